@@ -23,17 +23,6 @@ pub mod cli {
         pub use crate::cli::support::setting_names::flag;
     }
 }
-pub mod edit {
-    pub mod choose {
-        pub use crate::edit::choose::{candidates, choose_labels, require_labels};
-    }
-    pub mod components {
-        pub use crate::edit::components::components;
-    }
-    pub mod rename {
-        pub use crate::edit::rename::{give_name, keep, renumber, split};
-    }
-}
 pub mod engine {
     pub use crate::engine::growth::capacity;
     pub use crate::engine::run::{ListKey, Report};
@@ -78,65 +67,15 @@ pub mod eval {
         pub use crate::eval::ssim8::{ssim8, to_bytes};
     }
 }
-pub mod io {
-    pub use crate::io::{initial_gaussians, open};
-    pub mod atomic {
-        pub use crate::io::atomic::{remove_stale, write};
-    }
+pub mod records {
     pub mod block_file {
-        pub use crate::io::block_file::{BlockFile, BlocksFile};
-    }
-    pub mod camera_json {
-        pub use crate::io::camera_json::{CameraFile, read_camera, write_cameras};
+        pub use crate::records::block_file::{BlockFile, BlocksFile};
     }
     pub mod checkpoint {
-        pub use crate::io::checkpoint::{Checkpoint, Plane, VERSION};
+        pub use crate::records::checkpoint::{Checkpoint, Plane, VERSION};
     }
     pub mod checkpoint_folder {
-        pub use crate::io::checkpoint_folder::{Found, keep, list, next};
-    }
-    pub mod image {
-        pub use crate::io::image::{
-            photo_size, read_grey, read_photo, read_rgba, write_exr_rgb, write_exr_y, write_png_grey8,
-            write_png_grey16, write_png_rgb8,
-        };
-    }
-    pub mod init {
-        pub use crate::io::init::{add_far_gaussians, initial_gaussians};
-    }
-    pub mod label_table {
-        pub use crate::io::label_table::FILE;
-    }
-    pub mod lens {
-        pub use crate::io::lens::{
-            Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan,
-        };
-    }
-    pub mod mask {
-        pub use crate::io::mask::read_mask;
-    }
-    pub mod masks {
-        pub mod check {
-            pub use crate::io::masks::check::{Look, findings};
-        }
-    }
-    pub mod model {
-        pub use crate::io::model::{LazyModel, ModelRef, StoredModel, read_model, write_model};
-    }
-    pub mod ply {
-        pub use crate::io::ply::read_points;
-    }
-    pub mod read {
-        pub use crate::io::read::text;
-    }
-    pub mod run_folder {
-        pub use crate::io::run_folder::{CONFIG, Lock, of_model};
-    }
-    pub mod truth {
-        pub use crate::io::truth::{files_below, read_truth};
-    }
-    pub mod window {
-        pub use crate::io::window::{Window, ids_of_photo, windows};
+        pub use crate::records::checkpoint_folder::{Found, keep, list, next};
     }
 }
 pub mod label {
@@ -203,19 +142,10 @@ pub mod shaders {
         pub use crate::shaders::constants::{
             ALPHA_MAX, ALPHA_MIN, KEY_INVISIBLE, LOG2_ALPHA_MIN, NO_SPLAT, TRANSMITTANCE_MIN,
         };
-        pub mod exact {
-            pub use crate::shaders::constants::exact::SH_C0;
-        }
     }
     pub mod structs {
         pub use crate::shaders::structs::{Counters, StepUniforms};
     }
-}
-pub mod synth {
-    pub use crate::synth::cameras::{cameras, ring_of_cameras};
-    pub use crate::synth::trace::{Picture, alone, photograph, picture};
-    pub use crate::synth::world::World;
-    pub use crate::synth::{dataset, write};
 }
 pub mod train {
     pub use crate::train::alignment::aligned;

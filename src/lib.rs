@@ -10,7 +10,7 @@
 //! ```no_run
 //! use labelgs::engine::Engine;
 //! use labelgs::gpu::{Gpu, GpuOptions};
-//! use labelgs::{edit, io, render, run, synth};
+//! use labelgs::{edit, formats, render, run, scenes, synth};
 //! use std::path::Path;
 //!
 //! fn main() -> labelgs::Result<()> {
@@ -21,12 +21,12 @@
 //!     request.inputs.masks = Some(scene.join("masks"));
 //!     let summary = run::train(&request, &|| Gpu::new(&GpuOptions::default()), &mut ())?;
 //!
-//!     let model = io::read_model(&summary.model)?.gaussians;
+//!     let model = formats::read_model(&summary.model)?.gaussians;
 //!     let barrel = edit::extract(&model, &[3], edit::MIN_LABEL_CONFIDENCE)?;
 //!     let rest = edit::remove(&model, &[3])?;
-//!     io::write_model("barrel.ply", &barrel)?;
+//!     formats::write_model("barrel.ply", &barrel)?;
 //!
-//!     let camera = io::open(scene, &io::LoadOptions::default())?.test[0].camera.clone();
+//!     let camera = scenes::open(scene, &scenes::LoadOptions::default())?.test[0].camera.clone();
 //!     let size = (camera.width, camera.height);
 //!     let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &rest, [size])?;
 //!     let picture = render::render(&mut engine, &camera, &render::RenderOptions::default())?;
@@ -38,7 +38,7 @@
 //! | --- | --- |
 //! | train, watch, pause, resume | [`run::train`], [`run::Observer`] |
 //! | change the training itself | [`train`] |
-//! | read and write scenes, masks, models | [`io::open`], [`io::masks`], [`io::read_model`] |
+//! | read scenes, masks, models; write models | [`scenes::open`], [`masks`], [`formats`] |
 //! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
 //! | choose, take out, change objects | [`edit`] |
 //! | label a finished model, repair masks | [`label`] |
@@ -71,36 +71,37 @@ pub mod blocks;
 mod bundle_adjustment;
 #[cfg(feature = "cli")]
 mod cli;
-pub mod edit;
 pub mod engine;
-mod error;
 pub mod eval;
 pub mod gpu;
 pub mod guide;
 #[doc(hidden)]
 pub mod internals;
-pub mod io;
-mod lab;
 pub mod label;
-mod options;
 mod pass;
+pub mod records;
 pub mod render;
-mod report;
 pub mod run;
-pub mod scene;
 mod scheduler;
 mod shaders;
-mod stage;
-pub mod synth;
 pub mod train;
 mod verify;
 mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;
-mod web;
-mod words;
 
-pub use error::{Error, Result, Setting};
+pub use labelgs_edit as edit;
+pub use labelgs_files as files;
+pub use labelgs_formats as formats;
+pub use labelgs_masks as masks;
+pub use labelgs_scene::{self as scene, Error, Result, Setting};
+pub use labelgs_scenes as scenes;
+pub use labelgs_synth as synth;
+
+use labelgs_report as report;
+use labelgs_scene::{error, lab, options, stage, words};
+#[cfg(feature = "viewer")]
+use labelgs_web as web;
 
 /// The programs of README.md compile.
 #[cfg(doctest)]

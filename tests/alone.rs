@@ -3,10 +3,10 @@
 use crate::support::device;
 use glam::{DVec2, DVec3};
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth::ring_of_cameras;
 use labelgs::internals::train::{REFIT_STEPS, refitted};
 use labelgs::scene::{Camera, Gaussians, LabelMap, Occluders, Photo, View};
 use labelgs::synth::SynthOptions;
+use labelgs::synth::ring_of_cameras;
 use labelgs::{Error, Result};
 use std::collections::BTreeMap;
 

@@ -3,9 +3,9 @@
 use crate::exposure::go_on;
 use crate::support::device;
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth;
 use labelgs::internals::train::{TrainState, Trainer, first_model};
 use labelgs::run::{StrategyKind, TrainConfig};
+use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
 
 /// No Gaussian is finer than its limit, which densification hands on; a resumed training has the same bits.

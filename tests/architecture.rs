@@ -97,6 +97,10 @@ fn modules_use_lower_floors_only() {
     let mut breaches = Vec::new();
     for (path, text) in files("src", &["rs"]) {
         let own = module(&path);
+        // The compiler checks crates.
+        if Path::new(ROOT).join("src").join(&own).join("Cargo.toml").exists() {
+            continue;
+        }
         for other in used(&text) {
             // A macro of the scheduler, which Rust exports at the root.
             let allowed = other == "buffers"

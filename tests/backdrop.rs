@@ -5,12 +5,12 @@ use crate::support::device::{Turn, device};
 use image::{Rgba, RgbaImage};
 use labelgs::engine::Engine;
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth;
 use labelgs::internals::train::{TrainState, Trainer, first_model};
-use labelgs::io::{self, LoadOptions};
 use labelgs::render::{RenderOptions, render};
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians, Photo, View};
+use labelgs::scenes::{self, LoadOptions};
+use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
 use std::fs;
 
@@ -103,7 +103,7 @@ fn opacity_is_read_where_it_is_wanted() {
         let background = [1.0; 3];
         let options =
             LoadOptions { keep_opacity, background, max_resolution, test_every: Some(2), ..LoadOptions::default() };
-        io::open(folder.path(), &options).expect("a scene")
+        scenes::open(folder.path(), &options).expect("a scene")
     };
     let texels = |views: &[View], right: usize| {
         let photo = views[0].photo().expect("a photo");

@@ -7,9 +7,9 @@ use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::internals::pass::KernelShape;
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
-use labelgs::io::initial_gaussians;
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians};
+use labelgs::scenes::initial_gaussians;
 
 /// Rows of tiles in a band; `None` trains on whole photos.
 fn options(turn: &Turn, tile_rows: Option<u32>, dataset: &Dataset) -> TrainerOptions {

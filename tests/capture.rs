@@ -2,9 +2,9 @@
 
 use assert_cmd::Command;
 use glam::DVec3;
-use labelgs::io::capture::{Fault, Report, scan};
-use labelgs::io::{LoadOptions, Lookup, open};
 use labelgs::scene::{Dataset, Photo, Point};
+use labelgs::scenes::capture::{Fault, Report, scan};
+use labelgs::scenes::{LoadOptions, Lookup, open};
 use std::path::{Path, PathBuf};
 
 /// A made scene of 16 photos.

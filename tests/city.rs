@@ -1,9 +1,8 @@
 //! The made city: many objects, too large for one photo, and seen by several photos everywhere.
 
-use labelgs::internals::synth;
-use labelgs::internals::synth::{World, cameras, picture};
-use labelgs::io::LabelTable;
+use labelgs::files::LabelTable;
 use labelgs::scene::Camera;
+use labelgs::synth::{self, World, cameras, picture};
 use labelgs::synth::{Preset, SynthOptions};
 use std::collections::BTreeSet;
 

@@ -2,15 +2,15 @@
 
 use assert_cmd::Command;
 use glam::DVec3;
+use labelgs::files::run_folder;
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::{read_model, write_model};
 use labelgs::internals::cli::scene::near_plane;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io::run_folder;
-use labelgs::internals::synth::ring_of_cameras;
-use labelgs::io::read_mask;
-use labelgs::io::{LabelEntry, LabelTable};
-use labelgs::io::{read_model, write_model};
+use labelgs::masks::read_mask;
 use labelgs::scene::Gaussians;
 use labelgs::synth::SynthOptions;
+use labelgs::synth::ring_of_cameras;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Output;

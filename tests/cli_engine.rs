@@ -1,7 +1,7 @@
 //! The command line with a device: `devices`, `plan`, `profile`, and a scene from `synth` to pictures.
 
 use assert_cmd::Command;
-use labelgs::io::read_model;
+use labelgs::formats::read_model;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -109,7 +109,7 @@ fn scene(folder: &Path) -> String {
 /// Width and height of the photos of a made scene.
 fn image_size(scene: &str) -> Value {
     let first = Path::new(scene).join("images/000.png");
-    let (width, height) = labelgs::internals::io::image::photo_size(&first).expect("a photo");
+    let (width, height) = labelgs::files::image::photo_size(&first).expect("a photo");
     serde_json::json!([width, height])
 }
 
@@ -248,10 +248,10 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
 
     let (truth, page) = (path("truth"), path("page"));
     for (view, object) in [("000", 1), ("000", 2), ("008", 1), ("008", 2)] {
-        let mask = labelgs::io::read_mask(format!("{masks}/{view}.png")).expect("a mask");
+        let mask = labelgs::masks::read_mask(format!("{masks}/{view}.png")).expect("a mask");
         let bytes: Vec<u8> = mask.ids.iter().map(|&id| if id == object { 255 } else { 0 }).collect();
         let file = format!("{truth}/{view}/{object}.png");
-        labelgs::internals::io::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
+        labelgs::files::image::write_png_grey8(file, mask.width, mask.height, &bytes).expect("written");
     }
     let by_name = ["benchmark", &out, "--scene", &scene, "--protocol", "lerf-mask", "--truth", &truth, "--page", &page];
     let found = json(&succeeds(&[&by_name[..], &["--json"]].concat()));

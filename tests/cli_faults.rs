@@ -357,7 +357,7 @@ fn a_folder_has_one_run_at_a_time() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     std::fs::create_dir_all(place.path("out")).expect("a folder");
-    let lock = labelgs::internals::io::run_folder::Lock::take(&place.path("out")).expect("the first run");
+    let lock = labelgs::files::run_folder::Lock::take(&place.path("out")).expect("the first run");
     let output = place.trained("out", &["--iterations", "1"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
     assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));

@@ -2,8 +2,8 @@
 
 use crate::support;
 use assert_cmd::Command;
-use labelgs::io::read_mask;
-use labelgs::io::read_model;
+use labelgs::formats::read_model;
+use labelgs::masks::read_mask;
 use serde_json::Value;
 use std::path::Path;
 

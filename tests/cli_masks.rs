@@ -39,7 +39,7 @@ fn imported_masks_pass_the_check_until_they_are_broken() {
             continue; // labels.json
         }
         let again = Path::new(&masks).join(path.file_name().expect("a name"));
-        let ids = |path: &Path| labelgs::io::read_mask(path).expect("a mask");
+        let ids = |path: &Path| labelgs::masks::read_mask(path).expect("a mask");
         assert_eq!(ids(&path), ids(&again));
     }
     let check = ["masks", "check", &masks, "--scene", &scene];

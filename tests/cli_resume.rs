@@ -2,7 +2,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, files, kills, stderr, succeeded};
-use labelgs::internals::io::run_folder::Lock;
+use labelgs::files::run_folder::Lock;
 use labelgs::internals::train::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

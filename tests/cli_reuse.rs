@@ -2,7 +2,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, copy, stderr, succeeded};
-use labelgs::io::{read_model, write_model};
+use labelgs::formats::{read_model, write_model};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;

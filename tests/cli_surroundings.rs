@@ -3,7 +3,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, copy, files, stderr, succeeded};
-use labelgs::io::write_model;
+use labelgs::formats::write_model;
 use labelgs::scene::Gaussians;
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};

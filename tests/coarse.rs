@@ -1,11 +1,11 @@
 //! Steps on small photos.
 
 use crate::support::device;
-use labelgs::internals::io::init;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Photo};
+use labelgs::scenes::init;
 use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
 use std::sync::Arc;
 

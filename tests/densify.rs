@@ -2,12 +2,12 @@
 
 use assert_cmd::Command;
 use glam::{DMat3, DQuat, DVec3};
-use labelgs::internals::synth::ring_of_cameras;
-use labelgs::io::read_mask;
-use labelgs::io::{Frame, Frames, LoadOptions};
+use labelgs::masks::read_mask;
 use labelgs::scene::Camera;
 use labelgs::scene::path::{Between, between, short_order, video};
+use labelgs::scenes::{Frame, Frames, LoadOptions};
 use labelgs::synth::SynthOptions;
+use labelgs::synth::ring_of_cameras;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Output;
@@ -143,7 +143,7 @@ fn tracked(folder: &Path) -> (String, String, String) {
     for index in 0..5_u16 {
         let ids: Vec<u16> = (0..64 * 48).map(|i| if i % 64 < 30 { 300 * index + 1 } else { 0 }).collect();
         let file = folder.join(format!("tracked/{index:05}.png"));
-        labelgs::internals::io::image::write_png_grey16(&file, 64, 48, &ids).expect("written");
+        labelgs::files::image::write_png_grey16(&file, 64, 48, &ids).expect("written");
     }
     (path("tracked"), path("video/frames.json"), path("masks"))
 }
@@ -160,9 +160,9 @@ fn masks_go_back_to_their_photos() {
         assert_eq!(read_mask(Path::new(&masks).join(photo)).expect("collected"), there, "{photo}");
     }
     let file = |name: &str| folder.path().join("tracked").join(name);
-    labelgs::internals::io::image::write_png_grey16(file("00002.png"), 48, 48, &[1; 48 * 48]).expect("written");
+    labelgs::files::image::write_png_grey16(file("00002.png"), 48, 48, &[1; 48 * 48]).expect("written");
     fails(3, "48 x 48 px and its frame 64 x 48", &args);
-    labelgs::internals::io::image::write_png_rgb8(file("00002.png"), 64, 48, &[[1, 2, 3]; 64 * 48]).expect("written");
+    labelgs::files::image::write_png_rgb8(file("00002.png"), 64, 48, &[[1, 2, 3]; 64 * 48]).expect("written");
     fails(3, "one id per pixel", &args);
     std::fs::remove_file(file("00002.png")).expect("removed");
     fails(3, "1 of 3 photos have no tracked mask", &args);
@@ -207,7 +207,7 @@ fn masks_of_a_rendered_video_return_to_their_photos() {
         std::fs::create_dir_all(tracked.parent().expect("a folder")).expect("made");
         // Perfect tracking: ground truth for the photos, other ids between them.
         let Some(photo) = &frame.photo else {
-            labelgs::internals::io::image::write_png_grey16(tracked, 96, 72, &[9; 96 * 72]).expect("written");
+            labelgs::files::image::write_png_grey16(tracked, 96, 72, &[9; 96 * 72]).expect("written");
             continue;
         };
         assert_eq!(index % 3, 0);
@@ -247,7 +247,7 @@ fn masks_of_faces_become_those_of_their_photos() {
     let densify = ["frames", &out, "--scene", &scene, "-o", &video, "--between", "0", "--include-test"];
     succeeds(&densify);
     let load = LoadOptions { masks: Some(format!("{scene}/masks").into()), ..LoadOptions::default() };
-    let dataset = labelgs::io::open(Path::new(&scene), &load).expect("read");
+    let dataset = labelgs::scenes::open(Path::new(&scene), &load).expect("read");
     let frames = Frames::read(&Path::new(&video).join("frames.json")).expect("frames");
     assert!(frames.lenses && frames.frames.len() > 6 && frames.frames.iter().any(|frame| frame.size.is_some()));
     let tracked = path("tracked");
@@ -259,7 +259,7 @@ fn masks_of_faces_become_those_of_their_photos() {
         // What lies beside the face is not of its photo.
         let padded: Vec<u16> = (0..width * height).map(|at| ids.get(at % width, at / width).unwrap_or(77)).collect();
         let file = Path::new(&tracked).join(Path::new(&frame.file).file_name().expect("a name"));
-        labelgs::internals::io::image::write_png_grey16(file, width, height, &padded).expect("written");
+        labelgs::files::image::write_png_grey16(file, width, height, &padded).expect("written");
     }
     let collect = ["masks", "collect", &tracked, "--frames", &format!("{video}/frames.json"), "-o", &masks];
     fails(2, "is needed: the photos of this video", &collect);

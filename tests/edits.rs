@@ -1,16 +1,15 @@
 //! Choosing and editing labels, on Gaussians and label maps made by hand.
 
 use glam::{DQuat, DVec3};
-use labelgs::edit::Grouping;
-use labelgs::edit::{Catalogue, Pick};
-use labelgs::edit::{Cleaned, Cleaning, Transform, clean};
-use labelgs::edit::{Place, Prompt, choose};
-use labelgs::edit::{Specks, recolour, relabel, split_components, without_specks};
+use labelgs::edit::components::components;
+use labelgs::edit::rename::{give_name, keep, renumber, split};
+use labelgs::edit::{
+    Catalogue, Cleaned, Cleaning, Grouping, Pick, Place, Prompt, Specks, Transform, choose, clean, recolour, relabel,
+    split_components, without_specks,
+};
+use labelgs::files::{LabelEntry, LabelTable};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::edit::components::components;
-use labelgs::internals::edit::rename::{give_name, keep, renumber, split};
-use labelgs::internals::shaders::constants::exact::SH_C0;
-use labelgs::io::{LabelEntry, LabelTable};
+use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Gaussians, LabelMap};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -8,9 +8,9 @@ use crate::support::device;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::exposure::decided;
 use labelgs::internals::train::{TrainState, Trainer};
-use labelgs::io::initial_gaussians;
 use labelgs::run::{ExposureMode, LabelRule, TrainConfig};
 use labelgs::scene::{ColourMatrix, Dataset};
+use labelgs::scenes::initial_gaussians;
 
 /// The loss sum (c' - t)^2 / 2, which has no kink.
 fn loss(image: &[[f64; 3]], rows: &ExposureRows, photo: &[[f64; 3]]) -> f64 {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use labelgs::edit::{Filled, Light, Sight, fill};
-use labelgs::internals::shaders::constants::exact::SH_C0;
+use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Camera, Gaussians, LabelMap};
 
 /// Radius of a dome, label 1, that stands on the plane z = 0, label 0.

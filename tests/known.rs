@@ -69,10 +69,10 @@ fn labels_beyond_those_of_the_masks_are_handled() {
     let [scene, masks, model] = ["scene", "scene/masks", "model.ply"].map(|name| place.text(name));
     succeeded(&place.trained("out", &["--config", &place.settings()]));
     let found = place.path("out/point_cloud/iteration_40/point_cloud.ply");
-    let mut gaussians = labelgs::io::read_model(&found).expect("a model").gaussians;
+    let mut gaussians = labelgs::formats::read_model(&found).expect("a model").gaussians;
     let labels = gaussians.labels.as_mut().expect("labels");
     labels.iter_mut().step_by(3).for_each(|label| *label = 65_535);
-    labelgs::io::write_model(&model, &gaussians).expect("written");
+    labelgs::formats::write_model(&model, &gaussians).expect("written");
     let commands: [&[&str]; 6] = [
         &["list", &model],
         &["render", &model, "--scene", &scene, "--what", "rgb,labels", "-o", &place.text("pictures")],

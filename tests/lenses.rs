@@ -1,12 +1,11 @@
 //! Lenses: their formulas, and a made scene photographed through each of them.
 
 use glam::{DVec2, DVec3};
-use labelgs::internals::io::lens::{Division, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan};
-use labelgs::internals::io::window::{Window, ids_of_photo, windows};
-use labelgs::internals::synth;
-use labelgs::internals::synth::{World, photograph, picture};
-use labelgs::io::LoadOptions;
 use labelgs::scene::{Camera, Dataset, LabelMap, View};
+use labelgs::scenes::LoadOptions;
+use labelgs::scenes::lens::{Division, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan};
+use labelgs::scenes::window::{Window, ids_of_photo, windows};
+use labelgs::synth::{self, World, photograph, picture};
 use labelgs::synth::{Preset, SynthLens, SynthOptions};
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
@@ -123,7 +122,7 @@ fn options(lens: SynthLens, fov: Option<u32>) -> SynthOptions {
 fn read(folder: &Path, options: &SynthOptions) -> Dataset {
     synth::write(options, folder, &|_| Ok(())).expect("written");
     let load = LoadOptions { masks: Some(folder.join("masks")), test_every: None, ..LoadOptions::default() };
-    labelgs::io::open(folder, &load).expect("read")
+    labelgs::scenes::open(folder, &load).expect("read")
 }
 
 /// PSNR of a view against the picture of a pinhole camera in its place, over the covered pixels; the share of equal
@@ -182,7 +181,7 @@ fn a_wide_photo_becomes_the_faces_that_it_covers() {
     }
     // A photo and its faces are held out together.
     let load = LoadOptions { test_every: Some(2), ..LoadOptions::default() };
-    let split = labelgs::io::open(folder.path(), &load).expect("read");
+    let split = labelgs::scenes::open(folder.path(), &load).expect("read");
     assert!(split.test.len() == 5 && split.test.iter().all(|view| view.name.starts_with("000.")));
 }
 
@@ -212,8 +211,8 @@ fn ids_return_to_the_photo() {
         let folder = tempfile::tempdir().expect("a folder");
         let options = options(name.parse().expect("a lens"), Some(fov));
         let dataset = read(folder.path(), &options);
-        let stored = labelgs::io::read_mask(folder.path().join("masks/000.png")).expect("a mask");
-        let windows = windows(folder.path(), &labelgs::io::Lookup::default()).expect("windows");
+        let stored = labelgs::masks::read_mask(folder.path().join("masks/000.png")).expect("a mask");
+        let windows = windows(folder.path(), &labelgs::scenes::Lookup::default()).expect("windows");
         let of_photo = dataset.train.iter().filter(|view| view.name.starts_with("000."));
         let masks: Vec<_> =
             of_photo.map(|view| (&windows[&view.name], view.mask().expect("read").expect("a mask"))).collect();
@@ -232,8 +231,8 @@ fn observed_points_are_where_the_lens_shows_them() {
     for name in ["THIN_PRISM_FISHEYE", "EQUIRECTANGULAR", "OPENCV"] {
         let folder = tempfile::tempdir().expect("a folder");
         let dataset = read(folder.path(), &options(name.parse().expect("a lens"), None));
-        let report =
-            labelgs::io::capture::scan(folder.path(), &labelgs::io::Lookup::default(), &dataset).expect("scanned");
+        let report = labelgs::scenes::capture::scan(folder.path(), &labelgs::scenes::Lookup::default(), &dataset)
+            .expect("scanned");
         let error = report.reprojection.expect("observations");
         // Points have an error of 0.15 % of their distance.
         assert!(error < 1.0, "{name}: {error} px");

@@ -1,12 +1,12 @@
 //! Scores, choice of labels and selections against brute force or values worked out by hand.
 
 use labelgs::edit::Catalogue;
+use labelgs::edit::choose::{candidates, choose_labels, require_labels};
 use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
 use labelgs::eval::psnr;
 use labelgs::eval::ssim;
 use labelgs::eval::{Scores, ViewScores};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::edit::choose::{candidates, choose_labels, require_labels};
 use labelgs::internals::eval::boundary::{boundary_iou, rim, rim_width};
 use labelgs::internals::eval::crop::Crop;
 use labelgs::internals::eval::metrics::{Overlap, paper_score};

@@ -86,7 +86,7 @@ fn train(turn: &Turn, request: &Request, observer: &mut dyn Observer) -> Summary
 
 /// A camera that no photo has, larger than all of them.
 fn odd_camera(place: &Place) -> Camera {
-    let scene = labelgs::io::open(&place.path("scene"), &labelgs::io::LoadOptions::default()).expect("a scene");
+    let scene = labelgs::scenes::open(&place.path("scene"), &labelgs::scenes::LoadOptions::default()).expect("a scene");
     scene.train[0].camera.resized(201, 117)
 }
 

@@ -2,11 +2,11 @@
 
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::label::occlusion::{distances, picture};
-use labelgs::internals::synth::{World, ring_of_cameras};
-use labelgs::io::OcclusionTable;
 use labelgs::label::occlusion::{Rule, by_contour, by_mean};
+use labelgs::records::OcclusionTable;
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use labelgs::synth::{Preset, SynthOptions};
+use labelgs::synth::{World, ring_of_cameras};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A repeatable number in 0 to 1.
@@ -240,7 +240,7 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
     let world = World::new(options.preset, options.seed);
     let (mut both, mut found_pairs, mut true_pairs, mut mean_pairs, mut mean_both) = (0, 0, 0, 0, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate() {
-        let made = labelgs::internals::synth::picture(&world, camera, view as u32);
+        let made = labelgs::synth::picture(&world, camera, view as u32);
         let labels = map(options.width, &made.ids.iter().map(|&id| u16::from(id)).collect::<Vec<_>>());
         let mut hidden: BTreeMap<(u16, u16), usize> = BTreeMap::new();
         for (object, whole) in world.objects.iter().zip(&made.whole) {

@@ -1,11 +1,11 @@
 //! A buffer that is too small costs a lost step, never a wrong update.
 
 use crate::support::device;
-use labelgs::internals::io::init;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::Trainer;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
+use labelgs::scenes::init;
 use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
 
 const SCENE: SynthOptions = SynthOptions {

@@ -2,8 +2,8 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, files, succeeded};
-use labelgs::io::{self, LoadOptions};
 use labelgs::scene::{Dataset, Pixels};
+use labelgs::scenes::{self, LoadOptions};
 use labelgs::synth::{self, SynthOptions};
 use std::path::Path;
 use std::time::Duration;
@@ -22,7 +22,7 @@ fn scene(folder: &Path, lens: &str) -> LoadOptions {
 }
 
 fn open(folder: &Path, options: &LoadOptions) -> Dataset {
-    io::open(folder, options).expect("a scene")
+    scenes::open(folder, options).expect("a scene")
 }
 
 fn equal(a: &Dataset, b: &Dataset) {

@@ -1,7 +1,9 @@
 //! The way of the paper from photos to an object, with `tools/segment.py` and a segmenter that knows the truth.
 
 use assert_cmd::Command;
-use labelgs::io::{LabelTable, read_mask, read_model};
+use labelgs::files::LabelTable;
+use labelgs::formats::read_model;
+use labelgs::masks::read_mask;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Output;

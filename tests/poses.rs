@@ -9,11 +9,11 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use glam::{DQuat, DVec3};
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth::dataset;
 use labelgs::internals::train::{TrainState, Trainer, aligned};
-use labelgs::io::initial_gaussians;
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Camera, Point, View};
+use labelgs::scenes::initial_gaussians;
+use labelgs::synth::dataset;
 use labelgs::synth::{Preset, SynthOptions};
 
 /// Decisions nearer than this (relative) could flip within a difference.

@@ -1,7 +1,7 @@
 //! `eval --removal` and `remove --fill` on a made scene, and their bad inputs.
 
 use crate::cli_edit::{labelgs, refused_with as refused, succeeds};
-use labelgs::io::{read_model, write_model};
+use labelgs::formats::{read_model, write_model};
 use serde_json::Value;
 use std::path::Path;
 

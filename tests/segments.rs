@@ -100,7 +100,7 @@ fn segments_change_no_bit() {
         ..Default::default()
     };
     let dataset = labelgs::synth::dataset(&options, 0);
-    let start = labelgs::io::initial_gaussians(&dataset, 0, 400).expect("points");
+    let start = labelgs::scenes::initial_gaussians(&dataset, 0, 400).expect("points");
     let config = TrainConfig { iterations: 20, label_from: Some(5), ..TrainConfig::default() };
     let run = |segment_length: u32| {
         let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };

@@ -10,9 +10,9 @@ use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::train::Trainer;
-use labelgs::io::initial_gaussians;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
+use labelgs::scenes::initial_gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
 /// A scene with one changed Gaussian in full view.

@@ -5,8 +5,9 @@ use crate::pass::fixture::prove;
 use crate::reference::adam::adam_value;
 use crate::scheduler::{R, RW, S, W, toy_shader};
 use crate::support::compare::{Tolerance, close};
+use crate::support::device;
 use crate::support::device::Turn;
-use crate::support::{device, toy};
+use crate::support::toy;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::internals::engine::capacity;
 use labelgs::internals::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
@@ -18,9 +19,9 @@ use labelgs::internals::shaders::ShaderDesc;
 use labelgs::internals::train::shared::{Place, SharedLayout, SharedParameters};
 use labelgs::internals::train::strategy::At;
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
-use labelgs::io::initial_gaussians;
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
+use labelgs::scenes::initial_gaussians;
 use std::sync::Arc;
 
 /// Views of the scene.

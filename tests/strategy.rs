@@ -10,9 +10,9 @@ use labelgs::internals::scheduler::plan::Buf;
 use labelgs::internals::shaders::structs::StepUniforms;
 use labelgs::internals::train::strategy::{At, Population, Strategy};
 use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
-use labelgs::io::initial_gaussians;
 use labelgs::run::{Densified, LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians};
+use labelgs::scenes::initial_gaussians;
 use serde_json::{Value, json};
 use std::sync::Arc;
 

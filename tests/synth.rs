@@ -1,12 +1,11 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use labelgs::files::LabelTable;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::synth;
-use labelgs::internals::synth::{Picture, World, alone, picture, ring_of_cameras};
-use labelgs::io::LabelTable;
-use labelgs::io::LoadOptions;
-use labelgs::io::read_mask;
+use labelgs::masks::read_mask;
 use labelgs::scene::Camera;
+use labelgs::scenes::LoadOptions;
+use labelgs::synth::{self, Picture, World, alone, picture, ring_of_cameras};
 use labelgs::synth::{Preset, SynthOptions};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -171,7 +170,7 @@ fn the_reader_finds_what_was_made() {
     let options = SynthOptions { views: 9, ..small() };
     synth::write(&options, folder.path(), &|_| Ok(())).expect("written");
     let load = LoadOptions { masks: Some(folder.path().join("masks")), ..LoadOptions::default() };
-    let read = labelgs::io::open(folder.path(), &load).expect("read");
+    let read = labelgs::scenes::open(folder.path(), &load).expect("read");
     let made = synth::dataset(&options, 8);
     assert_eq!((read.train.len(), read.test.len()), (7, 2));
     for (read, made) in read.all().into_iter().zip(made.all()) {

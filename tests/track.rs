@@ -1,13 +1,12 @@
 //! Ids from frame to frame by overlap, alone and on the video between sparse photos.
 
-use labelgs::internals::io::image::write_png_grey16;
-use labelgs::internals::synth::{World, picture, ring_of_cameras};
-use labelgs::io::read_mask;
+use labelgs::files::image::write_png_grey16;
 use labelgs::label::masks::{Overlap, track};
+use labelgs::masks::read_mask;
 use labelgs::scene::path::{Between, short_order, video};
 use labelgs::scene::{Camera, LabelMap};
-use labelgs::synth::{Fault, spoil};
-use labelgs::synth::{Preset, SynthOptions};
+use labelgs::synth::{Fault, Preset, SynthOptions, spoil};
+use labelgs::synth::{World, picture, ring_of_cameras};
 
 const HOW: Overlap = Overlap { least: 0.1, memory: 5 };
 

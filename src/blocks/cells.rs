@@ -1,7 +1,7 @@
 //! The cores of the blocks: a tree of halves along the ground.
 
 use crate::error::{Error, Result, Setting};
-use crate::io::block_file::Bounds;
+use crate::records::block_file::Bounds;
 use glam::DVec3;
 
 /// Share of a core's side by which the zone is larger, each way.

@@ -5,7 +5,7 @@ use super::coarse::Coarse;
 use super::frame::Frame;
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::io::block_file::Bounds;
+use crate::records::block_file::Bounds;
 use crate::scene::{Camera, View, Zone};
 use crate::train::strategy::weights::weights;
 use glam::{DVec2, DVec3};

@@ -2,10 +2,11 @@
 
 use super::frame::Frame;
 use crate::error::{Error, Result};
-use crate::io::label_table::LabelTable;
-use crate::io::{LoadOptions, Lookup, read, run_folder};
+use crate::files::label_table::LabelTable;
+use crate::files::{read, run_folder};
 use crate::run::{Settings, latest_model, models, summary};
 use crate::scene::{ColourMatrix, Dataset, Gaussians};
+use crate::scenes::{LoadOptions, Lookup};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -51,7 +52,7 @@ impl Coarse {
             lookup: Lookup { poses: settings.read.poses, ..options.lookup },
             ..options
         };
-        let dataset = crate::io::open_logged(scene, &options)?;
+        let dataset = crate::scenes::open_logged(scene, &options)?;
         let found = models::open(&path)?.gaussians;
         if found.is_empty() || dataset.train.is_empty() {
             return Err(Error::data(&path, "", "the model has no Gaussians, or the scene no view to train on"));

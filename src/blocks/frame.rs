@@ -1,6 +1,6 @@
 //! The frame of the ground, and the boxes of the blocks in it.
 
-use crate::io::block_file::Bounds;
+use crate::records::block_file::Bounds;
 use crate::scene::{Camera, Gaussians, Overview, Zone};
 use glam::DVec3;
 

@@ -3,13 +3,13 @@
 use super::trained::Trained;
 use crate::engine::Engine;
 use crate::error::Result;
+use crate::files::label_table::{LabelEntry, LabelTable, unique_name};
 use crate::gpu::Gpu;
-use crate::io::block_file::BlockFile;
-use crate::io::label_table::{LabelEntry, LabelTable, unique_name};
-use crate::io::{LoadOptions, Lookup, open_logged};
+use crate::records::block_file::BlockFile;
 use crate::render::{RenderOptions, render};
 use crate::run::models;
 use crate::scene::{LabelMap, UNLABELLED, View, Zone};
+use crate::scenes::{LoadOptions, Lookup, open_logged};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;

@@ -3,10 +3,11 @@
 use super::join::{BlockMasks, Joined, join};
 use super::trained::{Trained, compare, core};
 use crate::error::{Error, Result};
-use crate::io::block_file::{self, BlockFile, BlocksFile, REST};
-use crate::io::label_table::{self, LabelTable};
-use crate::io::run_folder::{self, Lock};
-use crate::io::{atomic, write_joined};
+use crate::files::atomic;
+use crate::files::label_table::{self, LabelTable};
+use crate::files::run_folder::{self, Lock};
+use crate::formats::write_joined;
+use crate::records::block_file::{self, BlockFile, BlocksFile, REST};
 use crate::run::models::{self, Models, model_path};
 use crate::scene::{Gaussians, UNLABELLED};
 use serde_json::json;
@@ -236,7 +237,7 @@ fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
 fn write_records(file: &BlocksFile, parts: &[Part], names: Option<&LabelTable>, out: &Path) -> Result<()> {
     if let Some(first) = parts.iter().find_map(Part::trained) {
         let from = first.folder.join(run_folder::CONFIG);
-        let text = crate::io::read::text(&from)?;
+        let text = crate::files::read::text(&from)?;
         atomic::write(out.join(run_folder::CONFIG), |to| to.write_all(text.as_bytes()))?;
     }
     LabelTable::put(names, &out.join(label_table::FILE))?;

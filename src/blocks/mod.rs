@@ -22,7 +22,7 @@ mod seams;
 mod split;
 mod trained;
 
-pub use crate::io::block_file::{BlockRow, Bounds};
+pub use crate::records::block_file::{BlockRow, Bounds};
 pub use estimate::{Estimate, Sketch, estimate};
 pub use join::BlockMasks;
 pub use merge::{MergeOptions, Merged, merge};

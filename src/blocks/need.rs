@@ -74,7 +74,7 @@ impl Common {
         let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
         let minutes = self.pace.map(|seconds| f64::from(steps) * (seconds * larger.max(1.0)) / 60.0);
         // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
-        let host = PROGRAM + (views as u64 * pixels * 6).min(crate::io::PHOTO_MEMORY) + 800 * gaussians;
+        let host = PROGRAM + (views as u64 * pixels * 6).min(crate::scenes::PHOTO_MEMORY) + 800 * gaussians;
         Ok(Need { device, host, steps, minutes })
     }
 }

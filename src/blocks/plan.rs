@@ -8,7 +8,7 @@ use super::need::{Card, Common, Need};
 use crate::engine::{Engine, EngineSize, card};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
-use crate::io::LoadOptions;
+use crate::scenes::LoadOptions;
 use crate::scheduler::SchedulerOptions;
 use glam::DVec3;
 use std::path::Path;
@@ -136,7 +136,7 @@ fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
     } else {
         let max_resolution = (options.max_resolution > 0).then_some(options.max_resolution);
         let load = LoadOptions { max_resolution, photos: false, masks: None, ..options.load.clone() };
-        let full = crate::io::open(&coarse.dataset.root, &load)?;
+        let full = crate::scenes::open(&coarse.dataset.root, &load)?;
         full.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect()
     };
     let largest = image.iter().fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1)));

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::eval::Places;
-use crate::io::block_file::{BLOCKS, BlocksFile};
+use crate::records::block_file::{BLOCKS, BlocksFile};
 use crate::scene::Zone;
 use glam::DVec3;
 use std::path::Path;

@@ -2,9 +2,10 @@
 
 use super::plan::{Plan, PlannedBlock};
 use crate::error::Result;
-use crate::io::block_file::{BlockFile, BlockRow, BlocksFile, REST, poses_crc};
-use crate::io::label_table::LabelTable;
-use crate::io::{atomic, write_model};
+use crate::files::atomic;
+use crate::files::label_table::LabelTable;
+use crate::formats::write_model;
+use crate::records::block_file::{BlockFile, BlockRow, BlocksFile, REST, poses_crc};
 use crate::scene::View;
 use std::path::Path;
 
@@ -45,8 +46,8 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
         plan.file(index, block, crc).write(&folder)?;
     }
     write_model(out.join(REST), &rest)?;
-    LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::io::label_table::FILE))?;
-    atomic::write(out.join(crate::io::block_file::BLOCKS), |to| to.write_all(&text))
+    LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::files::label_table::FILE))?;
+    atomic::write(out.join(crate::records::block_file::BLOCKS), |to| to.write_all(&text))
 }
 
 /// Returns the name of a block.

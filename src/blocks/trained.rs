@@ -1,9 +1,9 @@
 //! The finished training of a block.
 
 use crate::Setting;
-use crate::io::block_file::{self, BlockFile};
-use crate::io::label_table::LabelTable;
-use crate::io::{read, run_folder};
+use crate::files::label_table::LabelTable;
+use crate::files::{read, run_folder};
+use crate::records::block_file::{self, BlockFile};
 use crate::run::info::{self, Info};
 use crate::run::models::{self, model_path};
 use crate::run::{Settings, summary};

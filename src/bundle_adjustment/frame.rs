@@ -1,6 +1,6 @@
 //! A photo with the depths of the model.
 
-use crate::io::resample::shrink_photo;
+use crate::files::resize::shrink_photo;
 use crate::scene::{Camera, Photo};
 
 /// Longest side of a frame, px: places in it are known to a hundredth of a pixel.

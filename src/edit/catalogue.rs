@@ -1,9 +1,8 @@
 //! The labels of a model by id and by name, for command lines and messages.
 
-use crate::io::label_table::LabelTable;
-use crate::scene::{Gaussians, UNLABELLED};
-use crate::words::did_you_mean;
-use crate::{Error, Result};
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::words::did_you_mean;
+use labelgs_scene::{Error, Gaussians, Result, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most labels in a message.

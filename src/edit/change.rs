@@ -1,9 +1,8 @@
 //! Changes of the colours or labels of a model.
 
 use super::components::{Grouping, components};
-use crate::io::model::values::sh0_of;
-use crate::scene::{Gaussians, LABEL_MAX, MODEL_LABEL_MAX, UNLABELLED};
-use crate::{Error, Result, Setting};
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::{Error, Gaussians, LABEL_MAX, MODEL_LABEL_MAX, Result, Setting, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The treatment of parts that are too small.

@@ -1,8 +1,7 @@
 //! Chooses labels by a mask in one view.
 
 use super::catalogue::Catalogue;
-use crate::scene::{LabelMap, UNLABELLED};
-use crate::{Error, Result};
+use labelgs_scene::{Error, LabelMap, Result, UNLABELLED};
 
 /// A label with pixels in a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,9 +1,8 @@
 //! Drops Gaussians that only disturb: faint, huge, lonely or far ones.
 
-use crate::error::{Error, Result};
-use crate::scene::Gaussians;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use labelgs_scene::{Error, Gaussians, Result};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZero;

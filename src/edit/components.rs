@@ -3,16 +3,15 @@
 //! Two Gaussians are connected if their ellipsoids of `REACH` standard deviations, grown by half of a gap, intersect.
 //! The test uses the contact function of Perram and Wertheim (1985).
 
-use crate::scene::Gaussians;
-use crate::scene::gaussians::axes_of;
-use crate::stage::Stage;
-use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use labelgs_scene::gaussians::axes_of;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Error, Gaussians, Result};
 use std::collections::BTreeMap;
 
 /// Half axes of an ellipsoid in standard deviations: at its surface an eighth of the opacity is left.
-pub(crate) const REACH: f64 = 2.0;
+pub const REACH: f64 = 2.0;
 
 /// The rules for connected parts and specks.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,9 +3,8 @@
 use super::catalogue::Catalogue;
 use super::change::relabel;
 use super::rename::{give_name, renumber};
-use crate::io::label_table::LabelTable;
-use crate::scene::{Gaussians, UNLABELLED};
-use crate::{Error, Result, Setting};
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::{Error, Gaussians, Result, Setting, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The result of [`merge`].

@@ -2,8 +2,7 @@
 
 use super::catalogue::Catalogue;
 use super::choose::{candidates, require_labels};
-use crate::scene::{LabelMap, UNLABELLED};
-use crate::{Error, Result, Setting};
+use labelgs_scene::{Error, LabelMap, Result, Setting, UNLABELLED};
 use std::collections::BTreeSet;
 
 /// A place in a view. Pixels count from 0 at the top left, at the size of the label map.

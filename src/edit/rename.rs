@@ -1,9 +1,8 @@
 //! Updates the table of labels after an edit of the model.
 
 use super::catalogue::Catalogue;
-use crate::io::label_table::{LabelEntry, LabelTable};
-use crate::scene::UNLABELLED;
-use crate::{Error, Result, Setting};
+use labelgs_files::label_table::{LabelEntry, LabelTable};
+use labelgs_scene::{Error, Result, Setting, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Returns the entries whose id is wanted.

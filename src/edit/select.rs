@@ -1,9 +1,8 @@
 //! Lists the labels of a model, and makes models of some of them.
 
 use super::catalogue::Catalogue;
-use crate::scene::Gaussians;
-use crate::{Error, Result, Setting};
 use glam::DVec3;
+use labelgs_scene::{Error, Gaussians, Result, Setting};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -40,11 +39,11 @@ struct Sum {
 
 /// Adds up the Gaussians of each label, one after the other.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tally(BTreeMap<u32, Sum>);
+pub struct Tally(BTreeMap<u32, Sum>);
 
 impl Tally {
     /// Adds a Gaussian: its label, its place in the world, and its opacity after the sigmoid.
-    pub(crate) fn add(&mut self, label: u32, mean: DVec3, opacity: f64) {
+    pub fn add(&mut self, label: u32, mean: DVec3, opacity: f64) {
         let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
         let sum = self.0.entry(label).or_insert(start);
         // Never 0, so that invisible Gaussians have a centre too.
@@ -57,12 +56,12 @@ impl Tally {
     }
 
     /// Returns the number of Gaussians per label.
-    pub(crate) fn counts(&self) -> BTreeMap<u32, u64> {
+    pub fn counts(&self) -> BTreeMap<u32, u64> {
         self.0.iter().map(|(&label, sum)| (label, sum.count)).collect()
     }
 
     /// Returns one row per label, sorted.
-    pub(crate) fn summaries(&self) -> Vec<LabelSummary> {
+    pub fn summaries(&self) -> Vec<LabelSummary> {
         let row = |(&label, sum): (&u32, &Sum)| LabelSummary {
             label,
             count: sum.count,
@@ -83,7 +82,7 @@ pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
 }
 
 /// Returns the mean confidence of each label that occurs; nothing without confidences.
-pub(crate) fn mean_confidence(model: &Gaussians) -> BTreeMap<u32, f64> {
+pub fn mean_confidence(model: &Gaussians) -> BTreeMap<u32, f64> {
     let mut sums: BTreeMap<u32, (f64, u64)> = BTreeMap::new();
     for (row, &share) in model.label_confidence.iter().flatten().enumerate() {
         let (sum, count) = sums.entry(model.label(row)).or_default();
@@ -111,7 +110,7 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
 }
 
 /// The error of a choice that leaves nothing.
-pub(crate) fn nothing_left() -> Error {
+pub fn nothing_left() -> Error {
     Error::usage(Setting("labels"), "names every label of the model; no Gaussian would be left")
 }
 

@@ -3,8 +3,8 @@
 
 use super::Engine;
 use crate::error::Result;
-use crate::io::checkpoint::Plane;
 use crate::pass::{ATTRIBUTES, SHARED_PLANES};
+use crate::records::checkpoint::Plane;
 use crate::scheduler::plan::{Buf, Domain, TABLE};
 use glam::DVec3;
 use std::collections::BTreeMap;

@@ -1,7 +1,8 @@
 //! An HTML page with ground truth, prediction and difference of every scored picture, in one folder with its PNGs.
 
 use super::compared::{Compared, Watch};
-use crate::io::{atomic, image::write_png_rgb8};
+use crate::files::atomic;
+use crate::files::image::write_png_rgb8;
 use crate::report::panels::difference;
 use crate::report::{Figure, Panel, page, section};
 use crate::scene::colour::to_byte;

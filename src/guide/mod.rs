@@ -20,7 +20,7 @@
 //! Commands in boxes run one after the other, page after page, in an empty folder; a test runs them all, with fewer steps.
 
 #[allow(unused_imports, reason = "the pages link to them")]
-use crate::{Error, edit, engine, eval, gpu, io, label, render, run, scene, synth};
+use crate::{Error, edit, engine, eval, files, gpu, label, render, run, scene, scenes, synth};
 
 /// A module for each page, with the text of its file. Definitions of links come first and win over those at the end of a
 /// file, which serve readers of the file itself.
@@ -36,6 +36,10 @@ macro_rules! pages {
         /// [page outputs]: outputs
         /// [page formats]: formats
         /// [page devices]: devices
+        /// [`masks::import()`]: crate::masks::import
+        /// [`masks::inspect()`]: crate::masks::inspect
+        /// [`formats::read_model`]: crate::formats::read_model
+        /// [`formats::export_model`]: crate::formats::export_model
         ///
         #[doc = include_str!(concat!(stringify!($name), ".md"))]
         pub mod $name {}

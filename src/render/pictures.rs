@@ -1,6 +1,6 @@
 //! Writes pictures of a view as NAME.WHAT.png or NAME.WHAT.exr.
 
-use crate::io::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_grey16, write_png_rgb8};
+use crate::files::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_grey16, write_png_rgb8};
 use crate::scene::LABEL_MAX;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;

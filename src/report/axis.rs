@@ -2,7 +2,7 @@
 
 /// The range of an axis, and its ticks.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Axis {
+pub struct Axis {
     /// Value at the start.
     pub low: f64,
     /// Value at the end.
@@ -14,7 +14,7 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// Makes an axis for values from `low` to `high`. A rounded axis ends at ticks.
-    pub(crate) fn new(low: f64, high: f64, is_rounded: bool) -> Self {
+    pub fn new(low: f64, high: f64, is_rounded: bool) -> Self {
         const TICKS: f64 = 5.0;
         // A constant needs some room, also beside large numbers.
         let room = (high - low).max(1e-9 * low.abs().max(high.abs())).max(1e-12);
@@ -37,12 +37,12 @@ impl Axis {
     }
 
     /// Returns the place of a value: 0 at the start, 1 at the end.
-    pub(crate) fn place(&self, value: f64) -> f64 {
+    pub fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 
     /// Returns the text of a tick, with the digits that tell ticks apart.
-    pub(crate) fn text(&self, tick: f64) -> String {
+    pub fn text(&self, tick: f64) -> String {
         let size = tick.abs();
         let short = |value: f64, unit: &str| {
             let text = format!("{value:.2}");

@@ -9,13 +9,13 @@ use std::fmt::Write;
 const COLOURS: usize = 8;
 
 /// Returns the class of a colour.
-pub(crate) fn colour_class(colour: usize) -> String {
+pub fn colour_class(colour: usize) -> String {
     format!("c{}", colour % COLOURS)
 }
 
 /// A vertical mark.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Mark {
+pub struct Mark {
     /// Step.
     pub step: f64,
     /// What happened.
@@ -26,7 +26,7 @@ pub(crate) struct Mark {
 
 /// A picture of curves.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Chart {
+pub struct Chart {
     /// Title.
     pub title: String,
     /// Note below the title.
@@ -41,7 +41,7 @@ pub(crate) struct Chart {
 
 impl Chart {
     /// Returns the chart; nothing without points.
-    pub(crate) fn markup(&self) -> Markup {
+    pub fn markup(&self) -> Markup {
         let series: Vec<&Series> = self.series.iter().filter(|series| !series.points.is_empty()).collect();
         let thinned: Vec<Vec<(f64, f64)>> = series.iter().map(|series| series.thinned()).collect();
         let ends = |value: fn(&(f64, f64)) -> f64| {

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 /// A picture: its name, and its address inside or beside the page.
 #[derive(Clone, Debug)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// What it shows.
     pub name: String,
     /// `data:` or the name of a file beside the page.
@@ -13,7 +13,7 @@ pub(crate) struct Panel {
 
 /// The pictures of one view.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// Name of the view.
     pub view: String,
     /// Name of the object; none for the whole view.
@@ -28,7 +28,7 @@ pub(crate) struct Figure {
 
 impl Figure {
     /// Returns the figure.
-    pub(crate) fn markup(&self) -> Markup {
+    pub fn markup(&self) -> Markup {
         html! {
             figure.view {
                 figcaption {

@@ -1,12 +1,11 @@
 //! Pixels of the pictures that pages show, and small encoded copies of them.
 
-use crate::error::{Error, Result};
-use crate::io::image::jpeg_rgb8;
-use crate::io::resample::bounded_size;
-use crate::scene::Photo;
-use crate::scene::colour::to_byte;
 use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
+use labelgs_files::image::jpeg_rgb8;
+use labelgs_files::resize::bounded_size;
+use labelgs_scene::colour::to_byte;
+use labelgs_scene::{Error, Photo, Result};
 use std::io::Cursor;
 
 /// Longest side of a picture inside a page, px.
@@ -14,7 +13,7 @@ const LONGEST: u32 = 800;
 const QUALITY: u8 = 85;
 
 /// Returns the absolute difference of a render and its photo.
-pub(crate) fn difference(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
+pub fn difference(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
     let of = |([r, g, b, _], &found): (&[u8; 4], &[f32; 3])| {
         let found = found.map(to_byte);
         [found[0].abs_diff(*r), found[1].abs_diff(*g), found[2].abs_diff(*b)]
@@ -23,13 +22,13 @@ pub(crate) fn difference(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
 }
 
 /// Returns a difference that is easier to see.
-pub(crate) fn brighter(difference: &[[u8; 3]], times: u8) -> Vec<[u8; 3]> {
+pub fn brighter(difference: &[[u8; 3]], times: u8) -> Vec<[u8; 3]> {
     difference.iter().map(|colour| colour.map(|value| value.saturating_mul(times))).collect()
 }
 
 /// How a small copy is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum Kind {
     /// Smooth pictures: JPEG.
     Smooth,
     /// Maps of few colours with sharp contours: PNG.
@@ -37,7 +36,7 @@ pub(crate) enum Kind {
 }
 
 /// Encodes a copy that fits into a page.
-pub(crate) fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kind) -> Result<Vec<u8>> {
+pub fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kind) -> Result<Vec<u8>> {
     let broken = |text: String| Error::Bug(format!("a picture of a page: {text}"));
     let bytes = bytemuck::cast_slice(pixels).to_vec();
     let mut picture =

@@ -1,11 +1,11 @@
 //! A curve, thinned so that its spikes stay.
 
 /// Most points of a drawn curve.
-pub(crate) const POINTS_MAX: usize = 600;
+pub const POINTS_MAX: usize = 600;
 
 /// A named curve.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Series {
+pub struct Series {
     /// Name in the legend.
     pub name: String,
     /// Number of its colour.
@@ -16,14 +16,14 @@ pub(crate) struct Series {
 
 impl Series {
     /// Makes a curve of the finite points.
-    pub(crate) fn new(name: impl Into<String>, colour: usize, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+    pub fn new(name: impl Into<String>, colour: usize, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let points = points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
         Self { name: name.into(), colour, points }
     }
 
     /// Returns at most [`POINTS_MAX`] of the points: the least and the largest of each of equally long runs of points,
     /// with the first and the last point.
-    pub(crate) fn thinned(&self) -> Vec<(f64, f64)> {
+    pub fn thinned(&self) -> Vec<(f64, f64)> {
         let all = &self.points;
         let [first, inner @ .., last] = all.as_slice() else { return all.clone() };
         if all.len() <= POINTS_MAX {

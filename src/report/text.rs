@@ -4,12 +4,12 @@
 const NONE: &str = "–";
 
 /// Returns a number with a fixed count of digits, or a dash.
-pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
+pub fn number(value: Option<f64>, digits: usize) -> String {
     value.filter(|value| value.is_finite()).map_or(NONE.to_owned(), |value| format!("{value:.digits$}"))
 }
 
 /// Returns a count with thin spaces between thousands.
-pub(crate) fn count(value: u64) -> String {
+pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {
@@ -22,13 +22,13 @@ pub(crate) fn count(value: u64) -> String {
 }
 
 /// Returns bytes as MiB or GiB.
-pub(crate) fn bytes(value: u64) -> String {
+pub fn bytes(value: u64) -> String {
     let mib = value as f64 / f64::from(1 << 20);
     if mib < 1024.0 { format!("{mib:.1} MiB") } else { format!("{:.2} GiB", mib / 1024.0) }
 }
 
 /// Returns seconds as seconds, minutes or hours.
-pub(crate) fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     let whole = seconds.round().max(0.0) as u64;
     match whole {
         0..120 => format!("{seconds:.1} s"),
@@ -38,7 +38,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 }
 
 /// Returns a time since 1970, s, as date and time in UTC.
-pub(crate) fn utc(seconds: u64) -> String {
+pub fn utc(seconds: u64) -> String {
     let (days, rest) = (seconds / 86_400, seconds % 86_400);
     // Years begin in March here, so that the day that may be missing is the last one.
     let shifted = days + 719_468;

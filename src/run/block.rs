@@ -3,9 +3,9 @@
 use super::Settings;
 use super::resume::Resumed;
 use crate::error::{Error, Result};
-use crate::io::LoadOptions;
-use crate::io::block_file::{self, BlockFile, poses_crc};
+use crate::records::block_file::{self, BlockFile, poses_crc};
 use crate::scene::{ColourMatrix, Dataset, View};
+use crate::scenes::LoadOptions;
 use crate::train::ExposureMode;
 use crate::train::setup::region::Region;
 use crate::train::shared::exposure;

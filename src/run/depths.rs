@@ -1,9 +1,9 @@
 //! Depths that photos are known to have, from files or from the reconstruction.
 
 use crate::error::{Error, Result, Setting};
-use crate::io::capture::Sightings;
-use crate::io::{DepthFolder, Lookup};
 use crate::scene::{Dataset, View};
+use crate::scenes::capture::Sightings;
+use crate::scenes::{DepthFolder, Lookup};
 use crate::train::TrainConfig;
 use crate::train::input::known_depths::KnownDepths;
 use std::path::Path;

@@ -64,7 +64,7 @@ pub enum Start<'a> {
 pub struct Inputs {
     /// Folder of id masks, one per view by name. Without it the model has no labels.
     pub masks: Option<PathBuf>,
-    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See [`crate::io::LoadOptions::ignore`].
+    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See [`crate::scenes::LoadOptions::ignore`].
     #[serde(default)]
     pub ignore: Option<PathBuf>,
     /// Folder of depth maps in world units, in place of the points of the reconstruction, for
@@ -77,14 +77,14 @@ pub struct Inputs {
     pub max_bad_photos: Option<f32>,
     /// Accepts photos and points outside of the scene's folder.
     pub allow_outside: bool,
-    /// Folder of the photos, where they are not where the scene lists them. See [`crate::io::Lookup::images`].
+    /// Folder of the photos, where they are not where the scene lists them. See [`crate::scenes::Lookup::images`].
     #[serde(default)]
     pub images: Option<PathBuf>,
 }
 
 /// The description of a run.
 pub struct Request<'a> {
-    /// Folder or file of the scene, see [`crate::io::open`].
+    /// Folder or file of the scene, see [`crate::scenes::open`].
     pub scene: PathBuf,
     /// Folder of the run.
     pub output: PathBuf,
@@ -167,7 +167,7 @@ struct Run<'a> {
     occlusion: Option<String>,
     /// Comments for `config.toml`: name and value.
     facts: Vec<(&'static str, String)>,
-    names: Option<crate::io::label_table::LabelTable>,
+    names: Option<crate::files::label_table::LabelTable>,
     dataset: Dataset,
     /// View of the preview pictures.
     preview: Option<View>,

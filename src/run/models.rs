@@ -2,13 +2,13 @@
 
 use super::{Event, Run};
 use crate::error::{Error, Result};
-use crate::io::model::{LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
-use crate::io::read;
-use crate::io::{camera_json, image};
+use crate::files::{image, read};
+use crate::formats::{LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
 use crate::render::Rendered;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Photo};
+use crate::scenes::camera_json;
 use crate::train::between::Between;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::mean_confidence;
 use crate::eval::scores::{ObjectScores, Scores};
-use crate::io::label_table::LabelTable;
+use crate::files::label_table::LabelTable;
 use crate::scene::{Gaussians, UNLABELLED};
 use serde::{Deserialize, Serialize};
 

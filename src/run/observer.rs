@@ -5,7 +5,7 @@ use super::Summary;
 use super::history::Recorder;
 use crate::error::Result;
 use crate::eval::scores::Scores;
-use crate::io::label_table::LabelTable;
+use crate::files::label_table::LabelTable;
 use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Camera, Dataset, Gaussians};
 use crate::train::{Densified, StepReport, Trainer};

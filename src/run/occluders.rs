@@ -2,7 +2,7 @@
 
 use super::Request;
 use crate::error::{Error, Result, Setting};
-use crate::io::occlusion_table::OcclusionTable;
+use crate::records::occlusion_table::OcclusionTable;
 use crate::scene::{Dataset, View};
 use crate::train::{Occlusion, TrainConfig};
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::info::Pictured;
 use crate::error::{Error, Result};
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::label_iou;
-use crate::io::atomic;
+use crate::files::atomic;
 use crate::report::panels::{self, Kind, encoded};
 use crate::scene::LabelMap;
 use crate::scene::colour::to_byte;

@@ -9,17 +9,18 @@ use super::resume::{self, Record, Resumed, absolute};
 use super::{Inputs, Observer, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
+use crate::files::label_table::LabelTable;
+use crate::files::run_folder::Lock;
+use crate::files::{self, atomic};
 use crate::gpu::Gpu;
-use crate::io::capture::Sightings;
-use crate::io::label_table::LabelTable;
-use crate::io::occlusion_table::OcclusionTable;
-use crate::io::run_folder::Lock;
-use crate::io::{self, Lookup, atomic, checkpoint_folder};
+use crate::records::checkpoint_folder;
+use crate::records::occlusion_table::OcclusionTable;
 use crate::scene::{Dataset, Gaussians};
+use crate::scenes::capture::Sightings;
+use crate::scenes::{self, Lookup};
 use crate::scheduler::SchedulerOptions;
 use crate::train::setup::TrainerOptions;
-use crate::train::shared::Shared;
-use crate::train::shared::exposure;
+use crate::train::shared::{Shared, exposure};
 use crate::train::{self, ExposureMode, TrainConfig, Trainer};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -97,7 +98,7 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
         std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
     }
     // A missing or unreadable folder needs no clearing.
-    let models = io::read::folder(&out.join("point_cloud")).unwrap_or_default();
+    let models = files::read::folder(&out.join("point_cloud")).unwrap_or_default();
     let own = [out.to_owned(), checkpoints, out.join("preview"), out.join(pictures::FOLDER)];
     for folder in own.into_iter().chain(models) {
         atomic::remove_stale(folder, Duration::ZERO);
@@ -119,7 +120,7 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Op
     if let Some(block) = block {
         block.limit(&mut options);
     }
-    let dataset = io::open_logged(&request.scene, &options)?;
+    let dataset = scenes::open_logged(&request.scene, &options)?;
     block.map_or(Ok(()), |block| block.check_scene(&dataset))?;
     if dataset.train.is_empty() {
         let problem = format!("no view is left to train on; set {} to 0 or to a larger number", Setting("test_every"));

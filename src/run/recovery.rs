@@ -3,7 +3,7 @@
 use super::steps::steps;
 use super::{Request, Run};
 use crate::error::{Error, Result};
-use crate::io::checkpoint_folder;
+use crate::records::checkpoint_folder;
 use crate::run::Summary;
 use std::time::Duration;
 

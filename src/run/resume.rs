@@ -3,8 +3,9 @@
 use super::history::Sums;
 use super::{Changed, Inputs, Request, Settings};
 use crate::error::{Error, Result, Setting};
-use crate::io::{ReadOptions, checkpoint_folder};
+use crate::records::checkpoint_folder;
 use crate::run::RunOptions;
+use crate::scenes::ReadOptions;
 use crate::train::TrainState;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

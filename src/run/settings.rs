@@ -1,11 +1,12 @@
 //! All settings of a run, and the file that stores them.
 
 use crate::error::{Error, Result, Setting};
-use crate::io::{self, LoadOptions, ReadOptions, run_folder};
+use crate::files::{self, run_folder};
 use crate::options::parse::as_bytes;
 #[cfg(feature = "cli")]
 use crate::options::parse::bytes;
 use crate::options::{Key, Options};
+use crate::scenes::{self, LoadOptions, ReadOptions};
 use crate::train::setup::near_plane::NEAR;
 use crate::train::{Preset, TrainConfig};
 use crate::words::did_you_mean;
@@ -14,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-crate::options::options! {
+crate::options! {
     /// What a run writes before its end, and the memory that it takes: nothing of it changes a result.
     pub struct RunOptions {
         "Output" {
@@ -39,7 +40,7 @@ crate::options::options! {
             /// gone with the process. The model has the same bits.
             #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
             #[serde(with = "as_bytes")]
-            photo_memory <"SIZE">: u64 = io::PHOTO_MEMORY;
+            photo_memory <"SIZE">: u64 = scenes::PHOTO_MEMORY;
         }
     }
 }
@@ -80,7 +81,7 @@ impl Settings {
 
     /// Reads a file of [`Self::dump`]. Missing keys keep their defaults.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = io::read::text(path)?;
+        let text = files::read::text(path)?;
         let named: BTreeMap<toml::Spanned<String>, IgnoredAny> = parse(path, &text)?;
         if let Some(key) = named.keys().find(|key| !Self::keys().any(|known| known.name == key.get_ref())) {
             let cure = did_you_mean(key.get_ref(), Self::keys().map(|known| known.name));
@@ -101,7 +102,7 @@ impl Settings {
         let file = run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
         let Some(file) = file else { return Ok(None) };
         // Accept keys of other versions of labelgs: they must not make a model unreadable.
-        let text = io::read::text(&file)?;
+        let text = files::read::text(&file)?;
         let mut settings = Self::parse(&file, &text)?;
         let near = &mut settings.train.near;
         // 0 means automatic, which needs a scene.

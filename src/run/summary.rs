@@ -3,7 +3,7 @@
 use super::ObjectSummary;
 use crate::error::Result;
 use crate::eval::scores::Scores;
-use crate::io::atomic;
+use crate::files::atomic;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -17,28 +17,28 @@ const PAIRS_MIN: usize = 300;
 const CONTRAST_MIN: f64 = 6.0;
 
 /// A sample of views and points of a scene, or of a model as points.
-pub(crate) struct Sample {
+pub struct Sample {
     views: Vec<(Camera, Option<Arc<Photo>>)>,
     points: Vec<Point>,
 }
 
 /// How well the points of a sample fit its views.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Agreement {
+pub struct Agreement {
     /// Mean share of the points in front of a camera.
-    pub(crate) in_front: f64,
+    pub in_front: f64,
     /// Mean share of the points in the picture of a camera.
-    pub(crate) in_picture: f64,
+    pub in_picture: f64,
     /// The same of the middle one of the views, by their shares.
-    pub(crate) in_median_picture: f64,
+    pub in_median_picture: f64,
     /// Correlation of the colours of points and pixels, both relative to their means in a view; `None` without photos, or
     /// where there is too little to compare.
-    pub(crate) colour: Option<f64>,
+    pub colour: Option<f64>,
 }
 
 impl Sample {
     /// Takes some of the views and points. Photos that are not in memory are read.
-    pub(crate) fn new(views: &[&View], points: impl ExactSizeIterator<Item = Point>) -> Result<Self> {
+    pub fn new(views: &[&View], points: impl ExactSizeIterator<Item = Point>) -> Result<Self> {
         let some = views.iter().step_by(views.len().div_ceil(VIEWS_MAX).max(1));
         let view = |view: &&View| {
             let photo = view.photo.as_ref().map(|photo| photo.get()).transpose()?;
@@ -49,17 +49,17 @@ impl Sample {
     }
 
     /// Number of points.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.points.len()
     }
 
     /// Returns true if a camera shows none of the points.
-    pub(crate) fn is_unseen(&self, camera: &Camera) -> bool {
+    pub fn is_unseen(&self, camera: &Camera) -> bool {
         self.points.iter().all(|point| camera.sees(point.position).is_none())
     }
 
     /// Compares points and views; `change` turns each camera first.
-    pub(crate) fn agreement(&self, change: impl Fn(&mut Camera)) -> Agreement {
+    pub fn agreement(&self, change: impl Fn(&mut Camera)) -> Agreement {
         let mut pairs: Vec<[f64; 6]> = Vec::new();
         let (mut front, mut shares) = (0, Vec::with_capacity(self.views.len()));
         for (camera, photo) in &self.views {

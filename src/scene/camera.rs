@@ -100,6 +100,6 @@ impl Camera {
 }
 
 /// Returns a side of an image at a share of its size, at least 1 px.
-pub(crate) fn side_at(full: u32, share: f64) -> u32 {
+pub fn side_at(full: u32, share: f64) -> u32 {
     ((f64::from(full) * share).round() as u32).clamp(1, full)
 }

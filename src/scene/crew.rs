@@ -10,7 +10,7 @@ use std::thread;
 
 /// Returns `of` of the numbers below `count`, in order, from at most `workers` threads; `what` names the work for who shows its
 /// progress.
-pub(crate) fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let stage = Stage::new(what, count);
     let of = |index| stage.counted(|| of(index));
     let workers = workers.min(count).min(rayon::current_num_threads());
@@ -38,12 +38,12 @@ pub(crate) fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn
 }
 
 /// Returns `of` of each view, in order, as [`map`] does. As many views at a time have their pixels in memory as there is memory for.
-pub(crate) fn over_views<T: Send>(what: &str, views: &[&View], of: impl Fn(&View) -> T + Sync) -> Vec<T> {
+pub fn over_views<T: Send>(what: &str, views: &[&View], of: impl Fn(&View) -> T + Sync) -> Vec<T> {
     map(what, views.len(), at_once(views.iter().copied()), |index| of(views[index]))
 }
 
 /// Number of views whose pixels may be asked for at the same time.
-pub(crate) fn at_once<'a>(views: impl Iterator<Item = &'a View>) -> usize {
+pub fn at_once<'a>(views: impl Iterator<Item = &'a View>) -> usize {
     let of_view = |view: &View| {
         let photo = view.photo.as_ref().map_or(usize::MAX, |photo| photo.at_once());
         view.mask.as_ref().map_or(usize::MAX, |mask| mask.at_once()).min(photo)

@@ -4,14 +4,17 @@ use super::UNLABELLED;
 use crate::error::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 
+/// Largest opacity of a splat in a pixel (3DGS), as in `glsl/include/constants.glsl`.
+pub const ALPHA_MAX: f64 = 0.99;
+
 /// Returns the matrix of a rotation (w, x, y, z) of any length: its columns are the axes of the Gaussian.
-pub(crate) fn axes_of(quat: [f32; 4]) -> DMat3 {
+pub fn axes_of(quat: [f32; 4]) -> DMat3 {
     let [w, x, y, z] = quat.map(f64::from);
     DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
 /// Returns an opacity after the sigmoid.
-pub(crate) fn opacity_of(logit: f32) -> f64 {
+pub fn opacity_of(logit: f32) -> f64 {
     1.0 / (1.0 + (-f64::from(logit)).exp())
 }
 

@@ -80,7 +80,7 @@ fn widened(values: &[u16], steps: usize, stride: usize, pick: impl Fn(u16, u16) 
 }
 
 /// Returns the display colours of ids.
-pub(crate) fn label_colours<T: Copy + Into<u32>>(ids: &[T]) -> Vec<[u8; 3]> {
+pub fn label_colours<T: Copy + Into<u32>>(ids: &[T]) -> Vec<[u8; 3]> {
     ids.iter().map(|&id| label_colour(id.into())).collect()
 }
 
@@ -100,7 +100,7 @@ pub fn label_colour(id: u32) -> [u8; 3] {
 }
 
 /// Returns the ids of some pixels, sorted, without 0.
-pub(crate) fn objects_of(ids: &[u16]) -> Vec<u16> {
+pub fn objects_of(ids: &[u16]) -> Vec<u16> {
     // One bit per id.
     let mut seen = [0_u64; 1024];
     ids.iter().for_each(|&id| seen[usize::from(id / 64)] |= 1 << (id % 64));

@@ -11,7 +11,7 @@ const SIZE_OF_A_POINT: f64 = 10.0;
 
 /// Returns the best origin for positions: 0 unless the scene is far away. Its coordinates are multiples of a power of
 /// two above the size of the scene, so that the subtraction loses little.
-pub(crate) fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
+pub fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     if positions.is_empty() {
         return DVec3::ZERO;
     }

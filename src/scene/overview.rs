@@ -33,7 +33,7 @@ impl Overview {
 }
 
 /// Returns matrix and right side of the equations for the point with the least sum of squared distances to the optical axes.
-pub(crate) fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>) -> (DMat3, DVec3) {
+pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>) -> (DMat3, DVec3) {
     let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
     for camera in cameras {
         let axis = camera.axis();

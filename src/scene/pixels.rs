@@ -9,7 +9,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Where pixels come from that are not in memory.
-pub(crate) trait Source<T>: fmt::Debug + Send + Sync {
+pub trait Source<T>: fmt::Debug + Send + Sync {
     /// Makes the pixels: the same each time.
     fn make(&self) -> Result<Arc<T>>;
 
@@ -19,15 +19,15 @@ pub(crate) trait Source<T>: fmt::Debug + Send + Sync {
 
 /// What is known of pixels without having them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Facts {
+pub struct Facts {
     /// CRC-32 of the pixels.
-    pub(crate) crc: u32,
+    pub crc: u32,
     /// Ids of a mask, sorted, without 0.
-    pub(crate) objects: Vec<u16>,
+    pub objects: Vec<u16>,
 }
 
 /// A photo or a mask.
-pub(crate) trait Picture {
+pub trait Picture {
     /// Returns the pixels as bytes.
     fn bytes(&self) -> &[u8];
 
@@ -75,7 +75,7 @@ enum Place<T> {
 
 impl<T> Pixels<T> {
     /// Takes pixels that `source` makes.
-    pub(crate) fn made(source: Arc<dyn Source<T>>, facts: Facts) -> Self {
+    pub fn made(source: Arc<dyn Source<T>>, facts: Facts) -> Self {
         Self(Place::Made(source, Arc::new(facts)))
     }
 
@@ -97,7 +97,7 @@ impl<T> Pixels<T> {
     }
 
     /// Number of such pictures that may be asked for at the same time.
-    pub(crate) fn at_once(&self) -> usize {
+    pub fn at_once(&self) -> usize {
         match &self.0 {
             Place::Held(_) => usize::MAX,
             Place::Made(source, _) => source.at_once().max(1),
@@ -130,7 +130,7 @@ impl Pixels<LabelMap> {
 
 impl<T> Pixels<T> {
     /// Returns the CRC-32 of the pixels.
-    pub(crate) fn crc(&self) -> u32
+    pub fn crc(&self) -> u32
     where
         T: Picture,
     {

@@ -1,16 +1,16 @@
 //! Samples of points that are very many.
 
 /// Most tests of points against views, for one purpose: about a second.
-pub(crate) const TESTS_MAX: usize = 50_000_000;
+pub const TESTS_MAX: usize = 50_000_000;
 
 /// Returns n: each n-th of `points`, tested against each of `views`, makes up to [`TESTS_MAX`] tests.
-pub(crate) fn every(points: usize, views: usize) -> usize {
+pub fn every(points: usize, views: usize) -> usize {
     points.saturating_mul(views) / TESTS_MAX + 1
 }
 
 /// Returns the numbers below `count` by rank, in an order for samples: each once. Those of the first ranks, however many, are spread evenly; the same
 /// count has the same order.
-pub(crate) fn spread_order(count: usize) -> impl Fn(usize) -> usize + Sync {
+pub fn spread_order(count: usize) -> impl Fn(usize) -> usize + Sync {
     let divisor = |mut a: usize, mut b: usize| {
         while b > 0 {
             (a, b) = (b, a % b);

@@ -10,16 +10,16 @@ const COUNT_MIN: usize = 5;
 
 /// The middle of most positions, and how far they are from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Spread {
+pub struct Spread {
     /// Medians of the coordinates.
-    pub(crate) middle: DVec3,
+    pub middle: DVec3,
     /// Distance from the middle within which [`WITHIN`] of the positions lie.
-    pub(crate) radius: f64,
+    pub radius: f64,
 }
 
 impl Spread {
     /// Measures positions; `None` if they are too few or all at one place.
-    pub(crate) fn of(positions: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
+    pub fn of(positions: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
         let along = |axis: usize| median(positions.clone().map(move |position| position[axis]));
         let middle = DVec3::new(along(0)?, along(1)?, along(2)?);
         let mut distances: Vec<f64> = positions.map(|position| position.distance(middle)).collect();
@@ -32,7 +32,7 @@ impl Spread {
     }
 
     /// Returns the distance from the middle, in radii.
-    pub(crate) fn distance(&self, position: DVec3) -> f64 {
+    pub fn distance(&self, position: DVec3) -> f64 {
         position.distance(self.middle) / self.radius
     }
 }

@@ -30,13 +30,13 @@ pub struct Photo {
 const CLEAR: u8 = 128;
 
 /// Returns the alpha of a valid pixel of an opacity from 0 to 1.
-pub(crate) fn alpha_of(opacity: f64) -> u8 {
+pub fn alpha_of(opacity: f64) -> u8 {
     CLEAR + (f64::from(u8::MAX - CLEAR) * opacity).round() as u8
 }
 
 impl Photo {
     /// Returns the colours over a colour of r, g, b from 0 to 1; none if the photo is opaque.
-    pub(crate) fn over(&self, behind: [f32; 3]) -> Option<Vec<[u8; 4]>> {
+    pub fn over(&self, behind: [f32; 3]) -> Option<Vec<[u8; 4]>> {
         let shows = |alpha: u8| (CLEAR..u8::MAX).contains(&alpha);
         let over = |&[r, g, b, alpha]: &[u8; 4]| {
             if !shows(alpha) {
@@ -50,7 +50,7 @@ impl Photo {
     }
 
     /// Returns true if any pixel counts.
-    pub(crate) fn has_valid(&self) -> bool {
+    pub fn has_valid(&self) -> bool {
         self.rgba.iter().any(|texel| texel[3] > 0)
     }
 
@@ -93,7 +93,7 @@ impl View {
 
 /// Returns unique names for output files of several views: [`View::stem`], with a number appended if an earlier view
 /// has the same one (`a/1.jpg` and `a_1.png`).
-pub(crate) fn stems(views: &[&View]) -> Vec<String> {
+pub fn stems(views: &[&View]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let mut name = |view: &&View| {
         let stem = view.stem();

@@ -1,8 +1,8 @@
 //! The cameras of a scene: on a dome around it, facing inwards, or on a flight over a city.
 
 use super::{Preset, SynthOptions, flight, hash01};
-use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::Camera;
 use std::f64::consts::TAU;
 
 /// Distance to the common target of the cameras, world units.

@@ -1,9 +1,8 @@
 //! Lenses of the cameras of a made scene.
 
 use super::SynthOptions;
-use crate::io::lens::{self, CameraModel, Lens, MODELS, Optics};
-use crate::scene::Camera;
-use crate::{Error, Result, Setting};
+use labelgs_scene::{Camera, Error, Result, Setting};
+use labelgs_scenes::lens::{self, CameraModel, Lens, MODELS, Optics};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 

@@ -3,9 +3,9 @@
 use super::SynthOptions;
 use super::trace::ray;
 use super::world::World;
-use crate::io::lens::Optics;
-use crate::scene::Point;
 use glam::{DVec2, DVec3};
+use labelgs_scene::Point;
+use labelgs_scenes::lens::Optics;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 

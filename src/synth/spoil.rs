@@ -1,7 +1,7 @@
 //! Puts the faults of trackers into masks, to measure their effect.
 
 use super::hash01;
-use crate::scene::LabelMap;
+use labelgs_scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Factor by which trackers shrink photos: 1080 to 480 lines.

@@ -3,9 +3,9 @@
 use super::hash01;
 use super::object::Object;
 use super::world::World;
-use crate::io::lens::{Lens, Optics};
-use crate::scene::Camera;
 use glam::{DVec2, DVec3};
+use labelgs_scene::Camera;
+use labelgs_scenes::lens::{Lens, Optics};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 

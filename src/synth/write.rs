@@ -1,18 +1,17 @@
 //! The files of a made scene: COLMAP model, photos, masks with names, objects alone, depth.
 
-use super::object::Object;
-use super::points::Seen;
-
 use super::cameras::cameras;
+use super::object::Object;
+use super::points::{self, Seen};
 use super::trace::{Picture, alone, involved, photograph, picture, repaint};
 use super::world::World;
-use super::{SynthLens, SynthOptions, exposure, lens, points, view_name};
-use crate::io::label_table::{self, LabelEntry, LabelTable};
-use crate::io::lens::Optics;
-use crate::io::{ReadOptions, atomic, image};
-use crate::scene::Camera;
-use crate::{Error, Result, Setting};
+use super::{SynthLens, SynthOptions, exposure, lens, view_name};
 use glam::DQuat;
+use labelgs_files::label_table::{self, LabelEntry, LabelTable};
+use labelgs_files::{atomic, image};
+use labelgs_scene::{Camera, Error, Result, Setting};
+use labelgs_scenes::ReadOptions;
+use labelgs_scenes::lens::Optics;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fs;

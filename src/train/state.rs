@@ -6,10 +6,10 @@
 use super::TrainConfig;
 use super::shared::KeptShared;
 use super::strategy::Kept;
-use crate::engine::state::Counts;
-use crate::engine::{GrownSizes, state};
+use crate::engine::GrownSizes;
+use crate::engine::state::{self, Counts};
 use crate::error::{Error, Result, Setting};
-use crate::io::checkpoint::{Checkpoint, Plane};
+use crate::records::checkpoint::{Checkpoint, Plane};
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
 use crate::scheduler::plan::{Buf, TABLE};
 use serde::{Deserialize, Serialize};

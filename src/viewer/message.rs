@@ -3,7 +3,7 @@
 //! A frame is a header of little-endian numbers and its pictures, each after its length: what a browser decodes by
 //! itself, PNG or JPEG.
 
-use crate::io::camera_json::CameraFile;
+use crate::scenes::camera_json::CameraFile;
 use serde::Deserialize;
 
 /// Largest message of a page, bytes.

@@ -2,7 +2,7 @@
 
 use super::message::Pane;
 use crate::error::Result;
-use crate::io::image::{jpeg_rgb8, png_grey16, png_rgb8, png_rgba8};
+use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8, png_rgba8};
 use crate::render::pictures::{depth_preview, to_word};
 use crate::render::{Parts, Rendered};
 use crate::scene::colour::to_byte;

@@ -1,7 +1,7 @@
 //! Rows of the label panel, and a history of steps of bounded length.
 
 use crate::edit::select::{LabelSummary, mean_confidence, summarise};
-use crate::io::label_table::LabelTable;
+use crate::files::label_table::LabelTable;
 use crate::scene::Gaussians;
 use crate::scene::labels::label_colour;
 use serde_json::{Value, json};

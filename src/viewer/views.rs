@@ -2,11 +2,11 @@
 
 use crate::error::{Error, Result};
 use crate::eval::metrics::{label_iou, psnr};
-use crate::io::camera_json::CameraFile;
-use crate::io::image::{jpeg_rgb8, png_rgb8};
-use crate::io::resample::{bounded_size, shrink_photo};
+use crate::files::image::{jpeg_rgb8, png_rgb8};
+use crate::files::resize::{bounded_size, shrink_photo};
 use crate::render::Rendered;
 use crate::scene::{Dataset, Overview, Pixels, View};
+use crate::scenes::camera_json::CameraFile;
 use serde_json::{Value, json};
 
 /// Longest side of a thumbnail, px.

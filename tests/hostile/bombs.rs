@@ -7,15 +7,13 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 use labelgs::Result;
-use labelgs::internals::io;
-use labelgs::internals::io::image::photo_size;
-use labelgs::internals::io::ply::read_points;
-use labelgs::io::DepthFolder;
-use labelgs::io::LoadOptions;
-use labelgs::io::read_mask;
-use labelgs::io::read_model;
-use labelgs::io::read_photo;
+use labelgs::files::image::photo_size;
+use labelgs::files::read_photo;
+use labelgs::formats::read_model;
+use labelgs::masks::read_mask;
 use labelgs::scene::DepthMap;
+use labelgs::scenes::points::read_points;
+use labelgs::scenes::{self, DepthFolder, LoadOptions};
 use std::path::Path;
 
 /// Returns the message of a reader, and checks that it did not allocate the size in the header.
@@ -96,8 +94,8 @@ fn depth(bytes: &[u8]) -> Result<DepthMap> {
     let scene = simple(1);
     scene.write("depths/00.exr", bytes);
     let options = LoadOptions { test_every: None, photos: false, ..LoadOptions::default() };
-    let dataset = io::open(scene.path(), &options).expect("a scene");
-    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())?
+    let dataset = scenes::open(scene.path(), &options).expect("a scene");
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::scenes::Lookup::default())?
         .read(&dataset.train[0])
 }
 
@@ -186,7 +184,7 @@ fn json_nested_deeply_is_refused() {
         format!(r#"{{"frames": [], "aabb": {}1{}}}"#, "[".repeat(100_000), "]".repeat(100_000)),
     ] {
         scene.write("transforms.json", text);
-        let text = refused(|| io::open(scene.path(), &LoadOptions::default()));
+        let text = refused(|| scenes::open(scene.path(), &LoadOptions::default()));
         assert!(text.contains("transforms.json") && text.contains("line 1"), "{text}");
     }
     let toml = scene.write("config.toml", format!("near = {}", "[".repeat(100_000)));

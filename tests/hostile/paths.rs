@@ -2,19 +2,18 @@
 
 use crate::io::fixtures::{Scene, images_bin, pinhole, refusal};
 use labelgs::Result;
-use labelgs::internals::io;
-use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions};
 use std::path::Path;
 
 const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
 fn open(scene: &Path, allow_outside: bool) -> Result<Dataset> {
-    io::open(
+    scenes::open(
         scene,
         &LoadOptions {
             test_every: None,
-            lookup: labelgs::io::Lookup { allow_outside, ..Default::default() },
+            lookup: labelgs::scenes::Lookup { allow_outside, ..Default::default() },
             ..LoadOptions::default()
         },
     )
@@ -113,7 +112,7 @@ fn names_that_are_no_files_are_refused() {
     assert!(refusal(refused("images", false)).contains("1 of 1 listed photos do not exist"));
     // A name that consists of a prefix only once caused a panic.
     let cameras = LoadOptions { photos: false, test_every: None, ..LoadOptions::default() };
-    assert_eq!(names(&io::open(scene.path(), &cameras).expect("cameras are enough")), ["images"]);
+    assert_eq!(names(&scenes::open(scene.path(), &cameras).expect("cameras are enough")), ["images"]);
     scene.photo("images/images.png", 12, 8);
     assert_eq!(names(&refused("images", false).expect("images.png in images")), ["images.png"]);
     for name in ["", ".", "./", "/", "..", "a\\u0000b"] {

@@ -1,16 +1,15 @@
 //! Reported failures of other programs, one test each.
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
-use labelgs::internals::io;
-use labelgs::internals::io::image::{photo_size, write_png_grey16};
-use labelgs::io::LoadOptions;
-use labelgs::io::read_mask;
-use labelgs::io::read_photo;
-use labelgs::io::{read_model, write_model};
+use labelgs::files::image::{photo_size, write_png_grey16};
+use labelgs::files::read_photo;
+use labelgs::formats::{read_model, write_model};
+use labelgs::masks::read_mask;
 use labelgs::scene::{Dataset, Gaussians};
+use labelgs::scenes::{self, LoadOptions};
 
 fn open(scene: &Scene) -> labelgs::Result<Dataset> {
-    io::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
 }
 
 /// Python's `L` has 4 bytes on Windows and 8 elsewhere; other readers took big-endian ids.
@@ -82,7 +81,7 @@ fn a_photo_a_pixel_off_its_camera_is_used() {
         write_png_grey16(scene.at("masks/a.png"), 519, 346, &vec![7; 519 * 346]).expect("a mask");
         let masks = Some(scene.path().join("masks"));
         let options = LoadOptions { masks, test_every: None, ..LoadOptions::default() };
-        let dataset = io::open(scene.path(), &options).expect("a scene");
+        let dataset = scenes::open(scene.path(), &options).expect("a scene");
         let view = &dataset.train[0];
         let (camera, mask) = (&view.camera, view.mask().expect("read").expect("a mask"));
         assert_eq!((camera.width, camera.height, mask.width, mask.height), (width, height, width, height));
@@ -98,7 +97,7 @@ fn more_than_255_ids_stay_apart() {
     write_png_grey16(scene.at("masks/00.png"), 12, 8, &ids).expect("a mask");
     assert_eq!(read_mask(scene.at("masks/00.png")).expect("a mask").ids, ids);
     let masks = Some(scene.path().join("masks"));
-    let dataset = io::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() });
+    let dataset = scenes::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() });
     let dataset = dataset.expect("a scene");
     assert_eq!(dataset.train[0].mask.as_ref().expect("a mask").objects().len(), 95);
 }

@@ -3,12 +3,11 @@
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io;
-use labelgs::io::{LoadOptions, initial_gaussians};
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions, initial_gaussians};
 
 fn open(scene: &Scene, max_bad_photos: f32) -> Result<Dataset> {
-    io::open(scene.path(), &LoadOptions { test_every: None, max_bad_photos, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { test_every: None, max_bad_photos, ..LoadOptions::default() })
 }
 
 #[test]
@@ -23,7 +22,7 @@ fn a_few_undecodable_photos_are_skipped_and_listed() {
     assert!(note.contains("2 of 20") && note.contains("03.png") && note.contains("11.png"), "{note}");
     // The split into training and test views does not depend on skipped photos.
     let split = LoadOptions { test_every: Some(4), ..LoadOptions::default() };
-    let dataset = io::open(scene.path(), &split).expect("a scene");
+    let dataset = scenes::open(scene.path(), &split).expect("a scene");
     let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
     assert_eq!(test, ["00.png", "04.png", "08.png", "12.png", "16.png"]);
     assert!(refusal(open(&scene, 0.0)).contains("`max_bad_photos = 0` allows 0"));

@@ -4,9 +4,9 @@ use crate::support::device;
 use assert_cmd::Command;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::Trainer;
-use labelgs::io::initial_gaussians;
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, LabelMap, Photo, View};
+use labelgs::scenes::initial_gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use std::path::Path;
 
@@ -195,9 +195,9 @@ fn a_damaged_scene_trains_with_warnings_or_says_what_is_wrong() {
         std::fs::read_dir(Path::new(&scene).join("masks")).expect("masks").map(|entry| entry.expect("a mask").path())
     {
         if mask.extension().is_some_and(|extension| extension == "png") {
-            let whole = labelgs::io::read_mask(&mask).expect("a mask");
+            let whole = labelgs::masks::read_mask(&mask).expect("a mask");
             let ids: Vec<u16> = (0..24 * 18).map(|index| whole.at(index % 24 * 2, index / 24 * 2)).collect();
-            labelgs::internals::io::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
+            labelgs::files::image::write_png_grey16(&mask, 24, 18, &ids).expect("a mask");
         }
     }
     let (masks, out) = (at("scene/masks"), at("out"));

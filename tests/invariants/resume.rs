@@ -5,14 +5,14 @@ use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
 use labelgs::engine::Engine;
+use labelgs::formats::write_model;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io::checkpoint::Plane;
+use labelgs::internals::records::checkpoint::Plane;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::train::{StepReport, TrainState, Trainer};
-use labelgs::io::initial_gaussians;
-use labelgs::io::write_model;
 use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::Dataset;
+use labelgs::scenes::initial_gaussians;
 use std::path::Path;
 
 /// Densification, opacity resets, votes and occluder updates before and after step 30, all at different steps.
@@ -80,7 +80,7 @@ fn same_when_resumed(turn: &Turn, config: TrainConfig, data: fn() -> Dataset, op
 fn gaussians_of(ply: &[u8]) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("model.ply"), ply).expect("a PLY");
-    labelgs::io::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len()
+    labelgs::formats::read_model(folder.path().join("model.ply")).expect("a model").gaussians.len()
 }
 
 #[test]

@@ -4,14 +4,14 @@ use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::engine::Engine;
+use labelgs::formats::write_model;
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::internals::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::internals::train::{StepReport, Trainer};
-use labelgs::io::initial_gaussians;
-use labelgs::io::write_model;
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
+use labelgs::scenes::initial_gaussians;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 
 /// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
@@ -205,6 +205,6 @@ pub fn labels_of(ply: &[u8]) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     std::fs::write(&path, ply).expect("a file");
-    let read = labelgs::io::read_model(&path).expect("a PLY");
+    let read = labelgs::formats::read_model(&path).expect("a PLY");
     read.gaussians.labels.map_or(0, |labels| labels.iter().filter(|&&label| label != 0).count())
 }

@@ -3,9 +3,9 @@
 
 use super::fixtures::*;
 use glam::{DMat3, DQuat, DVec3};
+use labelgs::formats::{LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
 use labelgs::internals::verify::reference::Rules;
 use labelgs::internals::verify::reference::sh::basis;
-use labelgs::io::{LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
 use labelgs::scene::Gaussians;
 use std::fs;
 

@@ -2,8 +2,8 @@
 
 use super::fixtures::*;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io::checkpoint::{Checkpoint, Plane, VERSION};
-use labelgs::internals::io::checkpoint_folder;
+use labelgs::internals::records::checkpoint::{Checkpoint, Plane, VERSION};
+use labelgs::internals::records::checkpoint_folder;
 use serde_json::json;
 use std::fs;
 

@@ -3,13 +3,12 @@
 use super::fixtures::*;
 use glam::{DQuat, DVec3};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io;
-use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions};
 use std::fs;
 
 fn open(scene: &Scene) -> labelgs::Result<Dataset> {
-    io::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
 }
 
 fn check_poses(dataset: &Dataset, names: &[&str]) {
@@ -133,7 +132,7 @@ fn missing_photos_are_skipped_before_the_split() {
     let scene = simple(10);
     fs::remove_file(scene.path().join("images/00.png")).expect("removed");
     let dataset =
-        io::open(scene.path(), &LoadOptions { test_every: Some(4), ..LoadOptions::default() }).expect("a scene");
+        scenes::open(scene.path(), &LoadOptions { test_every: Some(4), ..LoadOptions::default() }).expect("a scene");
     let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
     assert_eq!(test, ["01.png", "05.png", "09.png"]);
     assert_eq!(dataset.train.len(), 6);
@@ -144,19 +143,19 @@ fn missing_photos_are_skipped_before_the_split() {
 
 #[test]
 fn a_single_photo_is_trained_on() {
-    let dataset = io::open(simple(1).path(), &LoadOptions::default()).expect("a scene");
+    let dataset = scenes::open(simple(1).path(), &LoadOptions::default()).expect("a scene");
     assert_eq!((dataset.train.len(), dataset.test.len()), (1, 0));
     let zero = LoadOptions { test_every: Some(0), ..LoadOptions::default() };
-    assert_eq!(exit_status(&io::open(simple(2).path(), &zero).expect_err("no split")), 2);
+    assert_eq!(exit_status(&scenes::open(simple(2).path(), &zero).expect_err("no split")), 2);
 }
 
 #[test]
 fn without_photos_cameras_are_enough() {
     let scene = simple(3);
     let options = LoadOptions { photos: false, max_resolution: Some(6), ..LoadOptions::default() };
-    let with_files = io::open(scene.path(), &options).expect("a scene");
+    let with_files = scenes::open(scene.path(), &options).expect("a scene");
     fs::remove_dir_all(scene.path().join("images")).expect("removed");
-    let without = io::open(scene.path(), &options).expect("a scene");
+    let without = scenes::open(scene.path(), &options).expect("a scene");
     assert!(without.all().iter().all(|view| view.photo.is_none()));
     let cameras = |d: &Dataset| d.all().iter().map(|view| view.camera.clone()).collect::<Vec<_>>();
     assert_eq!(cameras(&with_files), cameras(&without));
@@ -276,7 +275,7 @@ fn a_folder_without_scene_says_what_was_expected() {
     let scene = Scene::new();
     let text = refusal(open(&scene));
     assert!(text.contains("sparse/0") && text.contains("transforms.json"));
-    assert!(refusal(io::open(&scene.path().join("nowhere"), &LoadOptions::default())).contains("no such folder"));
+    assert!(refusal(scenes::open(&scene.path().join("nowhere"), &LoadOptions::default())).contains("no such folder"));
 }
 
 #[test]
@@ -334,7 +333,7 @@ fn one_broken_pose_leaves_its_photo_out() {
         dataset.notes
     );
     let none = LoadOptions { max_bad_photos: 0.0, ..LoadOptions::default() };
-    assert!(refusal(io::open(scene.path(), &none)).contains("remove the image"));
+    assert!(refusal(scenes::open(scene.path(), &none)).contains("remove the image"));
 }
 
 #[test]
@@ -380,7 +379,7 @@ fn another_model_is_named_with_its_photos_and_can_be_the_scene() {
     let notes = dataset.notes;
     assert!(notes.iter().any(|note| note.contains("4 of 5 photos") && note.contains("have no pose")), "{notes:?}");
     assert!(notes.iter().any(|note| note.contains("with 1 photo;") && note.contains("has 4")), "{notes:?}");
-    let other = io::open(&scene.path().join("sparse/1"), &LoadOptions::default()).expect("a scene");
+    let other = scenes::open(&scene.path().join("sparse/1"), &LoadOptions::default()).expect("a scene");
     assert_eq!(other.all().len(), 4);
 }
 

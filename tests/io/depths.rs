@@ -1,10 +1,9 @@
 //! Depth maps from every kind of file, brought to their photos.
 
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
-use labelgs::internals::io;
-use labelgs::io::DepthFolder;
-use labelgs::io::LoadOptions;
+use labelgs::files;
 use labelgs::scene::{Dataset, DepthMap, View};
+use labelgs::scenes::{self, DepthFolder, LoadOptions};
 use std::path::Path;
 
 const SIZE: (u32, u32) = (12, 8);
@@ -20,12 +19,12 @@ fn values() -> Vec<f32> {
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> Dataset {
     let options = LoadOptions { max_resolution, test_every: None, photos: false, ..LoadOptions::default() };
-    io::open(scene.path(), &options).expect("a scene")
+    scenes::open(scene.path(), &options).expect("a scene")
 }
 
 fn read(scene: &Scene) -> labelgs::Result<DepthMap> {
     let dataset = open(scene, None);
-    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())?
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::scenes::Lookup::default())?
         .read(&dataset.train[0])
 }
 
@@ -81,13 +80,13 @@ fn every_kind_of_file_comes_back_exactly() {
     comes_back("00.png.npy", file(npy("<f2", "False", "(8, 12)", &bytes(half))));
     comes_back("00.pfm", file(pfm("-1.0", f32::to_le_bytes)));
     comes_back("00.PFM".to_lowercase().as_str(), file(pfm("1", f32::to_be_bytes)));
-    comes_back("00.exr", |path| io::image::write_exr_y(path, 12, 8, &values()).expect("written"));
+    comes_back("00.exr", |path| files::image::write_exr_y(path, 12, 8, &values()).expect("written"));
     let grey: Vec<[f32; 3]> = values().iter().map(|&v| [v, 0.0, -v]).collect();
-    comes_back("00.exr", |path| io::image::write_exr_rgb(path, 12, 8, &grey).expect("written"));
+    comes_back("00.exr", |path| files::image::write_exr_rgb(path, 12, 8, &grey).expect("written"));
     comes_back("00.png", |path| png(path, png::BitDepth::Sixteen, png::ColorType::Grayscale, &words()));
     // A picture of the depth beside the depth is not read.
     comes_back("00.exr", |path| {
-        io::image::write_exr_y(path, 12, 8, &values()).expect("written");
+        files::image::write_exr_y(path, 12, 8, &values()).expect("written");
         std::fs::write(path.with_extension("png"), b"a picture").expect("written");
     });
 }
@@ -136,10 +135,11 @@ fn a_folder_must_have_all_maps() {
     let views: Vec<&View> = dataset.train.iter().collect();
     let folder = scene.path().join("depths");
     assert!(
-        refusal(DepthFolder::open(&folder, scene.path(), &labelgs::io::Lookup::default())).contains("no such folder")
+        refusal(DepthFolder::open(&folder, scene.path(), &labelgs::scenes::Lookup::default()))
+            .contains("no such folder")
     );
     scene.write("depths/01.pfm", pfm("-1", f32::to_le_bytes));
-    let depths = DepthFolder::open(&folder, scene.path(), &labelgs::io::Lookup::default()).expect("a folder");
+    let depths = DepthFolder::open(&folder, scene.path(), &labelgs::scenes::Lookup::default()).expect("a folder");
     let message = refusal(depths.check_complete(&views));
     assert!(message.contains("2 of 3 photos") && message.contains("00.png, 02.png"), "{message}");
     depths.check_complete(&views[1..2]).expect("01 is there");
@@ -151,10 +151,10 @@ fn maps_follow_the_size_of_the_view() {
     let scene = simple(1);
     // Twice as large as the photo, each photo pixel's own four pixels equal.
     let large: Vec<f32> = (0..24 * 16).map(|i| value(i / 48 * 12 + i % 24 / 2)).collect();
-    io::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
+    files::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
     assert_eq!(read(&scene).expect("a map").values, values());
     let dataset = open(&scene, Some(6));
-    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::io::Lookup::default())
+    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::scenes::Lookup::default())
         .expect("a folder");
     let half = folder.read(&dataset.train[0]).expect("a map");
     // The centre of a pixel of half size is a corner of four; the lower right one of them is taken.
@@ -174,7 +174,7 @@ fn maps_are_undistorted_as_masks_are() {
     }
     let masks = Some(scene.path().join("masks"));
     let options = LoadOptions { masks, test_every: None, ..LoadOptions::default() };
-    let dataset = io::open(scene.path(), &options).expect("a scene");
+    let dataset = scenes::open(scene.path(), &options).expect("a scene");
     let ids = dataset.train[0].mask().expect("read").expect("a mask").ids.clone();
     let found = read(&scene).expect("a map").values;
     assert!(found.iter().any(|depth| depth.is_nan()), "the lens leaves pixels without a source");

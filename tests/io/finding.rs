@@ -2,13 +2,13 @@
 
 use super::fixtures::*;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::io::{self, LoadOptions, Lookup};
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions, Lookup};
 use std::fs;
 
 fn open_with(scene: &Scene, images: Option<&str>) -> labelgs::Result<Dataset> {
     let lookup = Lookup { images: images.map(Into::into), ..Lookup::default() };
-    io::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() })
 }
 
 fn open(scene: &Scene) -> labelgs::Result<Dataset> {
@@ -87,7 +87,7 @@ fn a_third_of_the_photos_may_lack() {
     let text = refusal(open(&scene));
     assert!(text.contains("5 of 12") && text.contains("up to 4") && text.contains("`max_bad_photos`"), "{text}");
     let most = LoadOptions { max_bad_photos: 0.5, test_every: None, ..LoadOptions::default() };
-    assert_eq!(io::open(scene.path(), &most).expect("a scene").train.len(), 7);
+    assert_eq!(scenes::open(scene.path(), &most).expect("a scene").train.len(), 7);
 }
 
 #[test]
@@ -113,6 +113,6 @@ fn a_folder_of_photos_and_a_video_are_answered_with_the_way_to_poses() {
     let text = refusal(open(&scene));
     assert!(text.contains("pictures holds 1 photos without poses") && text.contains("tools/photos"), "{text}");
     let video = scene.write("clip.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0isomiso2");
-    let text = refusal(io::open(&video, &LoadOptions::default()));
+    let text = refusal(scenes::open(&video, &LoadOptions::default()));
     assert!(text.contains("a video") && text.contains("tools/photos"), "{text}");
 }

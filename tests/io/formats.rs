@@ -3,7 +3,8 @@
 use super::fixtures::*;
 use crate::support::device::device;
 use labelgs::engine::Engine;
-use labelgs::io::{LabelEntry, LabelTable, LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::{LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
 use labelgs::render::{RenderOptions, render};
 use labelgs::scene::Gaussians;
 use std::fs;
@@ -290,7 +291,7 @@ fn pictures_of_every_format_are_those_of_the_ply() {
     let scene = Scene::new();
     let before = picture_model();
     let options = labelgs::synth::SynthOptions { views: 5, width: 96, height: 64, ..Default::default() };
-    let camera = labelgs::internals::synth::ring_of_cameras(&options)[1].clone();
+    let camera = labelgs::synth::ring_of_cameras(&options)[1].clone();
     let draw = |model: &Gaussians| {
         let mut engine = Engine::of_model(turn.gpu(), model, [(96, 64)]).expect("an engine");
         render(&mut engine, &camera, &RenderOptions::default()).expect("a picture").rgb

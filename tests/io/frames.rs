@@ -3,8 +3,8 @@
 use super::fixtures::Scene;
 use glam::{DMat3, DQuat, DVec3};
 use image::{Rgb, RgbImage};
-use labelgs::io::{self, LoadOptions, Lookup};
 use labelgs::scene::{Camera, Dataset, Flaw};
+use labelgs::scenes::{self, LoadOptions, Lookup};
 
 const SIZE: u32 = 64;
 const VIEWS: usize = 10;
@@ -77,7 +77,7 @@ fn as_is(_: usize, (rotation, translation): (DMat3, DVec3)) -> (DQuat, DVec3) {
 
 fn open(scene: &Scene, poses: &str) -> Dataset {
     let lookup = Lookup { poses: poses.parse().expect("words"), ..Lookup::default() };
-    io::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() }).expect("a scene")
+    scenes::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() }).expect("a scene")
 }
 
 #[test]

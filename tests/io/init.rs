@@ -2,12 +2,12 @@
 
 use glam::{DMat3, DVec3};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io::init::add_far_gaussians;
-use labelgs::internals::shaders::constants::exact::SH_C0;
 use labelgs::internals::train::first_model;
-use labelgs::io::initial_gaussians;
 use labelgs::run::{StrategyKind, TrainConfig};
+use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
+use labelgs::scenes::init::add_far_gaussians;
+use labelgs::scenes::initial_gaussians;
 
 fn point(x: f64, y: f64, z: f64) -> Point {
     Point { position: DVec3::new(x, y, z), colour: [255, 0, 51] }

@@ -1,15 +1,12 @@
 //! `masks check` finds each kind of planted fault, and nothing in clean masks.
 
 use super::mask_forms::*;
-use labelgs::internals::io;
-use labelgs::internals::io::image::write_png_grey8;
-use labelgs::internals::io::masks::check::{Look, findings};
-use labelgs::internals::synth;
-use labelgs::io::LoadOptions;
-use labelgs::io::masks::Report;
-use labelgs::io::masks::inspect;
-use labelgs::io::masks::{Finding, Problem};
+use labelgs::files::image::write_png_grey8;
+use labelgs::masks::check::{Look, findings};
+use labelgs::masks::{Finding, Problem, Report, inspect};
 use labelgs::scene::{Camera, Dataset, LabelMap, Point};
+use labelgs::scenes::{self, LoadOptions};
+use labelgs::synth;
 use labelgs::synth::SynthOptions;
 use std::fs;
 use std::path::Path;
@@ -43,7 +40,7 @@ fn report(folder: &TempDir, dataset: &Dataset) -> Report {
 /// Changes the ids of one mask.
 fn edit(folder: &TempDir, name: &str, change: impl Fn(usize, u16) -> u16) {
     let path = folder.path().join("masks").join(name);
-    let map = labelgs::io::read_mask(&path).expect("a mask");
+    let map = labelgs::masks::read_mask(&path).expect("a mask");
     let ids: Vec<u8> = map.ids.iter().enumerate().map(|(index, &id)| change(index, id) as u8).collect();
     write_png_grey8(&path, map.width, map.height, &ids).expect("written");
 }
@@ -208,7 +205,7 @@ fn an_id_in_one_view_is_found() {
 #[test]
 fn an_id_that_is_lost_for_one_view_is_found() {
     let (folder, dataset) = made();
-    let mask = |name: &str| labelgs::io::read_mask(folder.path().join("masks").join(name)).expect("a mask");
+    let mask = |name: &str| labelgs::masks::read_mask(folder.path().join("masks").join(name)).expect("a mask");
     let shown = |id: u16| {
         ["013.png", "014.png", "015.png"]
             .iter()
@@ -271,6 +268,6 @@ fn pictures_of_one_pixel_and_one_line_are_measured() {
 fn no_folder_is_an_error() {
     let scene = scene();
     let load = LoadOptions { photos: false, ..LoadOptions::default() };
-    let dataset = io::open(scene.path(), &load).expect("a scene");
+    let dataset = scenes::open(scene.path(), &load).expect("a scene");
     assert!(super::fixtures::refusal(inspect(&dataset, Path::new("/no/such/folder"))).contains("no such folder"));
 }

@@ -2,21 +2,19 @@
 
 use super::fixtures::*;
 use super::mask_forms::*;
+use labelgs::files::LabelTable;
+use labelgs::files::label_table::FILE;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io;
-use labelgs::internals::io::label_table::FILE;
-use labelgs::io::LabelTable;
-use labelgs::io::LoadOptions;
-use labelgs::io::masks::import;
-use labelgs::io::masks::{Format, ImportOptions, Imported, Overlap};
-use labelgs::io::read_mask;
+use labelgs::masks::{Format, ImportOptions, Imported, Overlap, import, read_mask};
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions};
 use png::{BitDepth, ColorType};
 use std::fs;
 use std::path::Path;
 
 fn dataset(scene: &Scene) -> Dataset {
-    io::open(scene.path(), &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() }).expect("a scene")
+    scenes::open(scene.path(), &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
+        .expect("a scene")
 }
 
 pub fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions)) -> labelgs::Result<Imported> {
@@ -48,7 +46,7 @@ pub fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
         assert_eq!((entry.pixels, entry.views), (pixels(object), PHOTOS as u32));
     }
     let options = LoadOptions { masks: Some(masks), ..LoadOptions::default() };
-    assert!(io::open(scene.path(), &options).expect("a scene").all().iter().all(|view| view.mask.is_some()));
+    assert!(scenes::open(scene.path(), &options).expect("a scene").all().iter().all(|view| view.mask.is_some()));
 }
 
 pub fn names(done: &Imported) -> Vec<Option<&str>> {

@@ -3,8 +3,7 @@
 use super::fixtures::*;
 use super::mask_forms::*;
 use super::mask_import::{auto, names, run, same_as_truth, sources};
-use labelgs::io::masks::{Format, ImportOptions, Imported, ObjectPer, Overlap};
-use labelgs::io::read_mask;
+use labelgs::masks::{Format, ImportOptions, Imported, ObjectPer, Overlap, read_mask};
 use png::{BitDepth, ColorType};
 use serde_json::{Value, json};
 use std::fs;

@@ -1,10 +1,9 @@
 //! Id images: encodings, names, sizes.
 
 use super::fixtures::*;
-use labelgs::internals::io;
-use labelgs::io::LoadOptions;
-use labelgs::io::read_mask;
+use labelgs::masks::read_mask;
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions};
 use std::fs;
 use std::path::Path;
 
@@ -21,7 +20,7 @@ fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDep
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs::Result<Dataset> {
     let masks = Some(scene.path().join("masks"));
-    io::open(scene.path(), &LoadOptions { masks, max_resolution, test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { masks, max_resolution, test_every: None, ..LoadOptions::default() })
 }
 
 #[test]
@@ -125,7 +124,7 @@ fn masks_without_objects_are_noted() {
     let scene = simple(10);
     let notes = || {
         let masks = Some(scene.path().join("masks"));
-        io::open(scene.path(), &LoadOptions { masks, ..LoadOptions::default() }).expect("a scene").notes
+        scenes::open(scene.path(), &LoadOptions { masks, ..LoadOptions::default() }).expect("a scene").notes
     };
     let has = |text: &str| {
         let notes = notes();
@@ -174,7 +173,7 @@ fn a_folder_of_another_form_names_the_import() {
     refused("masks/coco.json", r#"{"images": [], "annotations": [{"image_id": 1}]}"#);
     refused("masks/00/readme.txt", "");
     let file = Some(scene.write("coco.json", "{}"));
-    let message = refusal(io::open(scene.path(), &LoadOptions { masks: file, ..LoadOptions::default() }));
+    let message = refusal(scenes::open(scene.path(), &LoadOptions { masks: file, ..LoadOptions::default() }));
     assert!(message.contains("is a file") && message.contains("masks import"), "{message}");
     fs::remove_dir_all(scene.path().join("masks")).expect("removed");
     flat(&scene, "masks/other.png", 1);
@@ -246,7 +245,7 @@ fn ignored_pixels_have_no_weight() {
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &half);
     let open = |scene: &Scene| {
         let ignore = Some(scene.path().join("ignore"));
-        io::open(scene.path(), &LoadOptions { ignore, test_every: None, ..LoadOptions::default() })
+        scenes::open(scene.path(), &LoadOptions { ignore, test_every: None, ..LoadOptions::default() })
     };
     let dataset = open(&scene).expect("a scene");
     let alphas = |view: usize| {

@@ -1,7 +1,7 @@
 //! Model formats by file extension.
 
 use super::fixtures::*;
-use labelgs::io::{read_model, write_model};
+use labelgs::formats::{read_model, write_model};
 use labelgs::scene::Gaussians;
 
 fn balls() -> Gaussians {

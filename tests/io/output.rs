@@ -2,9 +2,10 @@
 
 use super::fixtures::*;
 use glam::{DMat3, DVec3};
+use labelgs::files::{atomic, image as images};
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io::{atomic, camera_json, image as images};
 use labelgs::scene::Camera;
+use labelgs::scenes::camera_json;
 use std::fs;
 use std::io::Error;
 use std::time::Duration;
@@ -84,7 +85,7 @@ fn pixels_come_back_from_png_and_exr() {
     assert_eq!(back.into_raw(), pixels.concat());
     let ids = [0, 1, 255, 256, 40_000, 65_535];
     images::write_png_grey16(scene.at("i.png"), 3, 2, &ids).expect("written");
-    assert_eq!(labelgs::io::read_mask(scene.at("i.png")).expect("a mask").ids, ids);
+    assert_eq!(labelgs::masks::read_mask(scene.at("i.png")).expect("a mask").ids, ids);
     let values = [0.0, -1.5, 1e30, 0.1, f32::MIN_POSITIVE, 7.0];
     images::write_exr_y(scene.at("y.exr"), 3, 2, &values).expect("written");
     let colours: Vec<[f32; 3]> = values.iter().map(|&v| [v, 2.0, -v]).collect();

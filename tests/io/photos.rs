@@ -2,17 +2,16 @@
 
 use super::fixtures::*;
 use glam::DVec2;
+use labelgs::files::image::{photo_size, write_png_grey16};
+use labelgs::files::read_photo;
 use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::io;
-use labelgs::internals::io::image::photo_size;
-use labelgs::internals::io::lens::{Lens, Polynomial, Projection};
-use labelgs::io::LoadOptions;
-use labelgs::io::read_photo;
 use labelgs::scene::{Dataset, Photo};
+use labelgs::scenes::lens::{Lens, Polynomial, Projection};
+use labelgs::scenes::{self, LoadOptions};
 use std::fs;
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs::Result<Dataset> {
-    io::open(scene.path(), &LoadOptions { max_resolution, test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { max_resolution, test_every: None, ..LoadOptions::default() })
 }
 
 #[test]
@@ -73,7 +72,7 @@ fn the_longest_side_is_bounded_by_one_rounding_rule() {
         assert_eq!(photo.rgba.len() as u32, expected.0 * expected.1);
     }
     let none = LoadOptions { max_resolution: Some(0), ..LoadOptions::default() };
-    assert_eq!(exit_status(&io::open(simple(1).path(), &none).expect_err("no image")), 2);
+    assert_eq!(exit_status(&scenes::open(simple(1).path(), &none).expect_err("no image")), 2);
 }
 
 /// Mean of `photo` over the box of target pixel (x, y), by brute force on a grid of 1/60 px.
@@ -154,9 +153,9 @@ fn undistortion_samples_where_the_model_says() {
     for k in [[0.08, -0.03, 0.002, -0.001], [-0.25, 0.05, 0.0, 0.0]] {
         let scene = distorted(k, size);
         let ids: Vec<u16> = (0..size.1).flat_map(|y| (0..size.0).map(move |x| (y * size.0 + x + 1) as u16)).collect();
-        io::image::write_png_grey16(scene.at("masks/a.png"), size.0, size.1, &ids).expect("written");
+        write_png_grey16(scene.at("masks/a.png"), size.0, size.1, &ids).expect("written");
         let masks = Some(scene.path().join("masks"));
-        let dataset = io::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() })
+        let dataset = scenes::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() })
             .expect("a scene");
         let view = &dataset.train[0];
         let (camera, photo) = (&view.camera, view.photo().expect("a photo"));

@@ -4,7 +4,7 @@ use crate::support::device;
 use crate::support::device::options;
 use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
 use labelgs::internals::pass::KernelShape;
-use labelgs::io::PipelineFolder;
+use labelgs::records::PipelineFolder;
 use std::sync::Arc;
 
 #[test]

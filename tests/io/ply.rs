@@ -1,9 +1,9 @@
 //! Gaussians and points as PLY: round trips, foreign layouts, hostile files.
 
 use super::fixtures::*;
-use labelgs::internals::io::ply::read_points;
-use labelgs::io::{LabelType, WriteOptions, export_model, read_model, write_model};
+use labelgs::formats::{LabelType, WriteOptions, export_model, read_model, write_model};
 use labelgs::scene::Gaussians;
+use labelgs::scenes::points::read_points;
 use std::fs;
 
 /// All values differ, so a swapped column is found.

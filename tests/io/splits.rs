@@ -1,13 +1,12 @@
 //! Splits that a data set brings.
 
 use super::fixtures::*;
-use labelgs::internals::io;
-use labelgs::io::LoadOptions;
 use labelgs::scene::{Dataset, View};
+use labelgs::scenes::{self, LoadOptions};
 use std::fs;
 
 fn open(scene: &Scene) -> Dataset {
-    io::open(scene.path(), &LoadOptions::default()).expect("a scene")
+    scenes::open(scene.path(), &LoadOptions::default()).expect("a scene")
 }
 
 fn names(views: &[View]) -> Vec<&str> {
@@ -47,7 +46,7 @@ fn lists_of_file_names_hold_out_and_leave_out() {
     let dataset = open(&transforms(3, r#""test_filenames": ["images/02.png"],"#));
     assert_eq!((dataset.train.len(), names(&dataset.test)), (2, vec!["02.png"]));
     let all = LoadOptions { test_every: None, ..LoadOptions::default() };
-    let dataset = io::open(transforms(3, r#""test_filenames": ["images/02.png"],"#).path(), &all).expect("a scene");
+    let dataset = scenes::open(transforms(3, r#""test_filenames": ["images/02.png"],"#).path(), &all).expect("a scene");
     assert_eq!((dataset.train.len(), dataset.test.len()), (3, 0));
     // Lists of another scene.
     let dataset = open(&transforms(9, r#""train_filenames": ["a.png"], "test_filenames": ["b.png"],"#));

@@ -2,14 +2,13 @@
 
 use super::fixtures::*;
 use glam::DVec3;
-use labelgs::internals::io;
-use labelgs::io::LoadOptions;
 use labelgs::scene::Dataset;
+use labelgs::scenes::{self, LoadOptions};
 
 const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
 fn open(scene: &Scene) -> labelgs::Result<Dataset> {
-    io::open(scene.path(), &LoadOptions::default())
+    scenes::open(scene.path(), &LoadOptions::default())
 }
 
 fn frame(name: &str, more: &str) -> String {
@@ -30,7 +29,7 @@ fn blender_uses_the_given_split_and_blends_alpha() {
     scene.write("transforms_train.json", text(&["./train/r_10", "./train/r_0"]));
     scene.write("transforms_test.json", text(&["./test/r_0"]));
     let options = LoadOptions { background: [1.0, 1.0, 0.0], test_every: Some(2), ..LoadOptions::default() };
-    let dataset = io::open(scene.path(), &options).expect("a scene");
+    let dataset = scenes::open(scene.path(), &options).expect("a scene");
     let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
     assert_eq!((names, dataset.test[0].name.as_str()), (vec!["train/r_0.png", "train/r_10.png"], "test/r_0.png"));
     let view = &dataset.train[0];
@@ -73,7 +72,8 @@ fn frames_override_the_file() {
     let global =
         r#""fl_x": 10.0, "w": 12.0, "h": 8.0, "cx": 6.5, "cy": 4.5, "camera_model": "OPENCV", "aabb_scale": 4"#;
     scene.write("transforms.json", format!(r#"{{{global}, "frames": [{}]}}"#, frames.join(",")));
-    let dataset = io::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() }).expect("a scene");
+    let dataset =
+        scenes::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() }).expect("a scene");
     let [a, b] = &dataset.train[..] else { panic!("two views") };
     assert_eq!((a.camera.fx, a.camera.fy, a.camera.cx, a.camera.cy), (20.0, 21.0, 5.0, 3.0));
     assert_eq!((b.camera.fx, b.camera.fy, b.camera.cx, b.camera.cy), (10.0, 10.0, 6.5, 4.5));
@@ -114,7 +114,7 @@ fn colmap_wins_and_a_json_can_be_named() {
     let text = format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frame("images/00.png", ""));
     let path = scene.write("transforms.json", text);
     assert_eq!(open(&scene).expect("a scene").all().len(), 2);
-    assert_eq!(io::open(&path, &LoadOptions::default()).expect("a scene").all().len(), 1);
+    assert_eq!(scenes::open(&path, &LoadOptions::default()).expect("a scene").all().len(), 1);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn a_broken_frame_leaves_its_photo_out() {
         frames[3] = broken.to_owned();
         scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frames.join(",")));
         let all = LoadOptions { test_every: None, ..LoadOptions::default() };
-        io::open(scene.path(), &all).expect("a scene")
+        scenes::open(scene.path(), &all).expect("a scene")
     };
     let nan = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,NaN,-Infinity]");
     let zero = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,0,0]");

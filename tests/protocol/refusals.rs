@@ -3,8 +3,8 @@
 use super::{Columns, columns_file, layout, message, run_on};
 use assert_cmd::Command;
 use labelgs::eval::protocol::{By, Protocol};
-use labelgs::io::write_model;
-use labelgs::io::{LabelEntry, LabelTable};
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::write_model;
 use labelgs::scene::Gaussians;
 use std::path::Path;
 use tempfile::tempdir;

@@ -3,10 +3,10 @@
 use super::{Columns, columns_file, run_on, view};
 use labelgs::eval::protocol::{By, Protocol};
 use labelgs::eval::{Compared, Watch};
+use labelgs::files::image::{read_grey, write_png_grey8};
 use labelgs::internals::cli::status::exit_status;
 use labelgs::internals::eval::page::Page;
-use labelgs::internals::io::image::{read_grey, write_png_grey8};
-use labelgs::internals::io::truth::read_truth;
+use labelgs::scenes::truth::read_truth;
 use std::collections::BTreeMap;
 use tempfile::tempdir;
 

@@ -1,10 +1,9 @@
 //! Runs of the program on a small scene, and the files of such runs.
 
 use assert_cmd::Command;
-use labelgs::internals::io::checkpoint_folder;
-use labelgs::internals::io::checkpoint_folder::Found;
+use labelgs::formats::read_model;
+use labelgs::internals::records::checkpoint_folder::{self, Found};
 use labelgs::internals::train::TrainState;
-use labelgs::io::read_model;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
@@ -63,7 +62,7 @@ impl Place {
         self.faulty(args, None)
     }
 
-    /// Runs the program with an injected fault (`src/lab/fault.rs`).
+    /// Runs the program with an injected fault (`src/scene/lab/fault.rs`).
     pub fn faulty(&self, args: &[&str], fault: Option<&str>) -> Output {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache"));

@@ -4,8 +4,9 @@ use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, Server, model};
 use super::{events, page_file};
 use crate::support::device;
-use labelgs::internals::io::camera_json::write_cameras;
-use labelgs::io::{LoadOptions, write_model};
+use labelgs::formats::write_model;
+use labelgs::scenes::LoadOptions;
+use labelgs::scenes::camera_json::write_cameras;
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 use serde_json::Value;
@@ -298,7 +299,7 @@ fn two_tabs_and_a_killed_one(browser: &mut Browser, tab: &Tab, server: &Server) 
 
 /// The cameras that a run has written stand in for its scene.
 fn a_run_without_its_scene(browser: &mut Browser, place: &Place) {
-    let scene = labelgs::io::open(&place.path("scene"), &LoadOptions::default()).expect("a scene");
+    let scene = labelgs::scenes::open(&place.path("scene"), &LoadOptions::default()).expect("a scene");
     let cameras: Vec<_> = scene.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
     let folder = place.path("run/point_cloud/iteration_1");
     std::fs::create_dir_all(&folder).expect("a folder");

@@ -2,9 +2,10 @@
 
 use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, model};
-use labelgs::internals::io::camera_json::CameraFile;
-use labelgs::io::{LoadOptions, write_model};
+use labelgs::formats::write_model;
 use labelgs::scene::Gaussians;
+use labelgs::scenes::LoadOptions;
+use labelgs::scenes::camera_json::CameraFile;
 use std::fmt::Write;
 
 /// Pictures of a page are blended in 8 bits: their error is a few steps of 1/256 where many Gaussians overlap.
@@ -44,7 +45,7 @@ pub fn a_page_shows_its_model(browser: &mut Browser, place: &Place) {
     write_model(place.path("rich.ply"), &rich(place)).expect("written");
     std::fs::copy(place.path("model.labels.json"), place.path("rich.labels.json")).expect("copied");
     place.succeeds(&["convert", "rich.ply", "page.html"]);
-    let scene = labelgs::io::open(&place.path("scene"), &LoadOptions::default()).expect("a scene");
+    let scene = labelgs::scenes::open(&place.path("scene"), &LoadOptions::default()).expect("a scene");
     let camera = serde_json::to_string(&CameraFile::from(&scene.train[0].camera)).expect("JSON");
     std::fs::write(place.path("camera.json"), &camera).expect("written");
     for (name, more) in [("all", &[][..]), ("some", &["--without", "3"])] {

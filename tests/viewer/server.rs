@@ -1,7 +1,9 @@
 //! A viewer of a small model in a process of its own, and a page that only speaks the protocol.
 
-use labelgs::io::{LabelEntry, LabelTable, LoadOptions, write_model};
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::write_model;
 use labelgs::scene::Gaussians;
+use labelgs::scenes::LoadOptions;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -72,7 +74,7 @@ impl Place {
 
 /// A model of the points of a scene, with labels from 0 to 4 by their place.
 pub fn model(scene: &Path) -> Gaussians {
-    let points = labelgs::io::open(scene, &LoadOptions::default()).expect("a scene").points;
+    let points = labelgs::scenes::open(scene, &LoadOptions::default()).expect("a scene").points;
     let count = points.len();
     let label = |row: usize| {
         let at = points[row].position;

@@ -3,10 +3,10 @@
 use super::Common;
 use super::measure::{table, write_json};
 use glam::{DMat3, DVec3};
-use labelgs::internals::io::atomic;
-use labelgs::internals::io::camera_json::CameraFile;
-use labelgs::io::write_model;
+use labelgs::files::atomic;
+use labelgs::formats::write_model;
 use labelgs::scene::{Camera, Gaussians};
+use labelgs::scenes::camera_json::CameraFile;
 use labelgs::{Error, Result};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};

@@ -1,6 +1,6 @@
 //! Clocks, medians, tables, files.
 
-use labelgs::internals::io::atomic;
+use labelgs::files::atomic;
 use labelgs::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write as _;

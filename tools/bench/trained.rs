@@ -4,11 +4,10 @@ use super::measure::{Cost, timed};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::synth;
 use labelgs::internals::train::{StepReport, Trainer, first_model};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians};
-use labelgs::synth::SynthOptions;
+use labelgs::synth::{self, SynthOptions};
 use std::sync::Arc;
 
 /// One view in this many of a made scene is held out.

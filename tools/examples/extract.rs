@@ -5,7 +5,7 @@
 //! ```
 
 use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
-use labelgs::io::{read_model, write_model};
+use labelgs::formats::{read_model, write_model};
 
 fn main() -> labelgs::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -5,10 +5,11 @@
 //! ```
 
 use labelgs::engine::Engine;
+use labelgs::formats;
 use labelgs::gpu::{Gpu, GpuOptions};
-use labelgs::io::{self, LoadOptions};
 use labelgs::render::{Format, Parts, RenderOptions, render, write_rgb};
 use labelgs::scene::label_colour;
+use labelgs::scenes::{self, LoadOptions};
 use std::path::Path;
 
 fn main() -> labelgs::Result<()> {
@@ -16,9 +17,9 @@ fn main() -> labelgs::Result<()> {
     let [model, scene, view, out, labels_out] = &arguments[..] else {
         return Err(labelgs::Error::usage("arguments", "expected: MODEL SCENE VIEW OUT.png LABELS.png"));
     };
-    let model = io::read_model(model)?.gaussians;
+    let model = formats::read_model(model)?.gaussians;
     // Poses only: photos are not decoded.
-    let scene = io::open(Path::new(scene), &LoadOptions { photos: false, ..LoadOptions::default() })?;
+    let scene = scenes::open(Path::new(scene), &LoadOptions { photos: false, ..LoadOptions::default() })?;
     let missing = || labelgs::Error::usage("VIEW", format!("the scene has no view {view}"));
     let camera = &scene.all().into_iter().find(|found| found.stem() == *view).ok_or_else(missing)?.camera;
 

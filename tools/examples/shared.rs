@@ -5,7 +5,7 @@
 //! ```
 
 use labelgs::gpu::{Gpu, GpuOptions};
-use labelgs::io::{self, LoadOptions};
+use labelgs::scenes::{self, LoadOptions};
 use labelgs::train::{
     At, Exposure, Extension, Place, SharedLayout, SharedParameters, TrainConfig, Trainer, TrainerOptions, first_model,
 };
@@ -45,7 +45,7 @@ fn main() -> labelgs::Result<()> {
         return Err(labelgs::Error::usage("arguments", "expected: SCENE STEPS"));
     };
     let iterations = steps.parse().map_err(|error| labelgs::Error::usage("STEPS", format!("{error}")))?;
-    let scene = io::open(Path::new(scene), &LoadOptions::default())?;
+    let scene = scenes::open(Path::new(scene), &LoadOptions::default())?;
     let config = TrainConfig { iterations, ..TrainConfig::default() };
     let model = first_model(&scene, &config)?;
     let options = TrainerOptions { shared: EarlyExposure::default().into(), ..TrainerOptions::default() };

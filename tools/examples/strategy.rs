@@ -4,8 +4,9 @@
 //! cargo run --release --example strategy -- SCENE STEPS OUT.ply
 //! ```
 
+use labelgs::formats;
 use labelgs::gpu::{Gpu, GpuOptions};
-use labelgs::io::{self, LoadOptions};
+use labelgs::scenes::{self, LoadOptions};
 use labelgs::train::{
     At, Buf, Builder, Extension, Hook, Population, StepUniforms, Strategy, TrainConfig, Trainer, TrainerOptions,
     first_model,
@@ -62,7 +63,7 @@ fn main() -> labelgs::Result<()> {
         return Err(labelgs::Error::usage("arguments", "expected: SCENE STEPS OUT.ply"));
     };
     let iterations = steps.parse().map_err(|error| labelgs::Error::usage("STEPS", format!("{error}")))?;
-    let scene = io::open(Path::new(scene), &LoadOptions::default())?;
+    let scene = scenes::open(Path::new(scene), &LoadOptions::default())?;
     let config = TrainConfig { iterations, ..TrainConfig::default() };
     let model = first_model(&scene, &config)?;
     let options = TrainerOptions { strategy: Some(Box::new(Thinning)), ..TrainerOptions::default() };
@@ -74,6 +75,6 @@ fn main() -> labelgs::Result<()> {
     if let Some(report) = trainer.newest_report() {
         println!("step {}: loss {:.4}", report.step, report.loss);
     }
-    io::write_model(out, &trainer.model()?)?;
+    formats::write_model(out, &trainer.model()?)?;
     Ok(())
 }

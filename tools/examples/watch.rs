@@ -40,7 +40,7 @@ fn main() -> labelgs::Result<()> {
         return Err(labelgs::Error::usage("arguments", "expected: SCENE OUT STEPS"));
     };
     let stop_after = steps.parse().map_err(|error| labelgs::Error::usage("STEPS", format!("{error}")))?;
-    let views = labelgs::io::open(scene.as_ref(), &labelgs::io::LoadOptions::default())?;
+    let views = labelgs::scenes::open(scene.as_ref(), &labelgs::scenes::LoadOptions::default())?;
     let mut watcher = Watcher { camera: views.train[0].camera.clone(), folder: out.into(), stop_after };
     let summary = run::train(&Request::new(scene, out), &|| Gpu::new(&GpuOptions::default()), &mut watcher)?;
     println!("stopped: {}, {} Gaussians in {}", summary.stopped, summary.gaussians, summary.model.display());

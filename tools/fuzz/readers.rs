@@ -2,19 +2,18 @@
 
 use super::seeds;
 use labelgs::Result;
+use labelgs::files::LabelTable;
+use labelgs::files::image;
+use labelgs::formats;
 use labelgs::internals::cli::profile_compare::{Profile, compare};
 use labelgs::internals::eval::lpips::weights::read_tensors;
-use labelgs::internals::io;
-use labelgs::internals::io::checkpoint::Checkpoint;
-use labelgs::internals::io::{camera_json, image, mask, model, ply};
-use labelgs::io::DepthFolder;
-use labelgs::io::Frames;
-use labelgs::io::LabelTable;
-use labelgs::io::LoadOptions;
-use labelgs::io::OcclusionTable;
-use labelgs::io::masks::import;
-use labelgs::io::masks::{Format, ImportOptions};
+use labelgs::internals::records::checkpoint::Checkpoint;
+use labelgs::masks::mask;
+use labelgs::masks::{Format, ImportOptions, import};
+use labelgs::records::OcclusionTable;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
+use labelgs::scenes::{self, DepthFolder, Frames, LoadOptions};
+use labelgs::scenes::{camera_json, points};
 use std::path::Path;
 
 pub fn put(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) {
@@ -56,7 +55,7 @@ pub fn sam_pictures(folder: &Path) {
 }
 
 pub fn open(folder: &Path) -> Result<Dataset> {
-    io::open(folder, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
+    scenes::open(folder, &LoadOptions { photos: false, test_every: None, ..LoadOptions::default() })
 }
 
 /// Reads a scene and its initial Gaussians.
@@ -66,7 +65,7 @@ pub fn scene(folder: &Path, _: &Path) -> Result<()> {
     assert!(dataset.points.iter().all(|point| point.position.as_vec3().is_finite()), "a point that is no f32");
     assert!(dataset.extent() > 0.0 && (dataset.extent() as f32).is_finite(), "the extent is {}", dataset.extent());
     if dataset.train.len() <= 8 {
-        sound_model(&io::initial_gaussians(&dataset, 1, 8)?);
+        sound_model(&scenes::initial_gaussians(&dataset, 1, 8)?);
     }
     Ok(())
 }
@@ -98,16 +97,16 @@ pub fn sound_model(model: &Gaussians) {
 
 /// Reads a model of any format, and checks that it survives writing and reading as a PLY.
 pub fn model(folder: &Path, file: &Path) -> Result<()> {
-    let read = model::read_model(file)?;
+    let read = formats::read_model(file)?;
     sound_model(&read.gaussians);
     let again = folder.join("again.ply");
-    assert_eq!(model::write_model(&again, &read.gaussians).expect("written"), 0);
-    assert_eq!(model::read_model(&again).expect("what was written").gaussians, read.gaussians);
+    assert_eq!(formats::write_model(&again, &read.gaussians).expect("written"), 0);
+    assert_eq!(formats::read_model(&again).expect("what was written").gaussians, read.gaussians);
     Ok(())
 }
 
 pub fn ply_cloud(_: &Path, file: &Path) -> Result<()> {
-    let points = ply::read_points(file)?;
+    let points = points::read_points(file)?;
     assert!(points.iter().all(|point| point.position.as_vec3().is_finite()), "a point that is no f32");
     Ok(())
 }
@@ -136,8 +135,8 @@ pub fn imported(folder: &Path, format: Format) -> Result<()> {
 
 pub fn depth(folder: &Path, _: &Path) -> Result<()> {
     let dataset = open(folder)?;
-    let map =
-        DepthFolder::open(&folder.join("depths"), folder, &labelgs::io::Lookup::default())?.read(&dataset.train[0])?;
+    let map = DepthFolder::open(&folder.join("depths"), folder, &labelgs::scenes::Lookup::default())?
+        .read(&dataset.train[0])?;
     assert_eq!(map.values.len(), map.width as usize * map.height as usize);
     Ok(())
 }

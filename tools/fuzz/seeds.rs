@@ -1,10 +1,10 @@
 //! Small valid files of every kind, made by the program's own writers where they exist.
 
+use labelgs::files::image as pixels;
+use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::formats::{SpzVersion, WriteOptions, export_model, write_model};
 use labelgs::gpu::PipelineStore;
-use labelgs::internals::io::image as pixels;
-use labelgs::io::PipelineFolder;
-use labelgs::io::{LabelEntry, LabelTable};
-use labelgs::io::{SpzVersion, WriteOptions, export_model, write_model};
+use labelgs::records::PipelineFolder;
 use labelgs::run::{Preset, Settings};
 use labelgs::scene::Gaussians;
 use std::io::{Cursor, Read};

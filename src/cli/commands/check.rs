@@ -3,8 +3,8 @@
 use crate::cli::support::args::{JsonFlag, ReadArgs};
 use crate::cli::support::context::Context;
 use crate::cli::support::stdout;
-use crate::io::capture::{Fault, Report, scan};
-use crate::io::{self, LoadOptions};
+use crate::scenes::capture::{Fault, Report, scan};
+use crate::scenes::{self, LoadOptions};
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
     // What is missing or damaged is a finding.
     let options = LoadOptions { test_every: None, photo_folder: None, max_bad_photos: 1.0, ..LoadOptions::default() };
-    let dataset = io::open(&args.scene, &args.read.options(options))?;
+    let dataset = scenes::open(&args.scene, &args.read.options(options))?;
     let is_found = |note: &&String| dataset.flaws.iter().any(|flaw| flaw.text() == *note);
     dataset.notes.iter().filter(|note| !is_found(note)).for_each(|note| tracing::warn!("{note}"));
     let report = scan(&args.scene, &args.read.lookup(), &dataset)?;

@@ -9,7 +9,7 @@ use crate::cli::support::parsers::model_file;
 use crate::cli::support::stdout;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
-use crate::io::model::export_model;
+use crate::formats::export_model;
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::words::counted;
 use clap::Args;

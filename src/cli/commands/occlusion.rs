@@ -7,13 +7,13 @@ use crate::cli::support::parsers::json_file;
 use crate::cli::support::scene::{near_plane, open_gpu};
 use crate::cli::support::stdout;
 use crate::engine::Engine;
+use crate::files::image::write_png_rgb8;
 use crate::gpu::Gpu;
-use crate::io::image::write_png_rgb8;
-use crate::io::occlusion_table::OcclusionTable;
-use crate::io::{self, LoadOptions};
 use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
+use crate::records::occlusion_table::OcclusionTable;
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{DepthKind, Gaussians, LabelMap, Occluders, View, stems};
+use crate::scenes::{self, LoadOptions};
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         photos: false,
         ..LoadOptions::default()
     };
-    let dataset = io::open_logged(&args.scene, &args.read.options(options))?;
+    let dataset = scenes::open_logged(&args.scene, &args.read.options(options))?;
     let views: Vec<&View> = dataset.all().into_iter().filter(|view| view.mask.is_some()).collect();
     let table = match (&args.depths, args.depth_kind, &args.model) {
         (Some(depths), Some(kind), _) => {

@@ -2,8 +2,8 @@
 
 use crate::Result;
 use crate::cli::support::parsers::share;
-use crate::io::{LoadOptions, Lookup, PoseConvention, ReadOptions};
 use crate::run::Settings;
+use crate::scenes::{LoadOptions, Lookup, PoseConvention, ReadOptions};
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use crate::cli::support::args::GlobalArgs;
 use crate::gpu::{Gpu, GpuOptions, MessageLog};
-use crate::io::PipelineFolder;
+use crate::records::PipelineFolder;
 use crate::run::models;
 use crate::scene::Gaussians;
 use crate::{Error, Result};

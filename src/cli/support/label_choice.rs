@@ -8,7 +8,7 @@ use crate::cli::support::parsers::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::cli::support::scene::{find_view, near_plane, open_gpu, open_scene};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Place, Prompt, choose};
-use crate::io::model::ModelRef;
+use crate::formats::ModelRef;
 use crate::scene::{Camera, LabelMap};
 use crate::scheduler::SchedulerOptions;
 use crate::{Error, Result, Setting};
@@ -166,7 +166,7 @@ impl PromptArgs {
         let points = self.at.iter().map(point("--at", false)).chain(self.not_at.iter().map(point("--not-at", true)));
         let mut prompts: Vec<Prompt> = points.chain(self.boxes.iter().map(area)).collect();
         if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
-            let map = crate::io::mask::read_mask(mask)?;
+            let map = crate::masks::mask::read_mask(mask)?;
             let place = Place::Mask(map.ids.iter().map(|&id| id != 0).collect());
             let size = Some((map.width, map.height));
             prompts.push(Prompt { argument: "--mask", view: view.clone(), size, place, away: false });

@@ -3,8 +3,8 @@
 use crate::Result;
 use crate::cli::support::parsers::bytes;
 use crate::engine::{Engine, EngineSize, tell_apart};
+use crate::formats::ModelRef;
 use crate::gpu::Gpu;
-use crate::io::model::ModelRef;
 use crate::render::large::{Index, Painter, fits};
 use crate::render::{Parts, RenderOptions, Rendered, label_map, render};
 use crate::scene::{Camera, LabelMap};

@@ -2,10 +2,10 @@
 
 use crate::Result;
 use crate::cli::support::args::SceneArgs;
-use crate::io::{self, LoadOptions};
 use crate::scene::agreement::{Agreement, Sample};
 use crate::scene::colour::to_byte;
 use crate::scene::{Dataset, Gaussians, Point, View};
+use crate::scenes::{self, LoadOptions};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -65,7 +65,7 @@ pub(crate) fn warn_of_misfit_with(
         ..reading.read.options(LoadOptions::default())
     };
     // The command does not need the photos, so that nothing is said of those that are missing or damaged.
-    match io::open(scene, &options) {
+    match scenes::open(scene, &options) {
         Ok(with_photos) => warn_of_misfit(path, model, &with_photos),
         Err(_) => warn_of_misfit(path, model, dataset),
     }

@@ -1,9 +1,9 @@
 //! How commands write models.
 
 use crate::Result;
-use crate::io::camera_json::views_of_model;
-use crate::io::model::{FirstView, LabelType, SpzVersion, WriteOptions, is_page};
+use crate::formats::{FirstView, LabelType, SpzVersion, WriteOptions, is_page};
 use crate::scene::Overview;
+use crate::scenes::camera_json::views_of_model;
 use clap::Args;
 use std::path::Path;
 

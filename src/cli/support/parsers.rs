@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::edit::catalogue::Pick;
-use crate::io::model::check_output;
+use crate::formats::check_output;
 use crate::options::parse;
 use crate::scene::MODEL_LABEL_MAX;
 use clap::builder::{PathBufValueParser, TypedValueParser};

@@ -5,10 +5,10 @@ use crate::cli::support::context::Context;
 use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
-use crate::io::pipeline_file::PipelineFolder;
-use crate::io::{self, LoadOptions};
+use crate::records::pipeline_file::PipelineFolder;
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
+use crate::scenes::{self, LoadOptions};
 use crate::scheduler::SchedulerOptions;
 use crate::train::setup::near_plane::NEAR;
 use crate::words::{counted, did_you_mean};
@@ -47,7 +47,7 @@ pub(crate) fn open_scene(
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
     let ignore = reading.ignore.clone();
     let options = LoadOptions { masks, ignore, max_resolution, test_every, background, photos, ..base };
-    io::open_logged(path, &reading.read.options(options))
+    scenes::open_logged(path, &reading.read.options(options))
 }
 
 /// Returns the views for `test`, `train`, `all` or a list of names.

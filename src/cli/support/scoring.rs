@@ -10,7 +10,7 @@ use crate::cli::support::stdout;
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::page::Page;
-use crate::io::atomic::write_json;
+use crate::files::atomic::write_json;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -2,10 +2,10 @@
 
 use crate::cli::support::number_errors;
 use crate::cli::support::setting_names::{flag, typed};
-use crate::io::ReadOptions;
 use crate::options::Key;
 use crate::options::typed::{all, refusal};
 use crate::run::{RunOptions, Settings};
+use crate::scenes::ReadOptions;
 use crate::train::{Preset, TrainConfig};
 use crate::words::did_you_mean;
 use crate::{Error, Result};

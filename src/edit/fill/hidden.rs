@@ -3,9 +3,9 @@
 
 use super::evidence::{Evidence, State};
 use super::{Place, Sight};
-use crate::scene::Gaussians;
-use crate::scene::gaussians::axes_of;
 use glam::DVec3;
+use labelgs_scene::Gaussians;
+use labelgs_scene::gaussians::axes_of;
 use rayon::prelude::*;
 
 /// Distance from its centre, in standard deviations, at which a Gaussian must be hidden too: its rim is still seen there.

@@ -5,11 +5,10 @@ use super::plane::planes;
 use super::shadow::{Disc, FLAT, hard, soft};
 use super::sheet::{BESIDE, Sheet};
 use super::{Place, Sight};
-use crate::Result;
-use crate::edit::select::summarise;
-use crate::scene::direction::even_direction;
-use crate::scene::{Gaussians, UNLABELLED};
+use crate::select::summarise;
 use glam::DVec3;
+use labelgs_scene::direction::even_direction;
+use labelgs_scene::{Gaussians, Result, UNLABELLED};
 use rayon::prelude::*;
 use std::cmp::Reverse;
 

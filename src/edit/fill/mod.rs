@@ -18,11 +18,10 @@ mod sheet;
 pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
-use crate::io::model::values::sh0_of;
-use crate::scene::{Camera, Gaussians, LabelMap};
-use crate::{Error, Result, Setting};
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::{Camera, Error, Gaussians, LabelMap, Result, Setting};
 use plane::{Plane, planes};
 use shadow::{Disc, Shadows};
 use sheet::Sheet;

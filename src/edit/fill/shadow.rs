@@ -5,9 +5,9 @@ use super::evidence::on_surface;
 use super::light::Light;
 use super::plane::Plane;
 use super::sheet::{BESIDE, Sheet};
-use crate::io::model::values::{sh0_of, shown};
-use crate::scene::Gaussians;
 use glam::{DVec2, DVec3};
+use labelgs_scene::Gaussians;
+use labelgs_scene::harmonics::{sh0_of, value_of};
 use rayon::prelude::*;
 
 /// Least sine of the angle between the light and a plane with shadows.
@@ -102,7 +102,7 @@ impl Shadows {
             is_lit[row] = true;
             for (channel, gain) in gain.to_array().into_iter().enumerate() {
                 let sh0 = &mut model.sh0[row][channel];
-                *sh0 = sh0_of(gain * shown(*sh0));
+                *sh0 = sh0_of(gain * value_of(*sh0));
                 for band in &mut model.sh_rest[row * rest..][..rest] {
                     band[channel] *= gain as f32;
                 }

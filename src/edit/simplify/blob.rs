@@ -1,8 +1,8 @@
 //! Two Gaussians as one.
 
-use crate::scene::gaussians::axes_of;
-use crate::shaders::constants::exact::{ALPHA_MAX, SH_C0};
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::gaussians::{ALPHA_MAX, axes_of};
+use labelgs_scene::harmonics::SH_C0;
 
 /// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
 const COLOUR: f64 = 4.0;

@@ -5,11 +5,10 @@
 
 mod blob;
 
-use crate::error::{Error, Result};
-use crate::scene::Gaussians;
 use blob::{Blob, axes, covariance};
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use labelgs_scene::{Error, Gaussians, Result};
 use rayon::prelude::*;
 use std::num::NonZero;
 
@@ -147,7 +146,7 @@ impl<'a> Simplifier<'a> {
 #[cfg(test)]
 mod tests {
     use super::Simplifier;
-    use crate::scene::Gaussians;
+    use labelgs_scene::Gaussians;
 
     /// Two rows of equal Gaussians, one of each label, interleaved.
     fn rows(count: usize) -> Gaussians {

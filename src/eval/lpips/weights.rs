@@ -8,7 +8,7 @@
 use super::convolution::Layer;
 use super::{CHANNELS, STAGES};
 use crate::error::{Error, Result};
-use crate::io::read;
+use crate::files::read;
 use safetensors::{Dtype, SafeTensors};
 use std::collections::BTreeMap;
 use std::path::Path;

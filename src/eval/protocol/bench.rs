@@ -3,9 +3,9 @@
 use super::score::Distance;
 use super::{Layout, Protocol};
 use crate::error::{Error, Result};
-use crate::io::label_table::LabelTable;
-use crate::io::truth::TruthMask;
+use crate::files::label_table::LabelTable;
 use crate::scene::View;
+use crate::scenes::truth::TruthMask;
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -9,8 +9,8 @@ use super::{Layout, Protocol, Task, Truth};
 use crate::error::Result;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::COVERED;
-use crate::io::truth::photo_at;
 use crate::scene::View;
+use crate::scenes::truth::photo_at;
 
 /// Returns the largest number of pictures that [`run`] renders, without prompts.
 pub(crate) fn picture_count(layout: &Layout) -> u64 {

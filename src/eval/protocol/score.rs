@@ -4,8 +4,8 @@ use crate::eval::boundary::boundary_iou;
 use crate::eval::metrics::{COVERED, Overlap, PAPER_COVERED, mean, paper_score, psnr};
 use crate::eval::ssim::ssim;
 use crate::eval::ssim8::{ssim8, to_bytes};
-use crate::io::truth::TruthMask;
 use crate::scene::Photo;
+use crate::scenes::truth::TruthMask;
 use serde::Serialize;
 
 /// A perceptual distance of two pictures with colours from 0 to 1.

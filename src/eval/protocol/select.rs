@@ -5,8 +5,8 @@ use super::paint::Painter;
 use super::{Prompt, Task};
 use crate::edit::choose::{candidates, choose_labels};
 use crate::error::Result;
-use crate::io::truth::TruthMask;
 use crate::scene::{LabelMap, View};
+use crate::scenes::truth::TruthMask;
 use std::path::Path;
 
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Names of objects after a repair of masks whose ids were of single views.
 
-use crate::io::label_table::{LabelTable, unique_name};
+use crate::files::label_table::{LabelTable, unique_name};
 use crate::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +41,7 @@ fn without_number<'a>(name: &'a str, names: &BTreeSet<&str>) -> &'a str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::LabelEntry;
+    use crate::files::LabelEntry;
 
     #[test]
     fn an_object_has_the_name_of_most_of_its_pixels() {

@@ -2,9 +2,9 @@
 
 use super::{by_mean, distances};
 use crate::error::{Error, Result};
-use crate::io::Lookup;
-use crate::io::depth::DepthFolder;
 use crate::scene::{DepthKind, Occluders, View, crew};
+use crate::scenes::Lookup;
+use crate::scenes::depth::DepthFolder;
 use std::collections::BTreeMap;
 use std::path::Path;
 

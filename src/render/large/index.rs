@@ -1,7 +1,7 @@
 //! What the host keeps of every Gaussian of a large model: enough to tell which of them a view may show.
 
 use crate::error::{Error, Result};
-use crate::io::model::{ModelRef, Row};
+use crate::formats::{ModelRef, Row};
 use crate::scene::UNLABELLED;
 use crate::scene::gaussians::opacity_of;
 use crate::scene::origin::far_origin;

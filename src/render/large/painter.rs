@@ -3,8 +3,8 @@
 use super::Index;
 use crate::engine::{Band, Engine, EngineSize, LabelSize, tell_apart, uniforms};
 use crate::error::{Error, Result};
+use crate::formats::ModelRef;
 use crate::gpu::Gpu;
-use crate::io::model::ModelRef;
 use crate::pass::KernelShape;
 use crate::render::{RenderOptions, Rendered, render_band};
 use crate::scene::{Camera, Gaussians};

@@ -11,7 +11,7 @@ pub(crate) use entry::{Entry, Scored, Steps, Sums};
 pub(crate) use read::read;
 
 use crate::error::{Error, Result};
-use crate::io::append::Lines;
+use crate::files::append::Lines;
 use crate::train::{Densified, StepReport, Trainer};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};

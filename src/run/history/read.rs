@@ -2,7 +2,7 @@
 
 use super::Entry;
 use crate::error::{Error, Result};
-use crate::io::read::bytes;
+use crate::files::read::bytes;
 use std::path::Path;
 
 /// A history.

@@ -1,7 +1,7 @@
 //! The files of a run, as a report needs them.
 
 use crate::error::{Error, Result};
-use crate::io::{read, run_folder};
+use crate::files::{read, run_folder};
 use crate::run::history::{self, Entry, Steps};
 use crate::run::info::{self, Info};
 use crate::run::passes::Pass;

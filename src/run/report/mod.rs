@@ -13,7 +13,7 @@ mod views;
 pub(crate) use load::json;
 
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::files::atomic;
 use crate::report::chart::colour_class;
 use crate::report::{page, section};
 use load::Ran;

@@ -2,7 +2,7 @@
 
 use super::load::Ran;
 use crate::error::Result;
-use crate::io::read;
+use crate::files::read;
 use crate::report::text::number;
 use crate::report::{Figure, Panel};
 use crate::run::info::Pictured;

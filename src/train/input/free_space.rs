@@ -4,8 +4,8 @@
 //! but they fog views between those cameras.
 
 use super::sampler::stream;
-use crate::io::init;
 use crate::scene::{Camera, Dataset, Gaussians};
+use crate::scenes::init;
 use glam::DVec3;
 use rand::Rng;
 

@@ -8,7 +8,7 @@ use super::part::{Part, labels_of, photo_of};
 use super::step_input::{TrainView, valid_pixels};
 use crate::engine::Band;
 use crate::error::{Error, Result};
-use crate::io::resample::shrink_photo;
+use crate::files::resize::shrink_photo;
 use crate::scene::{Camera, Photo, Pixels};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -11,7 +11,7 @@ use crate::train::{LabelRule, TrainConfig};
 use std::collections::BTreeMap;
 
 /// Share of D-SSIM in the photometric loss; the rest is L1 (3DGS).
-pub(super) const LAMBDA_DSSIM: f32 = 0.2;
+pub(in crate::train) const LAMBDA_DSSIM: f32 = 0.2;
 /// Largest weight of a small object relative to the mean.
 const WEIGHT_MAX: f64 = 10.0;
 

@@ -9,7 +9,7 @@ use crate::options::Options;
 use crate::options::parse::{colour, corners, count, samples};
 use crate::{Error, Result, Setting};
 
-crate::options::options! {
+crate::options! {
     /// The settings of a training. `Default` follows the paper except where measurements favour other
     /// values. [`TrainConfig::paper`] follows the paper throughout.
     ///

@@ -2,8 +2,8 @@
 
 use super::{engine_size, for_photos};
 use crate::error::{Result, Setting};
-use crate::io::init;
 use crate::scene::{Dataset, Gaussians, Point};
+use crate::scenes::init;
 use crate::train::{StrategyKind, TrainConfig};
 use std::borrow::Cow;
 

@@ -3,8 +3,8 @@
 use super::Trainer;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::io::checkpoint::Plane;
 use crate::pass::SHARED_PLANES;
+use crate::records::checkpoint::Plane;
 use crate::scene::Dataset;
 use crate::scheduler::plan::{Buf, TABLE};
 use crate::train::input::sampler::ViewOrder;

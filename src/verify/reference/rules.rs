@@ -284,6 +284,8 @@ pub fn mutants() -> Vec<Mutant> {
 #[cfg(test)]
 mod tests {
     use super::Rules;
+    use crate::scene::gaussians::ALPHA_MAX;
+    use crate::scene::harmonics::SH_C0;
     use crate::shaders::constants as glsl;
 
     #[test]
@@ -304,6 +306,8 @@ mod tests {
             (r.exponent_min(), glsl::LOG2_ALPHA_MIN),
             (r.colour_bias, glsl::COLOUR_BIAS),
             (r.sh_c0, glsl::SH_C0),
+            (SH_C0, glsl::SH_C0),
+            (ALPHA_MAX, glsl::ALPHA_MAX),
             (r.sh_c1, glsl::SH_C1),
             (r.ssim_c1, glsl::SSIM_C1),
             (r.ssim_c2, glsl::SSIM_C2),

@@ -3,9 +3,9 @@
 use super::compare::{Verdict, exact};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::io::initial_gaussians;
 use crate::pass::KernelShape;
 use crate::scene::Gaussians;
+use crate::scenes::initial_gaussians;
 use crate::synth::{self, Preset, SynthOptions};
 use crate::train::{TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;

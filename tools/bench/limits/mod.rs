@@ -13,7 +13,7 @@ use super::{Common, device};
 use ceilings::Ceilings;
 use labelgs::Result;
 use labelgs::internals::pass::{KernelShape, Stage};
-use labelgs::internals::synth;
+use labelgs::synth;
 use labelgs::synth::SynthOptions;
 use serde_json::{Value, json};
 

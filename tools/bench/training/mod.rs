@@ -9,8 +9,7 @@ mod table;
 
 use super::Common;
 use super::measure::table;
-use labelgs::internals::synth;
-use labelgs::synth::{Preset, SynthOptions};
+use labelgs::synth::{self, Preset, SynthOptions};
 use labelgs::{Error, Result};
 use rows::{Plan, Row, Rows, SceneOf};
 use std::path::{Path, PathBuf};

@@ -13,10 +13,10 @@ use crate::eval::protocol::paint::EnginePainter;
 use crate::eval::protocol::run::{picture_count, run as run_bench};
 use crate::eval::protocol::score::Distance;
 use crate::eval::protocol::{Ask, By, Layout, Prompt, Protocol};
-use crate::io::label_table::LabelTable;
-use crate::io::read;
-use crate::io::truth::{files_below, read_truth};
+use crate::files::label_table::LabelTable;
+use crate::files::read;
 use crate::scene::{Dataset, UNLABELLED, View};
+use crate::scenes::truth::{files_below, read_truth};
 use crate::words::did_you_mean;
 use crate::{Error, Result};
 use clap::Args;
@@ -83,7 +83,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let dataset = open_scene(&args.scene, &args.reading, None, [0.0; 3], true)?;
     let (views, test) = (dataset.all(), test_views(protocol, &dataset, &args.scene));
     let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().filter(|&label| label != UNLABELLED).collect();
-    let windows = crate::io::window::windows(&args.scene, &args.reading.read.lookup())?;
+    let windows = crate::scenes::window::windows(&args.scene, &args.reading.read.lookup())?;
     let truth = |file: &Path, view: &View| read_truth(&root.join(file), view, &windows);
     let bench = Bench {
         protocol,

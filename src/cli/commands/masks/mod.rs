@@ -9,12 +9,12 @@ pub(crate) mod track;
 
 use crate::cli::support::args::ReadArgs;
 use crate::cli::support::context::Context;
-use crate::io::image::{write_png_grey8, write_png_grey16};
-use crate::io::mask_folder::png_key;
-use crate::io::read;
-use crate::io::window::Window;
-use crate::io::{self, LoadOptions};
+use crate::files::image::{write_png_grey8, write_png_grey16};
+use crate::files::read;
+use crate::masks::mask_folder::png_key;
 use crate::scene::{Dataset, LabelMap};
+use crate::scenes::window::Window;
+use crate::scenes::{self, LoadOptions};
 use crate::{Error, Result};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -73,7 +73,7 @@ pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
 /// Reads the scene that masks belong to: names, sizes and cameras of its photos, and its points.
 fn open_photos(scene: &Path, read: &ReadArgs) -> Result<Dataset> {
     let options = LoadOptions { photos: false, undistort: false, ..LoadOptions::default() };
-    io::open_logged(scene, &read.options(options))
+    scenes::open_logged(scene, &read.options(options))
 }
 
 /// Returns the mask file of each photo, relative to the folder of masks, and the indices of its views. A view without a

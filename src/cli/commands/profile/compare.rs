@@ -1,7 +1,7 @@
 //! `labelgs profile --compare`: two profiles side by side.
 
 use crate::cli::support::stdout;
-use crate::io::read;
+use crate::files::read;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

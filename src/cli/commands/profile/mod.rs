@@ -102,7 +102,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
     let profile = profile(&gpu, (&dataset, &model, config), window, context)?;
     match &args.json {
-        Some(Some(file)) => crate::io::atomic::write_json(file, &profile.to_json())?,
+        Some(Some(file)) => crate::files::atomic::write_json(file, &profile.to_json())?,
         Some(None) => stdout::print_json(&profile.to_json())?,
         None if context.json => stdout::print_json(&profile.to_json())?,
         None => {}

@@ -31,7 +31,7 @@ pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
     let Some(file) = &args.report else { return checked(args, context, &mut Vec::new()) };
     let mut checks = Vec::new();
     let outcome = checked(args, context, &mut checks);
-    crate::io::atomic::write_json(file, &device_report::report(&checks, outcome.as_ref().err(), context)?)?;
+    crate::files::atomic::write_json(file, &device_report::report(&checks, outcome.as_ref().err(), context)?)?;
     tracing::info!("wrote {}; please send it to the authors of labelgs", file.display());
     outcome
 }

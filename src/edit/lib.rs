@@ -1,0 +1,29 @@
+//! Chooses and changes the labels of a model, without a device.
+//!
+//! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
+//! [`remove`], [`recolour`], [`relabel`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
+//! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
+//! moves a model; [`summarise`] lists the labels.
+
+pub mod catalogue;
+pub mod change;
+pub mod choose;
+pub mod clean;
+pub mod components;
+pub mod fill;
+pub mod merge;
+pub mod prompt;
+pub mod rename;
+pub mod select;
+pub mod simplify;
+
+pub use catalogue::{Catalogue, Pick};
+pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
+pub use clean::{Cleaned, Cleaning, clean};
+pub use components::Grouping;
+pub use fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
+pub use labelgs_formats::Transform;
+pub use merge::{Merged, merge};
+pub use prompt::{Place, Prompt, choose};
+pub use select::{LabelSummary, MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+pub use simplify::Simplifier;

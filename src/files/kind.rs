@@ -1,0 +1,205 @@
+//! What a file is, by its first bytes: for messages on files that hold something else than their name says.
+
+use super::read;
+use labelgs_scene::{Error, Result};
+use std::io::Read;
+use std::path::Path;
+
+/// First bytes that tell what a file is.
+const FIRST: u64 = 512;
+
+/// What a file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Content {
+    /// With its article, as in "a Git LFS pointer".
+    pub what: &'static str,
+    /// What to do to get a photo or a model from it. Empty for what is a photo or a model itself.
+    pub cure: &'static str,
+}
+
+const PHOTO: &str = "";
+const CONVERT: &str = "convert it to JPEG or PNG";
+const VIDEO: &str = "extract its frames as photos first, as with ffmpeg";
+const UNPACK: &str = "unpack it first";
+const AGAIN: &str = "copy or download it again";
+const PAGE: &str = "the address gave this page instead of the file; download it again, after a login if it needs one";
+const OTHER: &str = "name another file";
+
+/// Offset and bytes that begin a kind of file, what it is, and the cure.
+type Magic = (usize, &'static [u8], &'static str, &'static str);
+
+/// The first that fits counts.
+const MAGIC: [Magic; 57] = [
+    (0, b"version https://git-lfs.github.com/", "a Git LFS pointer", "run git lfs pull where it was cloned"),
+    (0, b"/annex/objects/", "a git-annex pointer", "run git annex get on it"),
+    (0, b"bplist00", "a placeholder or list of macOS", "download the file itself"),
+    (
+        0,
+        b"\0\x05\x16\x07",
+        "a side file of macOS (AppleDouble)",
+        "delete it; the file itself has no ._ before its name",
+    ),
+    (0, b"\xFF\xD8\xFF", "a JPEG", PHOTO),
+    (0, b"\x89PNG", "a PNG", PHOTO),
+    (8, b"WEBP", "a WebP picture", CONVERT),
+    (8, b"AVI ", "a video (AVI)", VIDEO),
+    (4, b"ftypavif", "an AVIF picture", CONVERT),
+    (4, b"ftypavis", "an AVIF picture", CONVERT),
+    (4, b"ftyphei", "a HEIC picture", CONVERT),
+    (4, b"ftyphev", "a HEIC picture", CONVERT),
+    (4, b"ftypmif1", "a HEIF picture", CONVERT),
+    (4, b"ftypmif2", "a HEIF picture", CONVERT),
+    (4, b"ftypmsf1", "a HEIF picture", CONVERT),
+    (4, b"ftypcrx ", "a raw photo (CR3)", CONVERT),
+    (4, b"ftypqt", "a video (MOV)", VIDEO),
+    (4, b"ftyp", "a video (MP4)", VIDEO),
+    (4, b"moov", "a video (MOV)", VIDEO),
+    (4, b"mdat", "a video (MOV)", VIDEO),
+    (4, b"wide", "a video (MOV)", VIDEO),
+    (0, b"\x1A\x45\xDF\xA3", "a video (Matroska or WebM)", VIDEO),
+    (0, b"\0\0\x01\xBA", "a video (MPEG)", VIDEO),
+    (0, b"II*\0\x10\0\0\0CR", "a raw photo (CR2)", CONVERT),
+    (0, b"II*\0", "a TIFF or a raw photo", CONVERT),
+    (0, b"MM\0*", "a TIFF or a raw photo", CONVERT),
+    (0, b"II+\0", "a TIFF", CONVERT),
+    (0, b"MM\0+", "a TIFF", CONVERT),
+    (0, b"FUJIFILM", "a raw photo (RAF)", CONVERT),
+    (0, b"IIRO", "a raw photo (ORF)", CONVERT),
+    (0, b"IIRS", "a raw photo (ORF)", CONVERT),
+    (0, b"IIU\0", "a raw photo (RW2)", CONVERT),
+    (0, b"GIF8", "a GIF", CONVERT),
+    (6, b"\0\0\0\0\x36\0\0\0", "a BMP", CONVERT),
+    (0, b"\xFF\x0A", "a JPEG XL picture", CONVERT),
+    (4, b"JXL ", "a JPEG XL picture", CONVERT),
+    (4, b"jP  ", "a JPEG 2000 picture", CONVERT),
+    (0, b"\xFF\x4F\xFF\x51", "a JPEG 2000 picture", CONVERT),
+    (0, b"\x76\x2F\x31\x01", "an EXR picture", CONVERT),
+    (0, b"#?RADIANCE", "an HDR picture", CONVERT),
+    (0, b"8BPS", "a Photoshop document", CONVERT),
+    (0, b"%PDF", "a PDF", OTHER),
+    (0, b"PK\x03\x04", "a zip archive", UNPACK),
+    (0, b"PK\x05\x06", "an empty zip archive", AGAIN),
+    (0, b"7z\xBC\xAF", "a 7z archive", UNPACK),
+    (0, b"Rar!", "a RAR archive", UNPACK),
+    (257, b"ustar", "a tar archive", UNPACK),
+    (0, b"\x1F\x8B", "a file packed by gzip", UNPACK),
+    (0, b"\xFD7zXZ", "a file packed by xz", UNPACK),
+    (0, b"BZh", "a file packed by bzip2", UNPACK),
+    (0, b"\x28\xB5\x2F\xFD", "a file packed by Zstandard", UNPACK),
+    (0, b"\x93NUMPY", "a NumPy array", OTHER),
+    (0, b"ply\n", "a PLY", "name it *.ply"),
+    (0, b"ply\r", "a PLY", "name it *.ply"),
+    (0, b"NGSP", "an SPZ", "name it *.spz"),
+    (0, b"glTF", "a GLB", "name it *.glb"),
+    (0, b"\x80\x02", "a pickle of Python", OTHER),
+];
+
+/// Words with which text begins, in lower case.
+const TEXT: [(&str, &str, &str); 6] = [
+    ("<!doctype html", "a web page", PAGE),
+    ("<html", "a web page", PAGE),
+    ("<head", "a web page", PAGE),
+    ("<svg", "an SVG drawing", CONVERT),
+    ("<?xml", "XML text", PAGE),
+    ("<", "a page of HTML or XML", PAGE),
+];
+
+/// Returns what a file with these first bytes is, if they tell; `first` is empty for an empty file only.
+pub fn name_of_content(first: &[u8]) -> Option<Content> {
+    if first.is_empty() {
+        return Some(Content { what: "an empty file", cure: AGAIN });
+    }
+    if first.len() >= 16 && first.iter().all(|&byte| byte == 0) {
+        return Some(Content { what: "a file of zeros", cure: AGAIN });
+    }
+    // HEIF files name the codec among the compatible brands, if the first brand does not.
+    let starts = |offset: usize, bytes: &[u8]| first.get(offset..).is_some_and(|rest| rest.starts_with(bytes));
+    let brands = first.get(16..64.min(first.len())).unwrap_or_default();
+    if starts(4, b"ftypmif1") && brands.chunks_exact(4).any(|brand| brand == b"avif") {
+        return Some(Content { what: "an AVIF picture", cure: CONVERT });
+    }
+    if let Some(&(_, _, what, cure)) = MAGIC.iter().find(|&&(offset, bytes, ..)| starts(offset, bytes)) {
+        return Some(Content { what, cure });
+    }
+    let text = first.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(first).trim_ascii_start().to_ascii_lowercase();
+    let word = TEXT.iter().find(|(word, ..)| text.starts_with(word.as_bytes()));
+    word.map(|&(_, what, cure)| Content { what, cure })
+}
+
+/// Returns what the file at `path` is, if its first bytes tell.
+pub fn of_file(path: &Path) -> Result<Option<Content>> {
+    let mut first = Vec::new();
+    read::open(path)?.take(FIRST).read_to_end(&mut first).map_err(Error::read(path))?;
+    Ok(name_of_content(&first))
+}
+
+impl Content {
+    /// The clause of an error on a file that should be something else, such as "a photo": what it is, and the cure.
+    pub fn told(self, expected: &str) -> String {
+        let Self { what, cure } = self;
+        let cure = if cure.is_empty() { OTHER } else { cure };
+        format!("is {what}, not {expected}; {cure}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn what(first: &[u8]) -> &'static str {
+        name_of_content(first).map_or("unknown", |content| content.what)
+    }
+
+    #[test]
+    fn first_bytes_tell_what_a_file_is() {
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 9\n";
+        let mut tar = vec![b'a'; 512];
+        tar[257..262].copy_from_slice(b"ustar");
+        let cases: [(&[u8], &str); 32] = [
+            (b"", "an empty file"),
+            (&[0; 64], "a file of zeros"),
+            (pointer, "a Git LFS pointer"),
+            (b"\xEF\xBB\xBF \n<!DOCTYPE HTML><html>", "a web page"),
+            (b"<html lang=en>", "a web page"),
+            (b"<?xml version=\"1.0\"?><Error>", "XML text"),
+            (b"\xFF\xD8\xFF\xE0\0\x10JFIF", "a JPEG"),
+            (b"\x89PNG\r\n\x1A\n", "a PNG"),
+            (b"RIFF\x10\0\0\0WEBPVP8 ", "a WebP picture"),
+            (b"RIFF\x10\0\0\0AVI LIST", "a video (AVI)"),
+            (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "a HEIC picture"),
+            (b"\0\0\0\x1Cftypmif1\0\0\0\0mif1heicmiaf", "a HEIF picture"),
+            (b"\0\0\0\x1Cftypmif1\0\0\0\0mif1avifmiaf", "an AVIF picture"),
+            (b"\0\0\0\x1Cftypavif\0\0\0\0mif1avif", "an AVIF picture"),
+            (b"\0\0\0\x14ftypqt  \0\0\x02\0qt  ", "a video (MOV)"),
+            (b"\0\0\0\x20ftypisom\0\0\x02\0isom", "a video (MP4)"),
+            (b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom", "a raw photo (CR3)"),
+            (b"II*\0\x10\0\0\0CR\x02\0", "a raw photo (CR2)"),
+            (b"MM\0*\0\0\0\x08", "a TIFF or a raw photo"),
+            (b"GIF89a\x01\0", "a GIF"),
+            (b"BM\x46\0\0\0\0\0\0\0\x36\0\0\0", "a BMP"),
+            (b"%PDF-1.7\n", "a PDF"),
+            (b"PK\x03\x04\x14\0", "a zip archive"),
+            (b"\x1F\x8B\x08\0", "a file packed by gzip"),
+            (&tar, "a tar archive"),
+            (b"\xFF\x0A\xFA\x1F", "a JPEG XL picture"),
+            (b"\0\0\0\x0CJXL \r\n\x87\n", "a JPEG XL picture"),
+            (b"\0\x05\x16\x07\0\x02\0\0Mac OS X", "a side file of macOS (AppleDouble)"),
+            (b"ply\r\nformat ascii 1.0\r\n", "a PLY"),
+            (b"glTF\x02\0\0\0", "a GLB"),
+            (b"1 2 3 some text", "unknown"),
+            (b"plywood", "unknown"),
+        ];
+        for (first, expected) in cases {
+            assert_eq!(what(first), expected, "{:?}", first.get(..24).unwrap_or(first).escape_ascii().to_string());
+        }
+    }
+
+    #[test]
+    fn a_content_is_told_with_its_cure() {
+        let told =
+            name_of_content(b"version https://git-lfs.github.com/spec/v1\n").map(|content| content.told("a PLY"));
+        assert_eq!(told.as_deref(), Some("is a Git LFS pointer, not a PLY; run git lfs pull where it was cloned"));
+        let told = name_of_content(b"\xFF\xD8\xFF\xE0").map(|content| content.told("a model"));
+        assert_eq!(told.as_deref(), Some("is a JPEG, not a model; name another file"));
+    }
+}

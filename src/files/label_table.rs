@@ -1,0 +1,208 @@
+//! `labels.json`: names, colours and counts of the ids in a folder of masks or in a model.
+//!
+//! It lies in a folder of masks, in the folder of a run, or beside a single PLY as `NAME.labels.json`.
+
+use super::{atomic, read, run_folder};
+use labelgs_scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
+use labelgs_scene::{Error, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Name of the file in a folder.
+pub const FILE: &str = "labels.json";
+/// Version of the layout.
+const SCHEMA_VERSION: u32 = 1;
+
+fn schema_version() -> u32 {
+    SCHEMA_VERSION
+}
+
+/// Returns `name`, with the first number appended that makes it unique.
+pub fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name} {number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
+    taken.insert(free.clone());
+    free
+}
+
+/// One object. A file needs the id only; the colour of an entry without one is that of [`LabelEntry::new`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Listed")]
+pub struct LabelEntry {
+    /// Id in masks, 1 to 65535, or in models, 1 to 2147483647.
+    pub id: u32,
+    /// Display name; unique.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Display colour, sRGB bytes.
+    pub colour: [u8; 3],
+    /// Id, colour or folder of the object in the source of the masks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Number of pixels over all masks; 0 without masks.
+    pub pixels: u64,
+    /// Number of masks that show it.
+    pub views: u32,
+    /// Keys that labelgs does not know. They are kept.
+    #[serde(flatten)]
+    pub others: BTreeMap<String, Value>,
+}
+
+/// An entry as a file has it.
+#[derive(Deserialize)]
+struct Listed {
+    id: u32,
+    #[serde(default)]
+    name: Option<String>,
+    #[serde(default, alias = "color")]
+    colour: Option<[u8; 3]>,
+    #[serde(default)]
+    source: Option<String>,
+    #[serde(default)]
+    pixels: u64,
+    #[serde(default)]
+    views: u32,
+    #[serde(flatten)]
+    others: BTreeMap<String, Value>,
+}
+
+impl From<Listed> for LabelEntry {
+    fn from(listed: Listed) -> Self {
+        let Listed { id, name, colour, source, pixels, views, others } = listed;
+        let colour = colour.unwrap_or_else(|| label_colour(id));
+        Self { id, name, colour, source, pixels, views, others }
+    }
+}
+
+impl LabelEntry {
+    /// Makes an entry with only an id.
+    pub fn new(id: u32) -> Self {
+        Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0, others: BTreeMap::new() }
+    }
+}
+
+/// A table of objects, sorted by id.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LabelTable {
+    /// Version of the layout; 1 in a file without it.
+    #[serde(default = "schema_version")]
+    pub schema_version: u32,
+    /// One entry per id.
+    pub labels: Vec<LabelEntry>,
+}
+
+impl LabelTable {
+    /// Makes a table of these entries, sorted by id.
+    pub fn new(mut labels: Vec<LabelEntry>) -> Self {
+        labels.sort_by_key(|entry| entry.id);
+        Self { schema_version: SCHEMA_VERSION, labels }
+    }
+
+    /// Reads a table. Another version, an invalid id, and a repeated id or name are errors.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(path, read::text(path)?.as_bytes())
+    }
+
+    /// Like [`Self::read`], from bytes of the file `path`.
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self> {
+        let expected =
+            r#"expected {"labels": [{"id": 1, "name": "cup"}]}, where "colour": [r, g, b] from 0 to 255 may be added"#;
+        read::parse_json::<Self>(path, text, expected)?.checked(path)
+    }
+
+    /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.
+    pub fn checked(&self, path: &Path) -> Result<Self> {
+        if self.schema_version != SCHEMA_VERSION {
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", self.schema_version);
+            return Err(Error::data(path, "schema_version", problem));
+        }
+        let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
+        for entry in &self.labels {
+            let place = format!("label {}", entry.id);
+            if entry.id == 0 || entry.id > MODEL_LABEL_MAX {
+                return Err(Error::data(path, place, format!("labels are from 1 to {MODEL_LABEL_MAX}")));
+            }
+            if !ids.insert(entry.id) {
+                return Err(Error::data(path, place, "occurs twice; ids must be unique"));
+            }
+            if entry.name.as_ref().is_some_and(|name| !names.insert(name)) {
+                return Err(Error::data(path, place, "has the name of another label; names must be unique"));
+            }
+        }
+        Ok(Self::new(self.labels.clone()))
+    }
+
+    /// Reads the table in a folder of masks, if there is one.
+    pub fn of_folder(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(FILE);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let table = Self::read(&path)?;
+        match table.labels.iter().find(|entry| entry.id > LABEL_MAX) {
+            Some(entry) => {
+                let problem = format!("labels of masks are from 1 to {LABEL_MAX}");
+                Err(Error::data(&path, format!("label {}", entry.id), problem))
+            }
+            None => {
+                table.warn_of_others(&path);
+                Ok(Some(table))
+            }
+        }
+    }
+
+    /// Names keys without a meaning, which may be misspelt ones.
+    fn warn_of_others(&self, path: &Path) {
+        let keys: BTreeSet<&str> =
+            self.labels.iter().flat_map(|entry| entry.others.keys()).map(String::as_str).collect();
+        if !keys.is_empty() {
+            let keys = keys.into_iter().collect::<Vec<_>>().join(", ");
+            tracing::warn!("{}: keeps keys that labelgs does not know and does not use: {keys}", path.display());
+        }
+    }
+
+    /// Writes the table, atomically.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+        atomic::write(path, |out| out.write_all(text.as_bytes()))
+    }
+
+    /// Returns the entry of an id.
+    pub fn entry(&self, id: u32) -> Option<&LabelEntry> {
+        self.labels.binary_search_by_key(&id, |entry| entry.id).ok().map(|at| &self.labels[at])
+    }
+
+    /// Returns the name of an id, if it has one.
+    pub fn name(&self, id: u32) -> Option<&str> {
+        self.entry(id)?.name.as_deref()
+    }
+
+    /// Returns the id with this name, ignoring case.
+    pub fn by_name(&self, name: &str) -> Option<u32> {
+        let found = |entry: &&LabelEntry| entry.name.as_ref().is_some_and(|own| own.eq_ignore_ascii_case(name));
+        self.labels.iter().find(found).map(|entry| entry.id)
+    }
+
+    /// Returns the path of the table of a model, if there is one: `NAME.labels.json` beside the PLY, else `labels.json`
+    /// in the folder of the run.
+    pub fn find_for_model(model: &Path) -> Option<PathBuf> {
+        let of_run = run_folder::of_model(model).map(|run| run.join(FILE));
+        [Some(Self::beside(model)), of_run].into_iter().flatten().find(|path| path.is_file())
+    }
+
+    /// Writes the table to `path`. Without a table it removes the file, whose names would be wrong.
+    pub fn put(table: Option<&Self>, path: &Path) -> Result<()> {
+        match table {
+            Some(table) => table.write(path),
+            None if path.is_file() => std::fs::remove_file(path).map_err(Error::write(path)),
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the path of the table for a PLY outside of the folder of a run.
+    pub fn beside(model: &Path) -> PathBuf {
+        model.with_extension(FILE)
+    }
+}

@@ -1,0 +1,21 @@
+//! Access to files: bounded reads, atomic writes, images, names, and the table of labels.
+//!
+//! All reads go through [`read`] and all writes through [`atomic`] or [`append`], so that injected faults reach each of them
+//! and no crash leaves a partial file.
+
+pub mod all;
+pub mod append;
+pub mod atomic;
+pub mod depth_file;
+pub mod image;
+pub mod kind;
+pub mod label_table;
+pub mod names;
+pub mod npy;
+pub mod read;
+pub mod resize;
+pub mod run_folder;
+pub mod scratch;
+
+pub use image::read_photo;
+pub use label_table::{LabelEntry, LabelTable};

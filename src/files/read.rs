@@ -1,0 +1,118 @@
+//! File reading. Every reader opens and reads files through this module, so that [faults](labelgs_scene::lab::fault) reach all
+//! of them.
+
+#![expect(clippy::disallowed_methods, reason = "the place that opens files for reading")]
+
+use labelgs_scene::lab::fault;
+use labelgs_scene::{Error, Result};
+use serde::de::DeserializeOwned;
+use std::fs::{self, File};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// An open file whose reads can be made to fail on purpose.
+#[derive(Debug)]
+pub struct Source(File);
+
+impl Source {
+    /// Reads a file that is open already.
+    pub fn of(file: File) -> Self {
+        Self(file)
+    }
+
+    /// Returns the size of the file, bytes.
+    pub fn length(&self) -> io::Result<u64> {
+        Ok(self.0.metadata()?.len())
+    }
+}
+
+impl Read for Source {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut once = || {
+            let is_short = fault::of_transfer("read")?;
+            let most = if is_short { buffer.len().min(1) } else { buffer.len() };
+            self.0.read(&mut buffer[..most])
+        };
+        loop {
+            // Some decoders do not retry after an interrupting signal.
+            match once() {
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                other => return other,
+            }
+        }
+    }
+}
+
+impl Seek for Source {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+fn source(path: &Path) -> io::Result<Source> {
+    fault::of_file("read")?;
+    Ok(Source(File::open(path)?))
+}
+
+/// Opens a file to read with a buffer.
+pub fn open(path: &Path) -> Result<BufReader<Source>> {
+    let file = source(path).map_err(Error::read(path))?;
+    Ok(BufReader::with_capacity(1 << 16, file))
+}
+
+/// Reads a whole file.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let all = || {
+        let mut file = source(path)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    all().map_err(Error::read(path))
+}
+
+/// Removes the mark that editors of Windows write before UTF-8 text; refuses that of UTF-16.
+pub fn without_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
+    const MARK: &[u8] = b"\xEF\xBB\xBF";
+    if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
+        return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
+    }
+    if text.starts_with(MARK) {
+        text.drain(..MARK.len());
+    }
+    Ok(())
+}
+
+/// Reads a file of UTF-8 text. A byte order mark is left out.
+pub fn text(path: &Path) -> Result<String> {
+    let mut bytes = bytes(path)?;
+    without_mark(path, &mut bytes)?;
+    String::from_utf8(bytes).map_err(|error| {
+        Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text; save it as UTF-8")
+    })
+}
+
+/// Reads a file of JSON. `expected` says in errors what it should hold.
+pub fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T> {
+    parse_json(path, text(path)?.as_bytes(), expected)
+}
+
+/// The same from the bytes of a file.
+pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
+    serde_json::from_slice(text).map_err(|error| {
+        let text = error.to_string();
+        let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
+        // What the parser quotes is a key of the file, not a setting.
+        let problem = format!("{}; {expected}", problem.replace('`', "\""));
+        Error::data(path, format!("line {}", error.line()), problem)
+    })
+}
+
+/// Lists the paths in a folder, in no particular order.
+pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+    let all = || {
+        fault::of_file("read")?;
+        fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()
+    };
+    all().map_err(Error::read(path))
+}

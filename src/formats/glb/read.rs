@@ -1,0 +1,339 @@
+//! Reads GLB.
+
+use super::nodes::{self, Placed};
+use super::{
+    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS,
+    file, harmonic, harmonics,
+};
+use crate::format::ReadModel;
+use crate::ply::fitting;
+use crate::rows::{Row, Rows};
+use crate::transform::Transform;
+use crate::values::log_scale;
+use labelgs_files::label_table::{LabelEntry, LabelTable};
+use labelgs_files::read as bytes_of;
+use labelgs_scene::{Error, Result};
+use labelgs_scene::{Gaussians, MODEL_LABEL_MAX};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Opacities at which the logit is still finite in 32 bits.
+const OPACITY_MIN: f32 = 1e-7;
+const OPACITY_MAX: f32 = 1.0 - 1e-7;
+
+struct Glb<'a> {
+    path: &'a Path,
+    root: Value,
+    binary: &'a [u8],
+}
+
+/// Columns of numbers of an accessor.
+struct Column {
+    values: Vec<f32>,
+    width: usize,
+}
+
+impl Column {
+    fn row<const N: usize>(&self, index: usize) -> [f32; N] {
+        std::array::from_fn(|at| self.values[index * self.width + at])
+    }
+}
+
+/// Reads all primitives with Gaussians at the places of their nodes.
+pub(super) fn read(path: &Path) -> Result<ReadModel> {
+    let bytes = bytes_of::bytes(path)?;
+    let (root, binary) = file::split(path, &bytes)?;
+    let glb = Glb { path, root, binary };
+    let placed = nodes::placed(&glb.root).map_err(|node| {
+        let problem = "mirrors, shears or scales by another factor along each axis, which is not read; apply its transform \
+                       in the program that wrote the file, and export it again";
+        glb.bad(&format!("node {node}"), problem)
+    })?;
+    if placed.is_empty() {
+        return Err(glb.bad("meshes", format!("no primitive has the extension {SPLATS}; this file has no Gaussians")));
+    }
+    let (mut read, mut parts) = (ReadModel::default(), Vec::new());
+    let mut names: BTreeMap<u32, LabelEntry> = BTreeMap::new();
+    for Placed { primitive, place } in &placed {
+        let splats = &primitive["extensions"][SPLATS];
+        if let Some(packed) = splats["extensions"].as_object().and_then(|inner| inner.keys().next()) {
+            let problem = format!("the Gaussians are compressed by {packed}, which is not read; export without it");
+            return Err(glb.bad("meshes", problem));
+        }
+        let part = glb.gaussians(primitive)?;
+        let is_moved = *place != Transform::default();
+        parts.push(if is_moved { place.apply(&part.gaussians)? } else { part.gaussians });
+        for entry in part.names.into_iter().flat_map(|table| table.labels) {
+            names.entry(entry.id).or_insert(entry);
+        }
+        read.dropped += part.dropped;
+        read.notes.extend(part.notes);
+        read.notes.extend(unread(splats));
+    }
+    read.notes.extend(glb.unread());
+    read.notes.dedup();
+    read.names = (!names.is_empty()).then(|| LabelTable::new(names.into_values().collect()));
+    read.gaussians = joined(parts)?;
+    Ok(read)
+}
+
+/// What changes the picture of a primitive and is not read.
+fn unread(splats: &Value) -> Vec<String> {
+    let mut notes = Vec::new();
+    if splats["colorSpace"] == "lin_rec709_display" {
+        notes.push("its colours are linear, and are taken for sRGB: the pictures are too dark".into());
+    }
+    for (key, usual) in [("kernel", "ellipse"), ("projection", "perspective")] {
+        if let Some(other) = splats[key].as_str().filter(|&other| other != usual) {
+            notes.push(format!("its {key} is {other}, and it is drawn as {usual}"));
+        }
+    }
+    notes
+}
+
+/// Makes one model of all parts.
+fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
+    if parts.len() == 1 {
+        return Ok(parts.remove(0));
+    }
+    let mut all = Gaussians {
+        sh_degree: parts.iter().map(|part| part.sh_degree).max().unwrap_or_default(),
+        origin: parts.first().map(|part| part.origin).unwrap_or_default(),
+        antialiased: parts.iter().any(|part| part.antialiased),
+        labels: parts.iter().any(|part| part.labels.is_some()).then(Vec::new),
+        label_confidence: parts.iter().any(|part| part.label_confidence.is_some()).then(Vec::new),
+        ..Gaussians::default()
+    };
+    for part in parts {
+        let part = fitting(part, &all)?;
+        all.means.extend(part.means);
+        all.quats.extend(part.quats);
+        all.scales.extend(part.scales);
+        all.opacities.extend(part.opacities);
+        all.sh0.extend(part.sh0);
+        all.sh_rest.extend(part.sh_rest);
+        all.labels.iter_mut().for_each(|to| to.extend(part.labels.iter().flatten()));
+        all.label_confidence.iter_mut().for_each(|to| to.extend(part.label_confidence.iter().flatten()));
+    }
+    Ok(all)
+}
+
+impl Glb<'_> {
+    /// What changes the picture of the whole file and is not read.
+    fn unread(&self) -> Vec<String> {
+        let some = |key: &str| self.root[key].as_array().is_some_and(|all| !all.is_empty());
+        let instanced = |node: &Value| node["extensions"]["EXT_mesh_gpu_instancing"].is_object();
+        let primitives = |mesh: &Value| mesh["primitives"].as_array().cloned().unwrap_or_default();
+        let all = self.root["meshes"].as_array().into_iter().flatten().flat_map(primitives);
+        let others = all.filter(|primitive| !primitive["extensions"][SPLATS].is_object()).count();
+        let meshes = format!("{others} meshes without Gaussians");
+        let left_out = [
+            (others > 0, meshes.as_str()),
+            (some("animations"), "animations"),
+            (
+                self.root["nodes"].as_array().is_some_and(|nodes| nodes.iter().any(instanced)),
+                "copies of instanced nodes",
+            ),
+        ];
+        left_out.iter().filter(|(there, _)| *there).map(|(_, what)| format!("its {what} were left out")).collect()
+    }
+
+    fn bad(&self, place: &str, problem: impl Into<String>) -> Error {
+        Error::data(self.path, place, problem)
+    }
+
+    fn gaussians(&self, primitive: &Value) -> Result<ReadModel> {
+        let attribute = |name: &str, width: usize| self.attribute(primitive, name, width);
+        let needed = |name: &str, width: usize| {
+            let problem = || self.bad("attributes", format!("lacks {name}, which {SPLATS} requires"));
+            attribute(name, width)?.ok_or_else(problem)
+        };
+        let (means, quats) = (needed("POSITION", 3)?, needed(ROTATION, 4)?);
+        let (scales, opacities, sh0) = (needed(SCALE, 3)?, needed(OPACITY, 1)?, needed(&harmonic(0, 0), 3)?);
+        let has = |degree: u32| harmonics(degree).all(|name| primitive["attributes"].get(name).is_some());
+        let degree = (0..=3).rev().find(|&degree| has(degree)).unwrap_or_default();
+        let rest = harmonics(degree).map(|name| needed(&name, 3)).collect::<Result<Vec<_>>>()?;
+        let count = means.values.len() / 3;
+        let labels = self.labels(primitive, count)?;
+        let shares = attribute(CONFIDENCE, 1)?.filter(|_| labels.is_some());
+        let columns = [&quats, &scales, &opacities, &sh0].into_iter().chain(&rest).chain(&shares);
+        if columns.into_iter().any(|column| column.values.len() != count * column.width) {
+            return Err(self.bad("attributes", format!("differ in length; expected {count} of each, as of POSITION")));
+        }
+        let odd = shares.iter().flat_map(|column| &column.values).position(|share| !(0.0..=1.0).contains(share));
+        if let Some(index) = odd {
+            return Err(
+                self.bad(&format!("{CONFIDENCE} {index}"), "is not from 0 to 1; correct it or leave out the attribute")
+            );
+        }
+        let mut rows = Rows::new(degree, labels.is_some(), shares.is_some());
+        let mut triples = vec![[0.0; 3]; rest.len()];
+        for index in 0..count {
+            triples.iter_mut().zip(&rest).for_each(|(triple, column)| *triple = column.row(index));
+            AXES.rest(&mut triples);
+            let [x, y, z, w] = quats.row(index);
+            let [opacity] = opacities.row(index);
+            let inside = opacity.clamp(OPACITY_MIN, OPACITY_MAX);
+            rows.push(&Row {
+                position: AXES.position(means.row(index)).map(f64::from),
+                quat: AXES.quat([w, x, y, z]).map(f64::from),
+                scale: scales.row(index).map(log_scale),
+                opacity: (inside / (1.0 - inside)).ln(),
+                sh0: sh0.row(index),
+                rest: &triples,
+                label: labels.as_ref().map(|found| found.0[index]),
+                confidence: shares.as_ref().map(|column| column.values[index]),
+            });
+        }
+        let mut read = rows.finish(self.path, None)?;
+        read.gaussians.antialiased = primitive["extras"][ANTIALIASED] == true;
+        Ok(ReadModel { names: labels.and_then(|found| found.1), ..read })
+    }
+
+    /// Returns an attribute as floats, if the primitive has it.
+    fn attribute(&self, primitive: &Value, name: &str, width: usize) -> Result<Option<Column>> {
+        let Some(at) = primitive["attributes"].get(name) else { return Ok(None) };
+        let index = at.as_u64().unwrap_or(u64::MAX);
+        let place = format!("accessor {index} of {name}");
+        let accessor = usize::try_from(index).ok().and_then(|at| self.root["accessors"].get(at));
+        let Some(accessor) = accessor else { return Err(self.bad(&place, "is not there; export the file again")) };
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
+        if accessor["type"] != kind || accessor.get("sparse").is_some() {
+            return Err(self.bad(&place, format!("is {} or sparse; expected a plain {kind}", accessor["type"])));
+        }
+        let number: fn(&[u8], bool) -> f32 = match accessor["componentType"].as_u64() {
+            Some(FLOAT) => |b, _| f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            Some(5120) => {
+                |b, unit| if unit { (f32::from(b[0] as i8) / 127.0).max(-1.0) } else { f32::from(b[0] as i8) }
+            }
+            Some(5121) => |b, unit| if unit { f32::from(b[0]) / 255.0 } else { f32::from(b[0]) },
+            Some(5122) => |b, unit| {
+                let value = f32::from(i16::from_le_bytes([b[0], b[1]]));
+                if unit { (value / 32_767.0).max(-1.0) } else { value }
+            },
+            Some(5123) => |b, unit| {
+                let value = f32::from(u16::from_le_bytes([b[0], b[1]]));
+                if unit { value / 65_535.0 } else { value }
+            },
+            _ => return Err(self.bad(&place, "has another component type than float, and signed or not 8 or 16 bits")),
+        };
+        let size = match accessor["componentType"].as_u64() {
+            Some(5120 | 5121) => 1,
+            Some(5122 | 5123) => 2,
+            _ => 4,
+        };
+        let unit = accessor["normalized"].as_bool().unwrap_or(false);
+        let count = accessor["count"].as_u64().unwrap_or(0);
+        let (view, stride) = self.view(&place, &accessor["bufferView"])?;
+        let start = accessor["byteOffset"].as_u64().unwrap_or(0);
+        let stride = stride.unwrap_or(width as u64 * size);
+        let bytes =
+            count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(width as u64 * size));
+        let end = bytes.and_then(|bytes| bytes.checked_add(start)).filter(|&end| end <= view.len() as u64);
+        if end.is_none() || stride < width as u64 * size {
+            let problem =
+                format!("has {count} elements of {stride} bytes from byte {start}, its view has {}", view.len());
+            return Err(self.bad(&place, format!("{problem}; the file was cut short or changed")));
+        }
+        let at = |row: u64, column: usize| (start + row * stride + column as u64 * size) as usize;
+        let value = |row: u64| (0..width).map(move |column| number(&view[at(row, column)..], unit));
+        Ok(Some(Column { values: (0..count).flat_map(value).collect(), width }))
+    }
+
+    /// Returns the bytes of a view of the numbers, and its stride.
+    fn view(&self, place: &str, index: &Value) -> Result<(&[u8], Option<u64>)> {
+        let view = index.as_u64().and_then(|at| self.root["bufferViews"].get(usize::try_from(at).ok()?));
+        let range = view.filter(|view| view["buffer"] == 0).and_then(|view| {
+            let start = usize::try_from(view["byteOffset"].as_u64().unwrap_or(0)).ok()?;
+            let length = usize::try_from(view["byteLength"].as_u64()?).ok()?;
+            self.binary.get(start..start.checked_add(length)?)
+        });
+        let problem = || {
+            self.bad(place, format!("its buffer view {index} is not in the chunk of numbers; export the file again"))
+        };
+        let stride = view.and_then(|view| view["byteStride"].as_u64());
+        range.map(|range| (range, stride)).ok_or_else(problem)
+    }
+
+    /// Returns the label of each Gaussian, and their names.
+    fn labels(&self, primitive: &Value, count: usize) -> Result<Option<(Vec<u32>, Option<LabelTable>)>> {
+        let sets = &primitive["extensions"][FEATURES]["featureIds"];
+        let own = sets.as_array().into_iter().flatten().find(|set| set["attribute"] == 0);
+        let Some(column) = self.attribute(primitive, FEATURE, 1)? else { return Ok(None) };
+        if column.values.len() != count {
+            return Err(self.bad(FEATURE, format!("has {} ids, expected {count}", column.values.len())));
+        }
+        let table = own.and_then(|set| set["propertyTable"].as_u64());
+        let rows = table.map(|table| self.table(table)).transpose()?;
+        let nothing = own.and_then(|set| set["nullFeatureId"].as_u64());
+        let mut labels = Vec::with_capacity(count);
+        for (index, &feature) in column.values.iter().enumerate() {
+            let place = format!("{FEATURE} {index}");
+            if feature.fract() != 0.0 || !(0.0..=FEATURE_MAX).contains(&feature) {
+                return Err(self.bad(
+                    &place,
+                    format!("is {feature}, no whole number from 0 to {FEATURE_MAX}; renumber the labels"),
+                ));
+            }
+            let id = match &rows {
+                _ if nothing == Some(feature as u64) => 0,
+                None => feature as u32,
+                Some(rows) => {
+                    let row = rows.get(feature as usize).ok_or_else(|| {
+                        self.bad(
+                            &place,
+                            format!("is {feature}, its table has {} rows; export the file again", rows.len()),
+                        )
+                    })?;
+                    row.0
+                }
+            };
+            labels.push(id);
+        }
+        let names = rows.map(|rows| {
+            let named = rows.into_iter().filter(|row| row.0 != 0);
+            LabelTable::new(named.map(|(id, name)| LabelEntry { name, ..LabelEntry::new(id) }).collect())
+        });
+        Ok(Some((labels, names.filter(|names| names.labels.iter().any(|entry| entry.name.is_some())))))
+    }
+
+    /// Returns the id and the name of each row of a property table. Without a column `id` the row is the id.
+    fn table(&self, index: u64) -> Result<Vec<(u32, Option<String>)>> {
+        let place = format!("property table {index}");
+        let bad = |problem: String| self.bad(&place, format!("{problem}; export the file again"));
+        let table = &self.root["extensions"][METADATA]["propertyTables"][usize::try_from(index).unwrap_or(usize::MAX)];
+        let count = table["count"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
+        if count == 0 || count > FEATURE_MAX as usize {
+            return Err(bad(format!("has {count} rows, expected 1 to {FEATURE_MAX}")));
+        }
+        let words = |view: &Value, count: usize| -> Result<Vec<u32>> {
+            let (bytes, _) = self.view(&place, view)?;
+            let words: Vec<u32> =
+                bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).take(count).collect();
+            if words.len() == count { Ok(words) } else { Err(bad(format!("a column has fewer than {count} values"))) }
+        };
+        let properties = &table["properties"];
+        let ids = match properties["id"].get("values") {
+            Some(values) => words(values, count)?,
+            None => (0..count as u32).collect(),
+        };
+        let mut names = vec![None; count];
+        if let Some(values) = properties["name"].get("values") {
+            let (text, _) = self.view(&place, values)?;
+            let offsets = words(&properties["name"]["stringOffsets"], count + 1)?;
+            for (name, ends) in names.iter_mut().zip(offsets.windows(2)) {
+                let part = text.get(ends[0] as usize..ends[1] as usize).and_then(|part| str::from_utf8(part).ok());
+                let part = part.ok_or_else(|| bad("a name is not inside of its text".into()))?;
+                *name = (!part.is_empty()).then(|| part.to_owned());
+            }
+        }
+        let (mut seen, mut known) = (BTreeSet::new(), BTreeSet::new());
+        for (&id, name) in ids.iter().zip(&names) {
+            if id > MODEL_LABEL_MAX || !seen.insert(id) || name.as_ref().is_some_and(|name| !known.insert(name)) {
+                return Err(bad(format!("the id {id} or its name is there twice, or above {MODEL_LABEL_MAX}")));
+            }
+        }
+        Ok(ids.into_iter().zip(names).collect())
+    }
+}

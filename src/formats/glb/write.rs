@@ -1,0 +1,174 @@
+//! Writes GLB.
+
+use super::{
+    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file,
+    harmonic, harmonics,
+};
+use crate::format::{Export, ModelWriter};
+use crate::values::sigmoid;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::harmonics::value_of;
+use labelgs_scene::{Error, Result, UNLABELLED};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
+use std::io::{self, Write};
+
+pub(super) const WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
+
+fn losses(export: &Export) -> Result<Vec<String>> {
+    let bytes = file::bytes_per_row(export) * export.rows.len() as u64;
+    if export.rows.is_empty() || bytes > file::BYTES_MAX {
+        let problem =
+            format!("a GLB holds up to {} bytes, and at least a Gaussian; this model takes {bytes}", file::BYTES_MAX);
+        return Err(Error::usage("GLB", format!("{problem}; leave out some Gaussians or write another format")));
+    }
+    let saturated = export.rows.iter().filter(|&&row| !(sigmoid(export.model.opacities[row]) < 1.0)).count();
+    let saturated =
+        (saturated > 0).then(|| format!("{saturated} opacities are 1 in 32 bits and come back as 0.9999999"));
+    let bold = export.model.antialiased.then(|| {
+        "the format has no mark for antialiased models; only labelgs draws its fine parts right, others too bold"
+            .to_owned()
+    });
+    Ok(saturated.into_iter().chain(bold).collect())
+}
+
+/// Numbers and the accessors on them.
+#[derive(Default)]
+struct Binary {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Binary {
+    /// Adds a view of the bytes that `fill` appends, from a multiple of 8 on, as tables need it.
+    fn view(&mut self, fill: impl FnOnce(&mut Vec<u8>)) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
+        let start = self.bytes.len();
+        fill(&mut self.bytes);
+        self.views.push(json!({ "buffer": 0, "byteOffset": start, "byteLength": self.bytes.len() - start }));
+        self.views.len() - 1
+    }
+
+    /// Adds an attribute of floats; positions need their bounds.
+    fn attribute<const N: usize>(&mut self, bounds: bool, rows: impl Iterator<Item = [f32; N]>) -> usize {
+        let (mut least, mut most, mut count) = ([f32::MAX; N], [f32::MIN; N], 0);
+        let view = self.view(|bytes| {
+            for row in rows {
+                count += 1;
+                for (axis, value) in row.into_iter().enumerate() {
+                    least[axis] = least[axis].min(value);
+                    most[axis] = most[axis].max(value);
+                    bytes.extend(value.to_le_bytes());
+                }
+            }
+        });
+        self.views[view]["target"] = json!(34962);
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
+        let mut accessor = json!({ "bufferView": view, "componentType": FLOAT, "count": count, "type": kind });
+        if bounds {
+            accessor["min"] = json!(least.as_slice());
+            accessor["max"] = json!(most.as_slice());
+        }
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+}
+
+fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    let mut binary = Binary::default();
+    let mut primitive = json!({
+        "mode": 0,
+        "attributes": attributes(export, &mut binary),
+        "extensions": { SPLATS: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
+    });
+    if export.model.antialiased {
+        primitive["extras"] = json!({ ANTIALIASED: true });
+    }
+    let mut used = vec![SPLATS];
+    let mut root = json!({
+        "asset": { "version": "2.0", "generator": concat!("labelgs ", env!("CARGO_PKG_VERSION")) },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "mesh": 0, "name": "gaussians" }],
+    });
+    if let Some(labels) = export.labels() {
+        let ids: BTreeSet<u32> = export.rows.iter().map(|&row| labels[row]).filter(|&id| id != UNLABELLED).collect();
+        let ids: Vec<u32> = [UNLABELLED].into_iter().chain(ids).collect();
+        let row_of = |row: usize| ids.binary_search(&labels[row]).unwrap_or_default() as f32;
+        let feature = binary.attribute(false, export.rows.iter().map(|&row| [row_of(row)]));
+        primitive["attributes"][FEATURE] = json!(feature);
+        if let Some(shares) = export.label_confidence() {
+            let share = binary.attribute(false, export.rows.iter().map(|&row| [shares[row]]));
+            primitive["attributes"][CONFIDENCE] = json!(share);
+        }
+        primitive["extensions"][FEATURES] = json!({ "featureIds": [{
+            "featureCount": ids.len(), "attribute": 0, "nullFeatureId": 0, "label": "object", "propertyTable": 0,
+        }]});
+        root["extensions"] = json!({ METADATA: table(&ids, export.names, &mut binary) });
+        used.extend([FEATURES, METADATA]);
+    }
+    binary.bytes.resize(binary.bytes.len().next_multiple_of(8), 0);
+    root["extensionsUsed"] = json!(used);
+    root["meshes"] = json!([{ "primitives": [primitive] }]);
+    root["accessors"] = Value::Array(binary.accessors);
+    root["bufferViews"] = Value::Array(binary.views);
+    root["buffers"] = json!([{ "byteLength": binary.bytes.len() }]);
+    file::write(&root, &binary.bytes, out)
+}
+
+fn attributes(export: &Export, to: &mut Binary) -> Value {
+    let g = export.model;
+    let rows = || export.rows.iter().copied();
+    let rotation = |row: usize| {
+        let quat = AXES.quat(g.quats[row]);
+        let length = quat.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
+        let [w, x, y, z] = quat.map(|value| (f64::from(value) / length) as f32);
+        [x, y, z, w]
+    };
+    let mut all = Map::new();
+    let mut add = |name: String, accessor: usize| drop(all.insert(name, json!(accessor)));
+    add("POSITION".into(), to.attribute(true, rows().map(|row| AXES.position(export.position(row)))));
+    // For viewers that draw points.
+    let shown = |row: usize| {
+        let [r, g, b] = export.model.sh0[row].map(|sh0| value_of(sh0).clamp(0.0, 1.0) as f32);
+        [r, g, b, sigmoid(export.model.opacities[row])]
+    };
+    add("COLOR_0".into(), to.attribute(false, rows().map(shown)));
+    add(ROTATION.into(), to.attribute(false, rows().map(rotation)));
+    add(SCALE.into(), to.attribute(false, rows().map(|row| g.scales[row].map(f32::exp))));
+    add(OPACITY.into(), to.attribute(false, rows().map(|row| [sigmoid(g.opacities[row])])));
+    add(harmonic(0, 0), to.attribute(false, rows().map(|row| g.sh0[row])));
+    for ((index, name), sign) in harmonics(g.sh_degree).enumerate().zip(AXES.signs()) {
+        let value = |row: usize| export.rest(row)[index].map(|value| sign * value);
+        add(name, to.attribute(false, rows().map(value)));
+    }
+    Value::Object(all)
+}
+
+/// The table of labels: a row for each id, with its name.
+fn table(ids: &[u32], names: Option<&LabelTable>, to: &mut Binary) -> Value {
+    let name = |&id: &u32| names.and_then(|names| names.name(id)).unwrap_or_default();
+    let texts: Vec<&str> = ids.iter().map(name).collect();
+    // A view may not be empty.
+    let text = texts.concat() + if texts.iter().all(|text| text.is_empty()) { " " } else { "" };
+    let values = to.view(|bytes| bytes.extend(text.as_bytes()));
+    let offsets = to.view(|bytes| {
+        let ends = texts.iter().scan(0_u32, |end, text| {
+            *end += text.len() as u32;
+            Some(*end)
+        });
+        [0].into_iter().chain(ends).for_each(|end| bytes.extend(end.to_le_bytes()));
+    });
+    let own = to.view(|bytes| ids.iter().for_each(|id| bytes.extend(id.to_le_bytes())));
+    json!({
+        "schema": { "id": "labelgs", "classes": { "object": { "properties": {
+            "name": { "type": "STRING" },
+            "id": { "type": "SCALAR", "componentType": "UINT32" },
+        }}}},
+        "propertyTables": [{ "name": "objects", "class": "object", "count": ids.len(), "properties": {
+            "name": { "values": values, "stringOffsets": offsets },
+            "id": { "values": own },
+        }}],
+    })
+}

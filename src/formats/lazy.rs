@@ -1,0 +1,139 @@
+//! A model of which only a part may be in memory.
+
+use super::{ReadModel, Row, StoredModel, open_stored, read_model};
+use glam::DVec3;
+use labelgs_files::label_table::LabelTable;
+use labelgs_scene::{Gaussians, Result};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// A model in its file, or one that was read whole because of its format.
+#[derive(Clone, Debug)]
+pub enum LazyModel {
+    /// In its file.
+    Stored(StoredModel),
+    /// Read.
+    Whole(ReadModel),
+}
+
+impl LazyModel {
+    /// Opens a model.
+    pub fn open(path: &Path) -> Result<Self> {
+        match open_stored(path)? {
+            Some(stored) => Ok(Self::Stored(stored)),
+            None => read_model(path).map(Self::Whole),
+        }
+    }
+
+    /// Names of the labels, if the file holds them.
+    pub fn names(&self) -> Option<&LabelTable> {
+        match self {
+            Self::Stored(_) => None,
+            Self::Whole(read) => read.names.as_ref(),
+        }
+    }
+
+    /// The model, to be seen row by row.
+    pub fn view(&self) -> ModelRef<'_> {
+        match self {
+            Self::Stored(stored) => ModelRef::Stored(stored),
+            Self::Whole(read) => ModelRef::Whole(&read.gaussians),
+        }
+    }
+}
+
+/// A model in its file or in memory, whose rows are seen one after the other. Rows have numbers, with gaps where a row of a
+/// file cannot be rendered.
+#[derive(Clone, Copy, Debug)]
+pub enum ModelRef<'a> {
+    /// In its file.
+    Stored(&'a StoredModel),
+    /// In memory.
+    Whole(&'a Gaussians),
+}
+
+impl<'a> From<&'a Gaussians> for ModelRef<'a> {
+    fn from(model: &'a Gaussians) -> Self {
+        Self::Whole(model)
+    }
+}
+
+impl<'a> ModelRef<'a> {
+    /// Reads all of it.
+    pub fn read(self) -> Result<Cow<'a, Gaussians>> {
+        match self {
+            Self::Stored(stored) => Ok(Cow::Owned(read_model(stored.path())?.gaussians)),
+            Self::Whole(model) => Ok(Cow::Borrowed(model)),
+        }
+    }
+
+    /// Number of rows; of a file, those included that cannot be rendered.
+    pub fn count(self) -> u64 {
+        match self {
+            Self::Stored(stored) => stored.count(),
+            Self::Whole(model) => model.len() as u64,
+        }
+    }
+
+    /// Degree of the spherical harmonics.
+    pub fn sh_degree(self) -> u32 {
+        match self {
+            Self::Stored(stored) => stored.sh_degree(),
+            Self::Whole(model) => model.sh_degree,
+        }
+    }
+
+    /// Returns true if Gaussians have labels.
+    pub fn has_labels(self) -> bool {
+        match self {
+            Self::Stored(stored) => stored.has_labels(),
+            Self::Whole(model) => model.labels.is_some(),
+        }
+    }
+
+    /// World position to which positions are relative.
+    pub fn origin(self) -> DVec3 {
+        match self {
+            Self::Stored(stored) => stored.origin(),
+            Self::Whole(model) => model.origin,
+        }
+    }
+
+    /// Calls `see` with number and values of each row that can be rendered, in order. Returns notes for the user.
+    pub fn scan(self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
+        let model = match self {
+            Self::Stored(stored) => {
+                return stored.scan(|number, row| {
+                    see(number, row);
+                    Ok(())
+                });
+            }
+            Self::Whole(model) => model,
+        };
+        let rest = model.rest_per_gaussian();
+        for row in 0..model.len() {
+            see(
+                row as u64,
+                &Row {
+                    position: model.means[row].map(f64::from),
+                    quat: model.quats[row].map(f64::from),
+                    scale: model.scales[row],
+                    opacity: model.opacities[row],
+                    sh0: model.sh0[row],
+                    rest: &model.sh_rest[row * rest..(row + 1) * rest],
+                    label: model.labels.as_ref().map(|labels| labels[row]),
+                    confidence: model.label_confidence.as_ref().map(|shares| shares[row]),
+                },
+            );
+        }
+        Ok(Vec::new())
+    }
+
+    /// Returns rows by number, sorted, as a model about a place `far` from the origin; one in memory stays about its origin.
+    pub fn rows(self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
+        match self {
+            Self::Stored(stored) => stored.rows(numbers, far),
+            Self::Whole(model) => Ok(model.picked(&numbers.map(|number| number as usize).collect::<Vec<_>>())),
+        }
+    }
+}

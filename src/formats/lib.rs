@@ -1,0 +1,187 @@
+//! Model files, by extension. Every command reads and writes models here.
+//!
+//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `FORMATS`.
+
+mod format;
+mod glb;
+mod html;
+mod lazy;
+mod origin;
+mod ply;
+mod rows;
+mod side_labels;
+mod sog;
+mod splat;
+mod spz;
+pub mod table;
+mod transform;
+mod turn;
+pub mod values;
+
+use labelgs_files::label_table::LabelTable;
+use labelgs_files::{atomic, kind};
+use labelgs_scene::stage::Stage;
+use labelgs_scene::{Error, Gaussians, Result};
+use std::path::Path;
+
+pub use lazy::{LazyModel, ModelRef};
+pub use ply::StoredModel;
+pub use ply::write_joined;
+pub use rows::Row;
+pub use transform::Transform;
+
+pub use format::{Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptions};
+pub use format::{ModelFormat, ModelWriter};
+
+/// All formats. The first one also serves pipes and devices, such as `/dev/stdout`.
+const FORMATS: [&ModelFormat; 6] =
+    [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT];
+
+/// Returns the format for the extension of a path, ignoring case.
+fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    FORMATS.into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
+}
+
+/// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
+pub fn is_page(path: &Path) -> bool {
+    by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)
+}
+
+/// Returns all known extensions of formats that are `chosen`.
+fn endings(chosen: impl Fn(&ModelFormat) -> bool) -> String {
+    let all = FORMATS.into_iter().filter(|format| chosen(format));
+    all.flat_map(|format| format.endings).copied().collect::<Vec<_>>().join(", ")
+}
+
+/// What is wrong with the extension of a path, for a message.
+fn unknown_ending(path: &Path) -> String {
+    let ending = path.extension().map(|ending| format!(".{}", ending.display()));
+    ending.map_or("it has no extension".to_owned(), |ending| format!("{ending} is no extension of a model"))
+}
+
+/// Returns the format in which a path is read: that of its extension. A file without one is known by its first bytes, and a
+/// pipe is a PLY.
+fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
+    if let Some(format) = by_ending(path) {
+        return Ok(format);
+    }
+    if !path.exists() {
+        return Err(Error::data(path, "", "there is no such file"));
+    }
+    if !path.is_file() {
+        return Ok(FORMATS[0]);
+    }
+    let content = kind::of_file(path)?;
+    let own = |format: &&'static ModelFormat| content.is_some_and(|content| contents(format).contains(&content.what));
+    if let Some(format) = FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
+        return Ok(format);
+    }
+    let problem = unknown_ending(path);
+    let what = content.map_or(String::new(), |content| format!(" and the file {}", content.told("a model")));
+    let cure = "give the file the extension of its format, or export it in one of these";
+    Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", endings(|_| true))))
+}
+
+/// What the first bytes of a format say that it is.
+fn contents(format: &ModelFormat) -> &'static [&'static str] {
+    match format.name {
+        "PLY" => &["a PLY"],
+        "SPZ" => &["an SPZ", "a file packed by gzip"],
+        "GLB" => &["a GLB"],
+        "SOG" => &["a zip archive"],
+        "HTML" => &["a web page", "a page of HTML or XML"],
+        _ => &[],
+    }
+}
+
+/// Returns the error of a reader, or what the file is instead if its first bytes tell.
+fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
+    let content = if path.is_file() { kind::of_file(path).ok().flatten() } else { None };
+    match content.filter(|content| !contents(format).contains(&content.what)) {
+        Some(content) => Error::data(path, "byte 0", content.told(&format!("a file of the format {}", format.name))),
+        None => error,
+    }
+}
+
+/// Reads a model in the format of its extension; an unknown one is an error.
+pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
+    let path = path.as_ref();
+    let _stage = Stage::new(format_args!("reading {}", path.display()), 0);
+    let format = format_to_read(path)?;
+    let read = (format.read)(path).map_err(|error| match error {
+        Error::Data { .. } => explained(path, format, error),
+        other => other,
+    })?;
+    read.gaussians.check()?;
+    Ok(read)
+}
+
+/// Opens a model that can stay in its file, or returns `None` for one that is read whole.
+fn open_stored(path: &Path) -> Result<Option<StoredModel>> {
+    if format_to_read(path)?.name == FORMATS[0].name { StoredModel::open(path) } else { Ok(None) }
+}
+
+/// Returns how a model is written at a path: by its extension. An unknown one is an error; a pipe or a device without one
+/// gets a PLY.
+fn writer_for(path: &Path) -> Result<ModelWriter> {
+    let is_pipe = || path.extension().is_none() && path.exists() && !path.is_file() && !path.is_dir();
+    let format = by_ending(path).or_else(|| is_pipe().then_some(FORMATS[0]));
+    let problem = match format {
+        Some(ModelFormat { write: Some(writer), .. }) => return Ok(*writer),
+        Some(format) => format!("{} files are only read", format.name),
+        None => unknown_ending(path),
+    };
+    let known = endings(|format| format.write.is_some());
+    Err(Error::usage(path.display().to_string(), format!("{problem}; models are written as {known}")))
+}
+
+/// Refuses a path at which no model can be written because of its extension.
+pub fn check_output(path: &Path) -> Result<()> {
+    writer_for(path).map(drop)
+}
+
+/// Writes a model in the format of its extension; an unknown one is an error. Leaves out rows that are not finite and returns
+/// their number. The write is atomic. What the format cannot hold is logged as a warning.
+pub fn write_model(path: impl AsRef<Path>, model: &Gaussians) -> Result<u64> {
+    write(path.as_ref(), model, None, WriteOptions::default(), false)
+}
+
+/// Like [`write_model`], with the names of the labels: in the file, where its format has a place for them, and in
+/// `NAME.labels.json` beside it. Without names, an old file of names beside it is removed.
+pub fn export_model(
+    path: impl AsRef<Path>,
+    model: &Gaussians,
+    names: Option<&LabelTable>,
+    options: WriteOptions,
+) -> Result<u64> {
+    let names = names.filter(|_| options.label_type != LabelType::None);
+    write(path.as_ref(), model, names, options, true)
+}
+
+fn write(
+    path: &Path,
+    model: &Gaussians,
+    names: Option<&LabelTable>,
+    options: WriteOptions,
+    with_table: bool,
+) -> Result<u64> {
+    let _stage = Stage::new(format_args!("writing {}", path.display()), 0);
+    model.check()?;
+    let writer = writer_for(path)?;
+    let rows: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
+    let export = Export::new(model, &rows, names, options);
+    (writer.losses)(&export)?.iter().for_each(|loss| tracing::warn!("{}: {loss}", path.display()));
+    atomic::write(path, |out| (writer.write)(&export, out))?;
+    // A pipe or a device has no files beside it.
+    if path.is_file() {
+        origin::write(path, export.origin, rows.len() as u64)?;
+    }
+    if with_table {
+        match (writer.checksum, export.labels()) {
+            (Some(checksum), Some(labels)) => side_labels::write(path, &export, labels, checksum(&export))?,
+            _ => LabelTable::put(names, &LabelTable::beside(path))?,
+        }
+    }
+    Ok((model.len() - rows.len()) as u64)
+}

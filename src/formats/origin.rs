@@ -1,0 +1,66 @@
+//! The origin of a scene far away, such as in UTM coordinates. Files hold 32-bit positions about it, so that no digit is
+//! lost; the origin itself is in `FILE.origin.json` beside it, and in the file if its format has a place.
+
+use glam::DVec3;
+use labelgs_files::{atomic, read};
+use labelgs_scene::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+const SCHEMA_VERSION: u32 = 1;
+/// Ending of the file, after the whole name of the model.
+const ENDING: &str = ".origin.json";
+
+#[derive(Serialize, Deserialize)]
+struct File {
+    schema_version: u32,
+    /// World position of the file's (0, 0, 0): world = file + origin.
+    world_origin: [f64; 3],
+    /// Number of Gaussians of the model, so that a file of another model is noticed.
+    gaussians: u64,
+}
+
+/// Returns the path of the file beside a model.
+pub(super) fn beside(model: &Path) -> PathBuf {
+    let mut name = model.file_name().unwrap_or_default().to_owned();
+    name.push(ENDING);
+    model.with_file_name(name)
+}
+
+/// Reads the origin beside a model of `count` Gaussians; 0 without a file. A file of another count is another model's:
+/// it is left alone, with a note.
+pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<DVec3> {
+    let path = beside(model);
+    if !path.is_file() {
+        return Ok(DVec3::ZERO);
+    }
+    let expected = r#"expected {"schema_version": 1, "world_origin": [x, y, z], "gaussians": N}; correct or delete it"#;
+    let file: File = read::json(&path, expected)?;
+    if file.schema_version != SCHEMA_VERSION {
+        let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", file.schema_version);
+        return Err(Error::data(&path, "schema_version", problem));
+    }
+    let origin = DVec3::from_array(file.world_origin);
+    if !origin.as_vec3().is_finite() {
+        return Err(Error::data(&path, "world_origin", format!("is beyond the range of 32-bit floats; {expected}")));
+    }
+    if file.gaussians != count {
+        let name = path.display();
+        notes.push(format!(
+            "{name} is of a model of {} Gaussians, this one has {count}; it was ignored",
+            file.gaussians
+        ));
+        return Ok(DVec3::ZERO);
+    }
+    Ok(origin)
+}
+
+/// Writes the file beside a model; an origin of 0 removes it.
+pub(super) fn write(model: &Path, origin: DVec3, gaussians: u64) -> Result<()> {
+    let path = beside(model);
+    if origin != DVec3::ZERO {
+        let file = File { schema_version: SCHEMA_VERSION, world_origin: origin.to_array(), gaussians };
+        return atomic::write_json(&path, &file);
+    }
+    if path.is_file() { std::fs::remove_file(&path).map_err(Error::write(&path)) } else { Ok(()) }
+}

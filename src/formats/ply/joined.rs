@@ -1,0 +1,69 @@
+//! Writes a file of many models, one after the other, so that no more than one is in memory.
+
+use super::write::{write_header, write_rows};
+use crate::format::{Export, WriteOptions};
+use labelgs_files::atomic;
+use labelgs_scene::{Error, Gaussians, Result, Setting};
+use std::io;
+use std::path::Path;
+
+/// Writes the models of `parts` as one, atomically; they have `count` rows together. All have the columns and the world
+/// origin of `like`, whose rows do not matter.
+///
+/// # Errors
+///
+/// Another number of rows, or a part with other columns; what a part cannot be read for.
+pub fn write_joined(
+    path: &Path,
+    like: &Gaussians,
+    count: usize,
+    parts: impl Iterator<Item = Result<Gaussians>>,
+) -> Result<()> {
+    let mut failed = None;
+    let done = atomic::write(path, |out| {
+        write_header(&export(like, &[], like), count, out)?;
+        let mut written = 0;
+        for part in parts {
+            let part = match part.and_then(|part| fitting(part, like)) {
+                Ok(part) => part,
+                Err(error) => {
+                    failed = Some(error);
+                    return Err(io::Error::other("a part cannot be read"));
+                }
+            };
+            let rows: Vec<usize> = (0..part.len()).collect();
+            write_rows(&export(&part, &rows, like), out)?;
+            written += rows.len();
+        }
+        if written != count {
+            failed = Some(Error::Bug(format!("{written} rows were written, and {count} announced")));
+            return Err(io::Error::other("a wrong number of rows"));
+        }
+        Ok(())
+    });
+    // What a part was refused for says more than that the file was not finished.
+    failed.map_or(done, Err)
+}
+
+fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Export<'a> {
+    Export { model, rows, names: None, origin: like.origin, options: WriteOptions::default() }
+}
+
+/// Returns a part with the columns and the origin of `like`.
+pub fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
+    if part.antialiased != like.antialiased {
+        let problem = "is on for some of the models and off for others; train all alike, the coarse one too";
+        return Err(Error::usage(Setting("antialias"), problem));
+    }
+    part.raise_degree(like.sh_degree);
+    if part.origin != like.origin {
+        let moved = |row: usize| (part.world(row) - like.origin).as_vec3().to_array();
+        part.means = (0..part.len()).map(moved).collect();
+        part.origin = like.origin;
+    }
+    let count = part.len();
+    part.labels = like.labels.as_ref().map(|_| part.labels.take().unwrap_or_else(|| vec![0; count]));
+    part.label_confidence =
+        like.label_confidence.as_ref().map(|_| part.label_confidence.take().unwrap_or_else(|| vec![0.0; count]));
+    Ok(part)
+}

@@ -1,0 +1,101 @@
+//! The standard 3DGS PLY. If the scene has labels, the last column is `label`. If votes were counted, `property float
+//! label_confidence` precedes it.
+
+mod columns;
+mod decode;
+mod joined;
+mod packed;
+mod stored;
+mod write;
+
+pub(super) use joined::fitting;
+pub use joined::write_joined;
+
+use super::format::{ModelFormat, ReadModel};
+use super::table::Table;
+use columns::Columns;
+use decode::Decoder;
+use glam::DVec3;
+use labelgs_scene::{Error, Result};
+use std::path::Path;
+
+pub use stored::StoredModel;
+
+/// Start of the comment with the world position of the file's (0, 0, 0).
+const ORIGIN: &str = "labelgs world_origin ";
+/// Start of the comment with how viewers draw the model (Brush, PlayCanvas), and its value for antialiased models.
+const MODE: &str = "SplatRenderMode: ";
+const ANTIALIASED: &str = "mip";
+/// The comment of Postshot's antialiased models.
+const ANTIALIASED_POSTSHOT: &str = "antialiased 1";
+
+/// The format that viewers of 3DGS read.
+pub(super) const FORMAT: ModelFormat =
+    ModelFormat { name: "PLY", endings: &[".ply"], read, write: Some(write::WRITER) };
+
+/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, with or
+/// without the prefixes of CloudCompare. The number of `f_rest_*` (0, 9, 24, 45 or 72, channel-major) gives the SH degree, of
+/// which 3 are kept; `label` is optional. The filter of Mip-Splatting is applied, discs of 2DGS get a thin third axis; other
+/// columns that may change the picture are named in a note. Without `label`, the selection in the `state` of an editor is
+/// label 1. Rows that cannot be rendered are dropped and counted. A compressed PLY is read too. A label of -1 is none; one
+/// that is no whole number up to [`MODEL_LABEL_MAX`] is an error.
+///
+/// [`MODEL_LABEL_MAX`]: labelgs_scene::MODEL_LABEL_MAX
+fn read(path: &Path) -> Result<ReadModel> {
+    if let Some(read) = packed::read(path)? {
+        return Ok(read);
+    }
+    let table = Table::open(path)?;
+    let columns = Columns::of(path, &table)?;
+    let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
+    let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, &columns));
+    let odd = table.for_each(&columns.names(), |index, values| {
+        if let Some(row) = decoder.row(index, values)? {
+            rows.push(&row);
+        }
+        Ok(())
+    })?;
+    let activated = rows.look_activated();
+    let mut read = rows.finish(path, origin)?;
+    read.gaussians.antialiased = antialiased;
+    read.dropped += decoder.deleted;
+    read.notes.extend(decoder.notes());
+    add_notes(&mut read.notes, activated, odd.extra_bytes);
+    Ok(read)
+}
+
+/// Adds what the user should know of the values and the length of a file.
+fn add_notes(notes: &mut Vec<String>, activated: bool, extra_bytes: u64) {
+    if activated {
+        let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
+                    and exponential, but a 3DGS PLY has the values before; such a model looks like fog";
+        notes.push(note.to_owned());
+    }
+    if extra_bytes > 0 {
+        notes.push(format!("{} bytes after the last Gaussian were ignored", extra_bytes));
+    }
+}
+
+/// Returns true if the comments of a header say that the model is antialiased.
+fn is_antialiased<'a>(mut comments: impl Iterator<Item = &'a str>) -> bool {
+    comments.any(|comment| {
+        let comment = comment.trim();
+        comment.strip_prefix(MODE).is_some_and(|mode| mode.trim() == ANTIALIASED) || comment == ANTIALIASED_POSTSHOT
+    })
+}
+
+/// Returns the origin in the comments of the header.
+fn origin(path: &Path, table: &Table) -> Result<Option<DVec3>> {
+    let Some(words) = table.comments().find_map(|comment| comment.trim().strip_prefix(ORIGIN)) else {
+        return Ok(None);
+    };
+    let numbers: Vec<f64> = words.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
+    match *numbers {
+        [x, y, z] if DVec3::new(x, y, z).as_vec3().is_finite() => Ok(Some(DVec3::new(x, y, z))),
+        _ => {
+            let problem =
+                format!("the comment `{ORIGIN}{words}` does not end with three numbers; correct or remove it");
+            Err(Error::data(path, "header", problem))
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Writes the standard 3DGS PLY.
+
+use super::{ANTIALIASED, MODE, ORIGIN};
+use crate::format::{Export, LabelType, ModelWriter};
+use glam::DVec3;
+use labelgs_scene::{Error, Result, Setting};
+use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
+use ply_rs_bw::writer::Writer;
+use std::io::{self, Write};
+
+/// Largest whole number up to which a 32-bit float holds all of them.
+const FLOAT_EXACT: u32 = 1 << 24;
+
+pub(super) const WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
+
+/// Refuses ids that a float would round.
+fn losses(export: &Export) -> Result<Vec<String>> {
+    let labels = export.labels().filter(|_| export.options.label_type == LabelType::Float).unwrap_or_default();
+    let Some(label) = labels.iter().find(|&&label| label > FLOAT_EXACT) else { return Ok(Vec::new()) };
+    let problem = format!(
+        "label {label} is above {FLOAT_EXACT}, up to which 32-bit floats hold whole numbers; give it a smaller id, or \
+         write labels as uint"
+    );
+    Err(Error::usage(Setting("label_type"), problem))
+}
+
+/// Writes a little-endian PLY with zero normals. If the scene has labels, `label` is the last column, and
+/// `label_confidence` precedes it if known. Positions are 32-bit floats, because some readers take nothing else; those
+/// that would be rounded are relative to the origin in a comment.
+fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    write_header(export, export.rows.len(), out)?;
+    write_rows(export, out)
+}
+
+/// Writes the header of a file with `count` rows like those of an export.
+pub(super) fn write_header(export: &Export, count: usize, out: &mut dyn Write) -> io::Result<()> {
+    // The crate needs a sized writer for the header.
+    let mut text = Vec::new();
+    Writer::<DefaultElement>::new().write_header(&mut text, &header(export, count))?;
+    out.write_all(&text)
+}
+
+/// Writes the rows of an export.
+pub(super) fn write_rows(export: &Export, out: &mut dyn Write) -> io::Result<()> {
+    let mut bytes = Vec::with_capacity((19 + export.model.rest_per_gaussian() * 3) * 4);
+    export.rows.iter().try_for_each(|&row| write_row(export, row, &mut bytes, out))
+}
+
+fn header(export: &Export, count: usize) -> Header {
+    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).to_vec();
+    names.extend((0..3).map(|k| format!("f_dc_{k}")));
+    names.extend((0..export.model.rest_per_gaussian() * 3).map(|k| format!("f_rest_{k}")));
+    names.push("opacity".into());
+    names.extend((0..3).map(|k| format!("scale_{k}")));
+    names.extend((0..4).map(|k| format!("rot_{k}")));
+    names.extend(export.label_confidence().map(|_| "label_confidence".into()));
+    let mut vertex = ElementDef::new("vertex".into());
+    vertex.count = count;
+    let mut add = |name, scalar| vertex.properties.add(PropertyDef::new(name, PropertyType::Scalar(scalar)));
+    names.into_iter().for_each(|name| add(name, ScalarType::Float));
+    if export.labels().is_some() {
+        let is_uint = export.options.label_type == LabelType::Uint;
+        add("label".into(), if is_uint { ScalarType::UInt } else { ScalarType::Float });
+    }
+    let mut header = Header::new();
+    header.encoding = Encoding::BinaryLittleEndian;
+    let origin = export.origin;
+    if origin != DVec3::ZERO {
+        header.comments.push(format!("{ORIGIN}{:?} {:?} {:?}", origin.x, origin.y, origin.z));
+    }
+    if export.model.antialiased {
+        header.comments.push(format!("{MODE}{ANTIALIASED}"));
+    }
+    header.elements.add(vertex);
+    header
+}
+
+fn write_row(export: &Export, row: usize, bytes: &mut Vec<u8>, out: &mut dyn Write) -> io::Result<()> {
+    bytes.clear();
+    let g = export.model;
+    let triples = export.rest(row);
+    let head = export.position(row).into_iter().chain([0.0; 3]).chain(g.sh0[row]);
+    let channels = (0..3).flat_map(|channel| triples.iter().map(move |triple| triple[channel]));
+    let tail = [g.opacities[row]].into_iter().chain(g.scales[row]).chain(g.quats[row]);
+    let share = export.label_confidence().map(|shares| shares[row]);
+    head.chain(channels).chain(tail).chain(share).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    if let Some(labels) = export.labels() {
+        let label = labels[row];
+        let is_uint = export.options.label_type == LabelType::Uint;
+        bytes.extend_from_slice(&if is_uint { label.to_le_bytes() } else { (label as f32).to_le_bytes() });
+    }
+    out.write_all(bytes)
+}

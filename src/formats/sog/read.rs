@@ -1,0 +1,135 @@
+//! Reads SOG.
+
+use super::archive::{Archive, Picture};
+use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
+use super::{CODEBOOK, PALETTE_ROW, ROTATION, coefficients};
+use crate::format::ReadModel;
+use crate::rows::{Row, Rows};
+use crate::values::logit_of_byte;
+use labelgs_files::read as file;
+use labelgs_scene::{Error, Result};
+use std::f64::consts::SQRT_2;
+use std::path::Path;
+
+/// The pictures of a file, each with a pixel for every Gaussian.
+struct Pictures {
+    low: Picture,
+    high: Picture,
+    quats: Picture,
+    scales: Picture,
+    sh0: Picture,
+    /// Entries of the palette, and the palette.
+    rest: Option<(Picture, Picture)>,
+    labels: Option<Picture>,
+}
+
+/// Reads a SOG of version 2.
+pub(super) fn read(path: &Path) -> Result<ReadModel> {
+    let bytes = file::bytes(path)?;
+    let mut archive = Archive::open(path, &bytes)?;
+    let text = archive.file(FILE)?;
+    let meta: Meta = serde_json::from_slice(&text)
+        .map_err(|error| Error::data(path, FILE, format!("{error}; expected that of a SOG; export the file again")))?;
+    if meta.version != VERSION {
+        return Err(bad(path, FILE, format!("has version {}; {VERSION} is read", meta.version)));
+    }
+    let own = meta.extras.as_ref().and_then(|extras| extras.labelgs.as_ref());
+    let own = own.filter(|own| own.version == EXTRAS_VERSION);
+    let pictures = pictures(path, &meta, own, &mut archive)?;
+    let bands = meta.rest.as_ref().map_or(0, |rest| rest.bands);
+    let mut triples = vec![[0.0; 3]; coefficients(bands)];
+    let mut rows = Rows::new(bands, own.is_some(), own.is_some_and(|own| own.confidence));
+    for index in 0..meta.count {
+        if let (Some(own), Some((entries, palette))) = (&meta.rest, &pictures.rest) {
+            harmonics(&mut triples, &own.codebook, palette, entries.texels[index])
+                .ok_or_else(|| bad(path, &own.files[1], format!("pixel {index} names no entry of the palette")))?;
+        }
+        let place = |axis: usize| {
+            let steps = [&pictures.low, &pictures.high].map(|picture| picture.texels[index][axis]);
+            let (least, most) = (meta.means.mins[axis], meta.means.maxs[axis]);
+            let logarithm = least + (most - least) * f64::from(u16::from_le_bytes(steps)) / 65_535.0;
+            logarithm.abs().exp_m1().copysign(logarithm)
+        };
+        let of_book = |book: &[f32], texel: [u8; 4]| [0, 1, 2].map(|at| book[usize::from(texel[at])]);
+        let label = pictures.labels.as_ref().map(|labels| labels.texels[index]);
+        rows.push(&Row {
+            position: [place(0), place(1), place(2)],
+            quat: quat(pictures.quats.texels[index]),
+            scale: of_book(&meta.scales.codebook, pictures.scales.texels[index]),
+            opacity: logit_of_byte(pictures.sh0.texels[index][3]),
+            sh0: of_book(&meta.sh0.codebook, pictures.sh0.texels[index]),
+            rest: &triples,
+            label: label.map(|[low, high, _, _]| u32::from(u16::from_le_bytes([low, high]))),
+            confidence: label.map(|texel| f32::from(texel[2]) / 255.0),
+        });
+    }
+    let names = own.and_then(|own| own.names.as_ref());
+    let names = names.map(|names| names.checked(path)).transpose()?;
+    let mut read = rows.finish(path, None)?;
+    read.gaussians.antialiased = meta.antialias || meta.model.as_deref() == Some(ANTIALIASED);
+    Ok(ReadModel { names, ..read })
+}
+
+fn bad(path: &Path, place: &str, problem: String) -> Error {
+    Error::data(path, place, format!("{problem}; export the file again"))
+}
+
+/// Reads the pictures, and checks their sizes and the codebooks.
+fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archive) -> Result<Pictures> {
+    let mut rest = None;
+    if let Some(own) = &meta.rest {
+        if !(1..=3).contains(&own.bands) {
+            return Err(bad(path, FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
+        }
+        let (entries, palette) = (archive.picture(&own.files[1])?, archive.picture(&own.files[0])?);
+        if palette.width != PALETTE_ROW * coefficients(own.bands) {
+            let problem = format!("is {} wide, expected {PALETTE_ROW} entries a row", palette.width);
+            return Err(bad(path, &own.files[0], problem));
+        }
+        rest = Some((entries, palette));
+    }
+    let all = Pictures {
+        low: archive.picture(&meta.means.files[0])?,
+        high: archive.picture(&meta.means.files[1])?,
+        quats: archive.picture(&meta.quats.files[0])?,
+        scales: archive.picture(&meta.scales.files[0])?,
+        sh0: archive.picture(&meta.sh0.files[0])?,
+        labels: own.map(|own| archive.picture(&own.file)).transpose()?,
+        rest,
+    };
+    let needed = [&all.low, &all.high, &all.quats, &all.scales, &all.sh0].into_iter().chain(&all.labels);
+    let least = needed.chain(all.rest.as_ref().map(|rest| &rest.0)).map(|picture| picture.texels.len()).min();
+    if meta.count == 0 || least < Some(meta.count) {
+        return Err(bad(path, FILE, format!("has {} Gaussians, and a picture has fewer pixels", meta.count)));
+    }
+    let books =
+        [&meta.scales.codebook, &meta.sh0.codebook].into_iter().chain(meta.rest.as_ref().map(|rest| &rest.codebook));
+    if books.into_iter().any(|book| book.len() != CODEBOOK) {
+        return Err(bad(path, FILE, format!("has a codebook of other than {CODEBOOK} numbers")));
+    }
+    Ok(all)
+}
+
+/// Fills in the harmonics of a palette's entry; `None` if there is no such entry.
+fn harmonics(to: &mut [[f32; 3]], book: &[f32], palette: &Picture, [low, high, _, _]: [u8; 4]) -> Option<()> {
+    let entry = usize::from(u16::from_le_bytes([low, high]));
+    let start = entry / PALETTE_ROW * palette.width + entry % PALETTE_ROW * to.len();
+    let texels = palette.texels.get(start..start + to.len())?;
+    to.iter_mut().zip(texels).for_each(|(triple, texel)| *triple = [0, 1, 2].map(|at| book[usize::from(texel[at])]));
+    Some(())
+}
+
+/// The rotation (w, x, y, z) of a pixel.
+fn quat([a, b, c, which]: [u8; 4]) -> [f64; 4] {
+    if which < ROTATION {
+        return [1.0, 0.0, 0.0, 0.0];
+    }
+    let [a, b, c] = [a, b, c].map(|value| (f64::from(value) / 255.0 * 2.0 - 1.0) / SQRT_2);
+    let largest = (1.0 - a * a - b * b - c * c).max(0.0).sqrt();
+    match which - ROTATION {
+        0 => [largest, a, b, c],
+        1 => [a, largest, b, c],
+        2 => [a, b, largest, c],
+        _ => [a, b, c, largest],
+    }
+}

@@ -1,0 +1,103 @@
+//! Moves, turns and scales a model. Colours that depend on the direction are turned along.
+
+use glam::{DQuat, DVec3};
+use labelgs_scene::harmonics::{COEFFICIENTS, basis};
+use labelgs_scene::origin::far_origin;
+use labelgs_scene::{Error, Gaussians, Result, Setting};
+use std::f64::consts::TAU;
+
+/// First coefficient of each degree above 0, and one past the last.
+const DEGREES: [usize; 4] = [0, 3, 8, COEFFICIENTS];
+/// Nodes and weights of Gauss and Legendre. Four are exact up to degree 7, two functions of degree 3 have 6.
+const NODES: [(f64, f64); 4] = [
+    (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+    (-0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
+    (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
+    (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+];
+/// Directions around the axis: exact up to degree 7.
+const AROUND: u32 = 8;
+
+/// A change of place: world' = scale * turn * (world - origin).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// The place that becomes (0, 0, 0), world units.
+    pub origin: DVec3,
+    /// The turn.
+    pub turn: DQuat,
+    /// The factor of all lengths, more than 0.
+    pub scale: f64,
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        Self { origin: DVec3::ZERO, turn: DQuat::IDENTITY, scale: 1.0 }
+    }
+}
+
+impl Transform {
+    /// Returns the shortest turn that makes a direction of the model the upward one of 3DGS files, -y.
+    pub fn upright(up: DVec3) -> Result<DQuat> {
+        let up = up.try_normalize();
+        let up = up
+            .ok_or_else(|| Error::usage(Setting("up"), "is no direction; expected one with a length, such as 0,0,1"))?;
+        Ok(DQuat::from_rotation_arc(up, DVec3::NEG_Y))
+    }
+
+    /// Returns the transformed model.
+    pub fn apply(&self, model: &Gaussians) -> Result<Gaussians> {
+        if !(self.scale > 0.0 && self.scale.is_finite() && self.origin.is_finite() && self.turn.is_normalized()) {
+            return Err(Error::usage("Transform", format!("{self:?} is no change of place with a scale above 0")));
+        }
+        let moved = |row: usize| self.scale * (self.turn * (model.world(row) - self.origin));
+        let places: Vec<DVec3> = (0..model.len()).map(moved).collect();
+        let mut to = model.clone();
+        to.origin = far_origin(&places);
+        to.means = places.iter().map(|&place| (place - to.origin).as_vec3().to_array()).collect();
+        let larger = self.scale.ln();
+        to.scales.iter_mut().flatten().for_each(|scale| *scale = (f64::from(*scale) + larger) as f32);
+        if self.turn == DQuat::IDENTITY {
+            return Ok(to);
+        }
+        for quat in &mut to.quats {
+            let [w, x, y, z] = quat.map(f64::from);
+            // The length of a rotation is kept, whatever it is.
+            let turned = self.turn * DQuat::from_xyzw(x, y, z, w);
+            *quat = [turned.w, turned.x, turned.y, turned.z].map(|value| value as f32);
+        }
+        let along = harmonics(self.turn);
+        let rest = model.rest_per_gaussian();
+        let degrees = &DEGREES[..=model.sh_degree as usize];
+        for (to, from) in to.sh_rest.chunks_exact_mut(rest.max(1)).zip(model.sh_rest.chunks_exact(rest.max(1))) {
+            for ends in degrees.windows(2) {
+                for at in ends[0]..ends[1] {
+                    let part = |channel: usize| {
+                        (ends[0]..ends[1]).map(|k| along[at][k] * f64::from(from[k][channel])).sum::<f64>() as f32
+                    };
+                    to[at] = [part(0), part(1), part(2)];
+                }
+            }
+        }
+        Ok(to)
+    }
+}
+
+/// The matrix that turns coefficients along: the integral, over all directions, of each basis function times each one
+/// turned. It is 0 between degrees.
+fn harmonics(turn: DQuat) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
+    let mut matrix = [[0.0; COEFFICIENTS]; COEFFICIENTS];
+    let back = turn.inverse();
+    for (z, weight) in NODES {
+        for at in 0..AROUND {
+            let (sin, cos) = (TAU * f64::from(at) / f64::from(AROUND)).sin_cos();
+            let radius = (1.0 - z * z).sqrt();
+            let direction = DVec3::new(radius * cos, radius * sin, z);
+            let (here, before) = (basis(direction), basis(back * direction));
+            let share = weight * TAU / f64::from(AROUND);
+            for (row, &value) in matrix.iter_mut().zip(&here) {
+                row.iter_mut().zip(&before).for_each(|(sum, other)| *sum += share * value * other);
+            }
+        }
+    }
+    matrix
+}

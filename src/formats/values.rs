@@ -1,0 +1,30 @@
+//! Values after activation, as other formats store them, before activation.
+
+/// A size of 0, which some formats allow, as one that has a logarithm.
+const SCALE_MIN: f32 = 1e-12;
+
+/// The opacity of a logit.
+pub(super) fn sigmoid(logit: f32) -> f32 {
+    1.0 / (1.0 + (-logit).exp())
+}
+
+/// The logit of an opacity in steps of 1/255; 0 and 255, which have none, count as a quarter of a step from the end.
+pub(super) fn logit_of_byte(byte: u8) -> f32 {
+    let share = f32::from(byte).clamp(0.25, 254.75) / 255.0;
+    (share / (1.0 - share)).ln()
+}
+
+/// The logarithm of a size; that of a negative size is NaN.
+pub(super) fn log_scale(scale: f32) -> f32 {
+    if (0.0..SCALE_MIN).contains(&scale) { SCALE_MIN.ln() } else { scale.ln() }
+}
+
+/// The value from 0 to 255 that is nearest.
+pub(super) fn byte(value: f32) -> u8 {
+    value.round().clamp(0.0, 255.0) as u8
+}
+
+/// The byte of an opacity in steps of 1/255, without 0 and 255, of which other readers make infinite logits.
+pub(super) fn opacity_byte(logit: f32) -> u8 {
+    byte(255.0 * sigmoid(logit)).clamp(1, 254)
+}

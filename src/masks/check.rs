@@ -1,0 +1,299 @@
+//! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
+
+use super::shortened;
+use super::soft_edges::{self, Edges};
+use labelgs_scene::median::median;
+use labelgs_scene::{Camera, LabelMap, Point, Setting};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Share of the image border above which an object surrounds the image. It is a little below 1, because the true object
+/// may touch the border.
+pub const INVERTED_BORDER: f64 = 0.9;
+/// Share of the image above which an object covers most of it. Objects of interest rarely do; backgrounds always do.
+pub const INVERTED_SHARE: f64 = 0.5;
+/// Border share up to which an id in the other masks does not surround the image.
+pub const INVERTED_ELSEWHERE: f64 = 0.5;
+/// Labelled area relative to the median below which a mask is nearly empty. Distance and image borders change areas by
+/// small factors; lost tracks leave nothing or specks.
+pub const EMPTY_MASK: f64 = 0.05;
+/// The same for one object. It is lower, because an object may really show a sliver behind another.
+pub const EMPTY_OBJECT: f64 = 0.005;
+/// Fewest masks with an object before one of them is compared with their median.
+pub const VIEWS_FOR_MEDIAN: usize = 4;
+/// Least share of the image that an object has in both neighbours for its absence between them to count. Smaller
+/// objects may really disappear.
+pub const BLINK_SHARE: f64 = 0.002;
+
+/// A kind of problem in masks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Problem {
+    /// A photo has no mask.
+    Missing,
+    /// A file belongs to no photo.
+    Misnamed,
+    /// No scale brings the mask to the size of the photo.
+    Missized,
+    /// The file is no id mask.
+    Unreadable,
+    /// Only photos that are held out have masks.
+    HeldOut,
+    /// No mask marks an object.
+    NoObject,
+    /// Every mask is one area of one id.
+    OneArea,
+    /// Values of areas mix at their edges.
+    SoftEdges,
+    /// Object and background look swapped.
+    Inverted,
+    /// Much less is labelled than in the other masks.
+    NearlyEmpty,
+    /// Only one mask has the id.
+    SingleView,
+    /// An id is absent between two masks that have it.
+    Blink,
+}
+
+impl Problem {
+    /// Returns the display name.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Misnamed => "misnamed",
+            Self::Missized => "missized",
+            Self::Unreadable => "unreadable",
+            Self::HeldOut => "held-out",
+            Self::NoObject => "no-object",
+            Self::OneArea => "one-area",
+            Self::SoftEdges => "soft-edges",
+            Self::Inverted => "inverted",
+            Self::NearlyEmpty => "nearly-empty",
+            Self::SingleView => "single-view",
+            Self::Blink => "blink",
+        }
+    }
+}
+
+/// A suspicious mask or object.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Finding {
+    /// Kind of problem.
+    pub problem: Problem,
+    /// Name of the photo, if the problem is about one.
+    pub view: Option<String>,
+    /// Id of the object, if the problem is about one.
+    pub id: Option<u32>,
+    /// Description.
+    pub text: String,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Area {
+    pixels: u64,
+    border: u64,
+}
+
+/// The measurements of a mask that the checks need.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Look {
+    pixels: u64,
+    border: u64,
+    objects: BTreeMap<u16, Area>,
+    edges: Edges,
+    /// Id at the projection of each point of the scene; `None` outside the image.
+    at_points: Vec<Option<u16>>,
+}
+
+impl Look {
+    /// Measures a mask. `camera` is that of the photo, at any scale. Lens distortion is ignored, because positions need
+    /// only be approximate.
+    pub fn new(map: &LabelMap, camera: &Camera, points: &[Point]) -> Self {
+        let mut objects: BTreeMap<u16, Area> = BTreeMap::new();
+        for run in map.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
+            objects.entry(run[0]).or_default().pixels += run.len() as u64;
+        }
+        let (width, height) = (map.width, map.height);
+        let rows = [0, height - 1].into_iter().collect::<BTreeSet<u32>>();
+        let columns = [0, width - 1].into_iter().collect::<BTreeSet<u32>>();
+        let horizontal = rows.iter().flat_map(|&y| (0..width).map(move |x| (x, y)));
+        let vertical = columns.iter().flat_map(|&x| (1..height.saturating_sub(1)).map(move |y| (x, y)));
+        let mut border = 0;
+        for (x, y) in horizontal.chain(vertical) {
+            border += 1;
+            if let Some(area) = objects.get_mut(&map.at(x, y)) {
+                area.border += 1;
+            }
+        }
+        let camera = camera.resized(width, height);
+        let at = |point: &Point| {
+            let own = camera.to_camera(point.position);
+            let pixel = camera.project(own);
+            let (x, y) = (pixel.x.floor(), pixel.y.floor());
+            let inside = own.z > 0.0 && x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
+            inside.then(|| map.at(x as u32, y as u32))
+        };
+        let at_points = points.iter().map(at).collect();
+        Self { pixels: map.ids.len() as u64, border, objects, edges: Edges::of(&map.ids, width, height), at_points }
+    }
+
+    /// Returns the ids in the mask.
+    pub fn ids(&self) -> impl Iterator<Item = u32> {
+        self.objects.keys().map(|&id| u32::from(id))
+    }
+
+    fn share(&self, id: u16) -> f64 {
+        self.objects.get(&id).map_or(0.0, |area| area.pixels as f64 / self.pixels as f64)
+    }
+
+    fn border_share(&self, id: u16) -> f64 {
+        self.objects.get(&id).map_or(0.0, |area| area.border as f64 / self.border as f64)
+    }
+
+    fn labelled(&self) -> f64 {
+        self.objects.values().map(|area| area.pixels).sum::<u64>() as f64 / self.pixels as f64
+    }
+}
+
+/// Checks masks, given with the names of their photos and sorted by name. A problem of all masks stands alone, because it
+/// makes many others.
+pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
+    if let Some((problem, text)) = problem_of_all(masks) {
+        return vec![Finding { problem, view: None, id: None, text }];
+    }
+    let ids: BTreeSet<u16> = masks.iter().flat_map(|(_, look)| look.objects.keys().copied()).collect();
+    let mut found = nearly_empty_masks(masks);
+    for &id in &ids {
+        found.extend(inverted(masks, id, ids.len() == 1));
+        found.extend(nearly_empty_objects(masks, id));
+        found.extend(single_view(masks, id));
+        found.extend(blinks(masks, id));
+    }
+    found.sort();
+    found
+}
+
+fn problem_of_all(masks: &[(&str, &Look)]) -> Option<(Problem, String)> {
+    let (_, first) = masks.first()?;
+    if masks.iter().all(|(_, look)| look.objects.is_empty()) {
+        return Some((Problem::NoObject, no_object(masks.len())));
+    }
+    if let Some((&id, _)) = first.objects.first_key_value()
+        && masks.iter().all(|(_, look)| look.objects.get(&id).is_some_and(|area| area.pixels == look.pixels))
+    {
+        return Some((Problem::OneArea, one_area(masks.len(), id)));
+    }
+    let edges: Vec<(&str, &Edges)> = masks.iter().map(|(name, look)| (*name, &look.edges)).collect();
+    soft_edges::problem(&edges).map(|text| (Problem::SoftEdges, text))
+}
+
+/// What is wrong with masks of which none marks an object.
+pub fn no_object(masks: usize) -> String {
+    format!(
+        "no mask marks an object: every pixel of all {masks} masks is 0. Make the masks again with an id above 0 for each \
+         object, and look whether the program that wrote them found anything, or wrote ids that were divided by 255"
+    )
+}
+
+/// What is wrong with masks of one area.
+pub fn one_area(masks: usize, id: u16) -> String {
+    format!(
+        "no mask tells an object from what is around it: every pixel of all {masks} masks is {id}. Make the masks again \
+         with 0 where no object is"
+    )
+}
+
+/// What is wrong with masks of photos that are held out.
+pub fn held_out(photos: &[&str]) -> String {
+    format!(
+        "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
+         photos, or hold out others by {} of the training",
+        shortened(photos),
+        Setting("test_every")
+    )
+}
+
+fn finding(problem: Problem, view: &str, id: Option<u16>, text: String) -> Finding {
+    Finding { problem, view: Some(view.to_owned()), id: id.map(u32::from), text }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.2} %", share * 100.0)
+}
+
+/// Finds masks in which an id surrounds and fills the image, although it does not in the other masks or is the only id.
+/// A scene has one floor or wall in most views; an object that is all around in one photo only is its background.
+fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
+    let with: Vec<&(&str, &Look)> = masks.iter().filter(|(_, look)| look.objects.contains_key(&id)).collect();
+    let surrounds = |look: &Look| look.border_share(id) >= INVERTED_BORDER && look.share(id) >= INVERTED_SHARE;
+    let elsewhere = |own: &str| {
+        let others = with.iter().filter(|(name, _)| *name != own).map(|(_, look)| look.border_share(id));
+        median(others).is_some_and(|share| share <= INVERTED_ELSEWHERE)
+    };
+    let found = with.iter().filter(|(name, look)| surrounds(look) && (only || elsewhere(name)));
+    let text = |look: &Look| {
+        let (share, border) = (percent(look.share(id)), percent(look.border_share(id)));
+        let unlike = if only { "it is the only object" } else { "in the other masks it does not surround the picture" };
+        format!(
+            "covers {share} of the picture and {border} of its border, and {unlike}: object and surroundings swapped?"
+        )
+    };
+    found.map(|(name, look)| finding(Problem::Inverted, name, Some(id), text(look))).collect()
+}
+
+fn nearly_empty_masks(masks: &[(&str, &Look)]) -> Vec<Finding> {
+    let usual = median(masks.iter().map(|(_, look)| look.labelled())).unwrap_or(0.0);
+    let few = |look: &Look| look.labelled() < usual * EMPTY_MASK;
+    let text = |look: &Look| {
+        format!("{} of the picture is labelled, in the median mask {}", percent(look.labelled()), percent(usual))
+    };
+    let found = masks.iter().filter(|(_, look)| few(look));
+    found.map(|(name, look)| finding(Problem::NearlyEmpty, name, None, text(look))).collect()
+}
+
+fn nearly_empty_objects(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
+    let with: Vec<(&str, f64)> =
+        masks.iter().map(|(name, look)| (*name, look.share(id))).filter(|(_, share)| *share > 0.0).collect();
+    if with.len() < VIEWS_FOR_MEDIAN {
+        return Vec::new();
+    }
+    let usual = median(with.iter().map(|(_, share)| *share)).unwrap_or(0.0);
+    let few = with.into_iter().filter(|(_, share)| *share < usual * EMPTY_OBJECT);
+    let text = |share| format!("covers {} of the picture, in the median mask {}", percent(share), percent(usual));
+    few.map(|(name, share)| finding(Problem::NearlyEmpty, name, Some(id), text(share))).collect()
+}
+
+fn single_view(masks: &[(&str, &Look)], id: u16) -> Option<Finding> {
+    let mut with = masks.iter().filter(|(_, look)| look.objects.contains_key(&id));
+    let (name, look) = with.next()?;
+    let text = || {
+        let (share, masks) = (percent(look.share(id)), masks.len());
+        format!("is in this mask only, of {masks}, and covers {share} of it: an object lost and found under two ids?")
+    };
+    (masks.len() > 1 && with.next().is_none()).then(|| finding(Problem::SingleView, name, Some(id), text()))
+}
+
+/// Finds masks without an object between two neighbours by name that both show it. Points of the scene that lie on the
+/// object in both neighbours can excuse the absence: either none of them is in the image, or most of those in the image
+/// are on other objects that both neighbours show too and that may hide the object.
+fn blinks(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
+    let shown = |look: &Look| look.share(id) >= BLINK_SHARE;
+    let blinking = masks.windows(3).filter(|three| {
+        let [(_, before), (_, between), (_, after)] = three else { return false };
+        let absent = !between.objects.contains_key(&id);
+        absent && shown(before) && shown(after) && !excused(before, between, after, id)
+    });
+    let text = |before: &str, after: &str| format!("is absent here and present in {before} and {after}");
+    blinking.map(|three| finding(Problem::Blink, three[1].0, Some(id), text(three[0].0, three[2].0))).collect()
+}
+
+fn excused(before: &Look, between: &Look, after: &Look, id: u16) -> bool {
+    let sides = before.at_points.iter().zip(&after.at_points);
+    let on_object = sides.zip(&between.at_points).filter(|((a, b), _)| **a == Some(id) && **b == Some(id));
+    let between: Vec<Option<u16>> = on_object.map(|(_, between)| *between).collect();
+    let inside: Vec<u16> = between.iter().copied().flatten().collect();
+    let known = |other: &&u16| before.objects.contains_key(other) && after.objects.contains_key(other);
+    let behind = inside.iter().filter(known).count();
+    // Without a point on the object there is no excuse.
+    !between.is_empty() && (inside.is_empty() || behind * 2 > inside.len())
+}

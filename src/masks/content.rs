@@ -1,0 +1,125 @@
+//! Converts the samples of a PNG to source ids, or to black and white.
+
+use super::mask::{Header, Raw, read_raw};
+use labelgs_scene::{Error, Result, Setting};
+use png::{BitDepth, ColorType};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// The kind of ids in a PNG, from its header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    Grey8,
+    Grey16,
+    Palette,
+    Rgb,
+    /// 16-bit colours: no ids.
+    Rgb16,
+}
+
+impl Kind {
+    /// Opacity makes no other kind. Colours with the same value in all channels are grey, which only pixels show.
+    pub(super) fn of(header: &Header) -> Self {
+        match (header.colour, header.depth) {
+            (ColorType::Indexed, _) => Self::Palette,
+            (ColorType::Rgb | ColorType::Rgba, BitDepth::Sixteen) => Self::Rgb16,
+            (ColorType::Rgb | ColorType::Rgba, _) => Self::Rgb,
+            (_, BitDepth::Sixteen) => Self::Grey16,
+            _ => Self::Grey8,
+        }
+    }
+
+    /// Returns the kind of a picture of colours whose channels have the same values.
+    pub(super) fn as_grey(self) -> Self {
+        match self {
+            Self::Rgb => Self::Grey8,
+            Self::Rgb16 => Self::Grey16,
+            other => other,
+        }
+    }
+
+    pub(super) fn text(self) -> &'static str {
+        match self {
+            Self::Grey8 => "8-bit grey",
+            Self::Grey16 => "16-bit grey",
+            Self::Palette => "palette",
+            Self::Rgb => "RGB",
+            Self::Rgb16 => "16-bit RGB",
+        }
+    }
+}
+
+/// Ids of the source, one per pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct SourceIds {
+    pub(super) size: (u32, u32),
+    pub(super) ids: Vec<u32>,
+}
+
+/// Returns true if the picture has one value per pixel, in whatever channels.
+pub(super) fn is_grey(path: &Path) -> Result<bool> {
+    Ok(read_raw(path, |_| Ok(()))?.values(path)?.is_some())
+}
+
+/// Reads ids from a PNG of the kind `expected`: value, index, or R + 256 G + 65536 B.
+pub(super) fn read_ids(
+    path: &Path,
+    expected: Kind,
+    accept: impl FnOnce((u32, u32)) -> Result<()>,
+) -> Result<SourceIds> {
+    let wrong = |found: Kind| {
+        let problem = format!(
+            "is a {} picture where {} is expected; set {} to what the folder holds",
+            found.text(),
+            expected.text(),
+            Setting("format")
+        );
+        Error::data(path, "", problem)
+    };
+    let raw = read_raw(path, |header| match Kind::of(header) {
+        found if found == expected || found.as_grey() == expected => accept(header.size),
+        found => Err(wrong(found)),
+    })?;
+    let ids = if expected == Kind::Rgb {
+        let id = |rgb: &[u16]| u32::from(rgb[0]) + (u32::from(rgb[1]) << 8) + (u32::from(rgb[2]) << 16);
+        raw.opaque(path)?.0.chunks_exact(3).map(id).collect()
+    } else {
+        let values = raw.values(path)?.ok_or_else(|| wrong(Kind::of(&raw.header)))?;
+        values.into_iter().map(u32::from).collect()
+    };
+    Ok(SourceIds { size: raw.header.size, ids })
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Binary {
+    pub(super) size: (u32, u32),
+    /// True for pixels of the object, row-major.
+    pub(super) inside: Vec<bool>,
+    /// Number of distinct values, 0 included if present.
+    pub(super) values: usize,
+    /// True if the pixels have only one value besides 0, so that no threshold was needed.
+    pub(super) sharp: bool,
+}
+
+/// Reads a black and white PNG of any kind. If there is one value besides 0, it is the object. If there are more, the
+/// object is the upper half of the range, as in the scorers of LERF-Mask.
+pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<Binary> {
+    let raw = read_raw(path, |header| accept(header.size))?;
+    let size = raw.header.size;
+    let values = brightness(path, &raw)?;
+    let distinct: BTreeSet<u16> = values.iter().copied().collect();
+    let sharp = distinct.iter().filter(|&&value| value != 0).count() <= 1;
+    if !sharp && raw.header.colour == ColorType::Indexed {
+        let problem = format!("has {} palette indices, expected two (object and background)", distinct.len());
+        return Err(Error::data(path, "", problem));
+    }
+    let half = (1_u32 << (raw.header.depth as u32)) / 2;
+    let inside = |&value: &u16| if sharp { value != 0 } else { u32::from(value) >= half };
+    Ok(Binary { size, inside: values.iter().map(inside).collect(), values: distinct.len(), sharp })
+}
+
+/// Returns the value of each pixel: grey, index, or the largest of its colours.
+fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
+    let (samples, channels) = raw.opaque(path)?;
+    Ok(samples.chunks_exact(channels).map(|pixel| pixel.iter().copied().max().unwrap_or(0)).collect())
+}

@@ -1,0 +1,204 @@
+//! The file format of checkpoints: named planes of 32-bit words, and JSON for everything else. A damaged file is
+//! refused.
+//!
+//! | byte | content, little-endian |
+//! | --- | --- |
+//! | 0 | `labelgsC` |
+//! | 8 | version of the format, u32 |
+//! | 12 | CRC-32 of everything from byte 24 on, u32 |
+//! | 16 | number of bytes from byte 24 on, u64 |
+//! | 24 | bytes of the JSON, u64; the JSON; the words of all planes, in its order |
+
+use crate::error::{Error, Result};
+use crate::files::{atomic, read};
+use crc32fast::Hasher;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::io::{self, BufRead, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Version of the format.
+pub const VERSION: u32 = 2;
+
+const MAGIC: [u8; 8] = *b"labelgsC";
+/// Number of bytes before the checksummed part.
+const HEADER: usize = 24;
+/// Number of bytes per conversion between words and little-endian bytes.
+const CHUNK: usize = 1 << 16;
+
+/// A table of words with one name, such as the positions of all Gaussians.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plane {
+    /// Name, unique in its file.
+    pub name: String,
+    /// Words per row.
+    pub words: u32,
+    /// Values, `[rows, words]`; floats as their bits.
+    pub data: Vec<u32>,
+}
+
+/// The content of a checkpoint file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Checkpoint {
+    /// Everything except the planes.
+    pub meta: Value,
+    /// The planes.
+    pub planes: Vec<Plane>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Contents {
+    meta: Value,
+    planes: Vec<Shape>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Shape {
+    name: String,
+    rows: u64,
+    words: u32,
+}
+
+impl Checkpoint {
+    /// Writes the file, atomically: the old file stays until the new one is safe on the disk.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let shape = |plane: &Plane| {
+            let (all, words) = (plane.data.len() as u64, u64::from(plane.words));
+            let rows = all.checked_div(words).filter(|rows| rows * words == all);
+            let rows = rows.ok_or_else(|| Error::Bug(format!("{}: {all} words in rows of {words}", plane.name)))?;
+            Ok(Shape { name: plane.name.clone(), rows, words: plane.words })
+        };
+        let planes = self.planes.iter().map(shape).collect::<Result<Vec<_>>>()?;
+        let json = serde_json::to_vec(&Contents { meta: self.meta.clone(), planes });
+        let json = json.map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
+        let mut body = Body::default();
+        self.put(&json, &mut body).map_err(Error::write(path))?;
+        atomic::write(path, |file| {
+            file.write_all(&MAGIC)?;
+            file.write_all(&VERSION.to_le_bytes())?;
+            file.write_all(&body.sum.finalize().to_le_bytes())?;
+            file.write_all(&body.bytes.to_le_bytes())?;
+            self.put(&json, file)
+        })
+    }
+
+    fn put(&self, json: &[u8], out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&(json.len() as u64).to_le_bytes())?;
+        out.write_all(json)?;
+        let mut bytes = Vec::with_capacity(CHUNK);
+        for chunk in self.planes.iter().flat_map(|plane| plane.data.chunks(CHUNK / 4)) {
+            bytes.clear();
+            bytes.extend(chunk.iter().flat_map(|word| word.to_le_bytes()));
+            out.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Reads a file. A truncated, extended or changed file, or another version, is an error that says so. Memory use is
+    /// about the size of the file, whatever its content.
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut file = read::open(path)?;
+        let length = file.get_ref().length().map_err(Error::read(path))?;
+        check(&mut file, path, length)?;
+        file.seek(SeekFrom::Start(HEADER as u64)).map_err(Error::read(path))?;
+        // The checksum was right: an inconsistency from here on was written that way.
+        let odd = |problem: String| Error::data(path, "contents", problem);
+        let mut rest = length - HEADER as u64;
+        let mut take = |bytes: u64| {
+            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than the file has")))?;
+            Ok::<usize, Error>(bytes as usize)
+        };
+        let mut word = [0; 8];
+        take(8)?;
+        file.read_exact(&mut word).map_err(Error::read(path))?;
+        let mut json = vec![0; take(u64::from_le_bytes(word))?];
+        file.read_exact(&mut json).map_err(Error::read(path))?;
+        let contents: Contents = serde_json::from_slice(&json).map_err(|error| odd(error.to_string()))?;
+        let mut planes = Vec::new();
+        for Shape { name, rows, words } in contents.planes {
+            let bytes = rows.checked_mul(u64::from(words)).and_then(|words| words.checked_mul(4));
+            let bytes = take(bytes.ok_or_else(|| odd(format!("{name} has {rows} rows of {words} words")))?)?;
+            let data = words_of(&mut file, bytes).map_err(Error::read(path))?;
+            planes.push(Plane { name, words, data });
+        }
+        if rest > 0 {
+            return Err(odd(format!("{rest} bytes are left over")));
+        }
+        Ok(Self { meta: contents.meta, planes })
+    }
+}
+
+/// A writer that counts bytes and computes the checksum.
+#[derive(Default)]
+struct Body {
+    sum: Hasher,
+    bytes: u64,
+}
+
+impl Write for Body {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.sum.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Checks the header, the checksum and the length (`length` bytes) of a file.
+fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
+    let refuse = |problem: String| Err(Error::data(path, "", problem));
+    let mut header = Vec::with_capacity(HEADER);
+    file.take(HEADER as u64).read_to_end(&mut header).map_err(Error::read(path))?;
+    let magic = &header[..header.len().min(MAGIC.len())];
+    if !MAGIC.starts_with(magic) {
+        return refuse("is no checkpoint of labelgs".to_owned());
+    }
+    let Ok::<[u8; HEADER], _>(header) = header.try_into() else {
+        return refuse(format!("was cut short: {length} bytes, a checkpoint has more than {HEADER}"));
+    };
+    let u32_at = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    let version = u32_at(8);
+    if version != VERSION {
+        return refuse(format!(
+            "has version {version} of the format, labelgs {} reads version {VERSION}; go on with the labelgs that wrote it",
+            env!("CARGO_PKG_VERSION")
+        ));
+    }
+    let body = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
+    let whole = body.saturating_add(HEADER as u64);
+    if length != whole {
+        let what = if length < whole { "was cut short" } else { "grew" };
+        return refuse(format!("{what}: {length} bytes, {whole} were written"));
+    }
+    let mut sum = Hasher::new();
+    loop {
+        let bytes = file.fill_buf().map_err(Error::read(path))?;
+        if bytes.is_empty() {
+            break;
+        }
+        sum.update(bytes);
+        let count = bytes.len();
+        file.consume(count);
+    }
+    let (found, written) = (sum.finalize(), u32_at(12));
+    if found != written {
+        return refuse(format!("was damaged after it was written: its checksum is {found:08x}, it was {written:08x}"));
+    }
+    Ok(())
+}
+
+fn words_of(file: &mut impl Read, bytes: usize) -> io::Result<Vec<u32>> {
+    let mut data = Vec::with_capacity(bytes / 4);
+    let mut chunk = vec![0; CHUNK];
+    let mut left = bytes;
+    while left > 0 {
+        let part = &mut chunk[..left.min(CHUNK)];
+        file.read_exact(part)?;
+        data.extend(part.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])));
+        left -= part.len();
+    }
+    Ok(data)
+}

@@ -1,0 +1,10 @@
+//! What a training leaves for later ones: checkpoints, blocks, occluders, compiled pipelines.
+
+pub(crate) mod block_file;
+pub(crate) mod checkpoint;
+pub(crate) mod checkpoint_folder;
+pub(crate) mod occlusion_table;
+pub(crate) mod pipeline_file;
+
+pub use occlusion_table::OcclusionTable;
+pub use pipeline_file::PipelineFolder;

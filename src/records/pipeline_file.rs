@@ -1,0 +1,76 @@
+//! The pipeline cache: one file per device with magic, checksum, length and the data of the driver.
+
+use crate::files::{atomic, read};
+use crate::gpu::PipelineStore;
+use etcetera::base_strategy::{BaseStrategy, choose_native_strategy};
+use std::path::PathBuf;
+
+const MAGIC: [u8; 8] = *b"labelgsP";
+const HEADER: usize = 20;
+
+/// A folder of pipeline caches.
+#[derive(Clone, Debug)]
+pub struct PipelineFolder {
+    folder: PathBuf,
+}
+
+impl PipelineFolder {
+    /// Uses a folder; saving creates it.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into() }
+    }
+
+    /// Returns the folder in `LABELGS_CACHE`, else the user's cache folder; none for `off` or without a cache folder.
+    pub fn of_user() -> Option<Self> {
+        match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
+            Some(value) if value == "off" => None,
+            Some(folder) => Some(Self::new(folder)),
+            None => {
+                let base = choose_native_strategy().ok()?.cache_dir();
+                base.is_absolute().then(|| Self::new(base.join("labelgs")))
+            }
+        }
+    }
+
+    /// Returns the folder for locks of the user's processes: that of the caches, else the system's for temporary files.
+    pub fn of_locks() -> PathBuf {
+        Self::of_user().map_or_else(|| std::env::temp_dir().join("labelgs"), |cache| cache.folder)
+    }
+
+    fn path(&self, device: &str) -> PathBuf {
+        self.folder.join(format!("pipelines-{device}.bin"))
+    }
+}
+
+impl PipelineStore for PipelineFolder {
+    fn load(&self, device: &str) -> Vec<u8> {
+        let path = self.path(device);
+        let Ok(bytes) = read::bytes(&path) else { return Vec::new() };
+        unpack(&bytes).map(<[u8]>::to_vec).unwrap_or_else(|| {
+            tracing::warn!("{} is damaged; pipelines are compiled and written again", path.display());
+            Vec::new()
+        })
+    }
+
+    fn save(&self, device: &str, data: &[u8]) {
+        let written = atomic::write(self.path(device), |file| {
+            file.write_all(&MAGIC)?;
+            file.write_all(&crc32fast::hash(data).to_le_bytes())?;
+            file.write_all(&(data.len() as u64).to_le_bytes())?;
+            file.write_all(data)
+        });
+        if let Err(error) = written {
+            tracing::warn!("compiled pipelines could not be saved, the next start compiles them again: {error}");
+        }
+    }
+}
+
+/// Returns the data if it is undamaged: a driver may trust it without checks.
+fn unpack(bytes: &[u8]) -> Option<&[u8]> {
+    let (header, data) = bytes.split_at_checked(HEADER)?;
+    let (magic, rest) = header.split_at(MAGIC.len());
+    let (sum, length) = rest.split_at(4);
+    let whole =
+        magic == MAGIC && length == (data.len() as u64).to_le_bytes() && sum == crc32fast::hash(data).to_le_bytes();
+    whole.then_some(data)
+}

@@ -1,0 +1,74 @@
+//! Settings in messages, and what the running program calls them.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
+use std::sync::OnceLock;
+
+/// What the running command calls a setting, by its field: a flag, or `--set KEY`; unset in a program of another.
+static FLAGS: OnceLock<BTreeMap<String, String>> = OnceLock::new();
+
+/// Gives settings these names in all later messages. The first call counts.
+pub fn speak_of(flags: BTreeMap<String, String>) {
+    // A second start in one process, as in tests, keeps the first flags.
+    let _ = FLAGS.set(flags);
+}
+
+/// A setting in a message, by the name of its field: `` `max_gaussians` ``. The command line prints what can be typed, such
+/// as `--max-gaussians` or `--set label_from`, if the running command has that setting, and `max gaussians` if not.
+///
+/// Only a value of this type becomes a flag, so that keys of files, which are text, never do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Setting(pub &'static str);
+
+impl Setting {
+    /// Returns the setting with a value: `` `overlap = later` `` or `--overlap later`.
+    pub fn to(self, value: impl Display) -> String {
+        self.named(FLAGS.get(), &format!(" = {value}"))
+    }
+
+    fn named(self, flags: Option<&BTreeMap<String, String>>, value: &str) -> String {
+        let Self(field) = self;
+        match flags.map(|flags| flags.get(field)) {
+            None => format!("`{field}{value}`"),
+            Some(Some(typed)) => {
+                // A name of two words takes KEY=VALUE.
+                let sign = if typed.contains(' ') { "=" } else { " " };
+                format!("{typed}{}", value.replacen(" = ", sign, 1))
+            }
+            Some(None) => format!("{}{value}", field.replace('_', " ")),
+        }
+    }
+}
+
+impl Display for Setting {
+    fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
+        to.write_str(&self.named(FLAGS.get(), ""))
+    }
+}
+
+/// The name at the head of a message, where it needs no quotes.
+impl From<Setting> for String {
+    fn from(setting: Setting) -> Self {
+        setting.to_string().trim_matches('`').to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_is_a_flag_where_the_command_has_it() {
+        let typed = [("max_gaussians", "--gaussians"), ("label_from", "--set label_from")];
+        let flags = BTreeMap::from(typed.map(|(field, typed)| (field.to_owned(), typed.to_owned())));
+        let (known, unknown) = (Setting("max_gaussians"), Setting("label_samples"));
+        let of = |setting: Setting, value: &str| [None, Some(&flags)].map(|flags| setting.named(flags, value));
+        assert_eq!(of(known, ""), ["`max_gaussians`", "--gaussians"]);
+        assert_eq!(of(known, " = 5"), ["`max_gaussians = 5`", "--gaussians 5"]);
+        assert_eq!(of(Setting("label_from"), "")[1], "--set label_from");
+        assert_eq!(of(Setting("label_from"), " = 5")[1], "--set label_from=5");
+        assert_eq!(of(unknown, ""), ["`label_samples`", "label samples"]);
+        assert_eq!(of(unknown, " = 5"), ["`label_samples = 5`", "label samples = 5"]);
+        assert_eq!(String::from(known), "max_gaussians", "at the head of a message");
+    }
+}

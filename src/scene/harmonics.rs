@@ -1,0 +1,50 @@
+//! Spherical harmonics of a Gaussian's colour, degrees 0 to 3, with the constants of `glsl/include/constants.glsl`.
+
+use glam::DVec3;
+
+/// Number of coefficients above degree 0, up to degree 3.
+pub const COEFFICIENTS: usize = 15;
+
+/// The basis function of degree 0.
+pub const SH_C0: f64 = 0.282_094_791_773_878_14;
+const SH_C1: f64 = 0.488_602_511_902_919_92;
+const SH_C2_0: f64 = 1.092_548_430_592_079_2;
+const SH_C2_2: f64 = 0.315_391_565_252_520_05;
+const SH_C2_4: f64 = 0.546_274_215_296_039_59;
+const SH_C3_0: f64 = 0.590_043_589_926_643_52;
+const SH_C3_1: f64 = 2.890_611_442_640_553_8;
+const SH_C3_2: f64 = 0.457_045_799_464_465_77;
+const SH_C3_3: f64 = 0.373_176_332_590_115_46;
+const SH_C3_5: f64 = 1.445_305_721_320_276_9;
+
+/// Returns the coefficient of degree 0 that shows a value, 0 to 1.
+pub fn sh0_of(value: f64) -> f32 {
+    ((value - 0.5) / SH_C0) as f32
+}
+
+/// Returns the value that a coefficient of degree 0 shows.
+pub fn value_of(sh0: f32) -> f64 {
+    0.5 + SH_C0 * f64::from(sh0)
+}
+
+/// Returns the basis functions above degree 0 in a direction, as `glsl/include/sh.glsl` has them.
+pub fn basis(DVec3 { x, y, z }: DVec3) -> [f64; COEFFICIENTS] {
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    [
+        -SH_C1 * y,
+        SH_C1 * z,
+        -SH_C1 * x,
+        SH_C2_0 * x * y,
+        -SH_C2_0 * y * z,
+        SH_C2_2 * (2.0 * zz - xx - yy),
+        -SH_C2_0 * x * z,
+        SH_C2_4 * (xx - yy),
+        -SH_C3_0 * y * (3.0 * xx - yy),
+        SH_C3_1 * x * y * z,
+        -SH_C3_2 * y * (4.0 * zz - xx - yy),
+        SH_C3_3 * z * (2.0 * zz - 3.0 * xx - 3.0 * yy),
+        -SH_C3_2 * x * (4.0 * zz - xx - yy),
+        SH_C3_5 * z * (xx - yy),
+        -SH_C3_0 * x * (xx - 3.0 * yy),
+    ]
+}

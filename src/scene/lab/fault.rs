@@ -1,0 +1,127 @@
+//! Injected faults, so that every failure can be tested. In a build with the feature `lab`, the environment variable
+//! `LABELGS_FAULT=SITE:N:KIND` makes the N-th event of a site fail; `SITE:N:KIND:COUNT` makes COUNT events fail from
+//! there on. Commas separate several faults.
+//!
+//! | site | events | kinds |
+//! | --- | --- | --- |
+//! | a Vulkan call, such as `vkQueueSubmit` | its calls | `DEVICE_LOST`, `HOST_MEMORY`, `DEVICE_MEMORY`, `INITIALIZATION` |
+//! | `vulkan` | all Vulkan calls that can fail | the same |
+//! | `write` | operations on a file to write: create, write, sync, rename | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
+//! | `read` | operations on a file to read: open, read, list a folder | `IO`, `SHORT`, `INTERRUPTED` |
+//! | `loader` | loading Vulkan | any |
+//! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a NaN position |
+//! | any | | `SLOW`: the event takes a minute |
+//!
+//! Every system may cause `SHORT` and `INTERRUPTED` at any time: it transfers only a part or nothing, and the call must
+//! be repeated. They must not change any result.
+
+use std::io;
+use std::ops::Range;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Effect of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The device is lost.
+    DeviceLost,
+    /// The host is out of memory.
+    HostMemory,
+    /// The device is out of memory.
+    DeviceMemory,
+    /// The driver cannot start.
+    Initialization,
+    /// The disk is full.
+    NoSpace,
+    /// The disk fails.
+    Io,
+    /// Only one byte is read or written.
+    Short,
+    /// A signal interrupts the call.
+    Interrupted,
+    /// A value becomes NaN.
+    Number,
+    /// The event takes a minute, but succeeds.
+    Slow,
+}
+
+struct Fault {
+    site: String,
+    /// Events that fail.
+    events: Range<u64>,
+    /// Number of events so far.
+    seen: AtomicU64,
+    kind: Kind,
+}
+
+/// The fault that is set for this event of a site, if any.
+#[inline(always)]
+pub fn at(site: &str) -> Option<Kind> {
+    if super::ON { asked(site) } else { None }
+}
+
+fn asked(site: &str) -> Option<Kind> {
+    static FAULTS: OnceLock<Vec<Fault>> = OnceLock::new();
+    let faults = FAULTS.get_or_init(|| {
+        let text = super::var("LABELGS_FAULT").unwrap_or_default();
+        let read = |text: &str| {
+            let fault = parse(text);
+            if fault.is_none() {
+                tracing::warn!("LABELGS_FAULT: {text} is ignored; expected SITE:N:KIND or SITE:N:KIND:COUNT");
+            }
+            fault
+        };
+        text.split(',').filter(|text| !text.is_empty()).filter_map(read).collect()
+    });
+    // Every fault of the site counts this event, also those after the first match.
+    let met =
+        |fault: &&Fault| fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
+    let kind = faults.iter().filter(met).last()?.kind;
+    tracing::warn!("a fault on purpose: {kind:?} at {site}");
+    if kind == Kind::Slow {
+        std::thread::sleep(Duration::from_secs(60));
+        return None;
+    }
+    Some(kind)
+}
+
+/// Applies a fault to a transfer of bytes from or to a file. Returns true if only a part may be transferred.
+pub fn of_transfer(site: &str) -> io::Result<bool> {
+    match at(site) {
+        Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
+        Some(Kind::Interrupted) => Err(io::ErrorKind::Interrupted.into()),
+        Some(Kind::Short) => Ok(true),
+        Some(_) => Err(io::Error::other("a fault on purpose")),
+        None => Ok(false),
+    }
+}
+
+/// Applies a fault to any other file operation, which succeeds or fails as a whole.
+pub fn of_file(site: &str) -> io::Result<()> {
+    match of_transfer(site) {
+        Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
+        other => other.map(|_| ()),
+    }
+}
+
+fn parse(text: &str) -> Option<Fault> {
+    let mut parts = text.split(':');
+    let (site, first, kind) = (parts.next()?, parts.next()?.parse::<u64>().ok()?, parts.next()?);
+    let count = parts.next().map_or(Some(1), |count| count.parse().ok())?;
+    let kind = match kind {
+        "DEVICE_LOST" => Kind::DeviceLost,
+        "HOST_MEMORY" => Kind::HostMemory,
+        "DEVICE_MEMORY" => Kind::DeviceMemory,
+        "INITIALIZATION" => Kind::Initialization,
+        "NO_SPACE" => Kind::NoSpace,
+        "IO" => Kind::Io,
+        "SHORT" => Kind::Short,
+        "INTERRUPTED" => Kind::Interrupted,
+        "NUMBER" => Kind::Number,
+        "SLOW" => Kind::Slow,
+        _ => return None,
+    };
+    let events = first..first.saturating_add(count);
+    Some(Fault { site: site.to_owned(), events, seen: AtomicU64::new(0), kind })
+}

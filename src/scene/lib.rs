@@ -1,0 +1,40 @@
+//! Plain host data of a scene, options and errors; no Vulkan, no files.
+//!
+//! A [`Dataset`] has [`View`]s (a [`Camera`] with [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
+//! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras, an [`Overview`] is what they look at.
+//! A [`Zone`] is a box.
+
+pub mod agreement;
+pub mod camera;
+pub mod colour;
+pub mod crew;
+pub mod depth;
+pub mod direction;
+pub mod error;
+pub mod gaussians;
+pub mod harmonics;
+pub mod lab;
+pub mod labels;
+pub mod median;
+pub mod options;
+pub mod origin;
+pub mod overview;
+pub mod path;
+pub mod pixels;
+pub mod sampling;
+pub mod spread;
+pub mod stage;
+pub mod view;
+pub mod words;
+pub mod zone;
+
+pub use camera::Camera;
+pub use depth::{DepthKind, DepthMap};
+pub use error::{Error, Result, Setting};
+pub use gaussians::Gaussians;
+pub use labels::{LABEL_MAX, LabelMap, MODEL_LABEL_MAX, Occluders, UNLABELLED, label_colour};
+pub use overview::Overview;
+pub use pixels::Pixels;
+pub use view::stems;
+pub use view::{ColourMatrix, Dataset, Flaw, Photo, Point, View};
+pub use zone::Zone;

@@ -1,0 +1,44 @@
+//! Words of messages: counts, and names for a misspelt one.
+
+/// Most names that a message offers for a misspelt one.
+const OFFERED_MAX: usize = 3;
+/// Least similarity of a name that is offered, 0 to 1.
+const SIMILARITY_MIN: f64 = 0.75;
+
+/// Returns a count with its noun: `1 object`, `8 objects`.
+pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
+    let count = count.to_string();
+    let ending = if count == "1" { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
+/// Returns `did you mean barrel?` with the names that are spelt most like `name`; none if no name is like it.
+pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let typed = name.to_lowercase();
+    let similarity = |known: &str| strsim::jaro_winkler(&typed, &known.to_lowercase());
+    let rated = known.into_iter().map(|known| (similarity(known), known));
+    let mut rated: Vec<(f64, &str)> = rated.filter(|(similarity, _)| *similarity >= SIMILARITY_MIN).collect();
+    rated.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(b.1)));
+    let names: Vec<&str> = rated.into_iter().map(|(_, name)| name).take(OFFERED_MAX).collect();
+    (!names.is_empty()).then(|| format!("did you mean {}?", names.join(" or ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_thing_is_singular() {
+        assert_eq!([0_u32, 1, 2].map(|count| counted(count, "object")), ["0 objects", "1 object", "2 objects"]);
+    }
+
+    #[test]
+    fn the_nearest_names_are_offered() {
+        let known = ["barrel", "basket", "cup", "red table", "barrels"];
+        let offered = |name| did_you_mean(name, known);
+        assert_eq!(offered("barell").as_deref(), Some("did you mean barrel or barrels?"));
+        assert_eq!(offered("CUPS").as_deref(), Some("did you mean cup?"));
+        assert_eq!(offered("red tabel").as_deref(), Some("did you mean red table?"));
+        assert_eq!(offered("xyz"), None);
+    }
+}

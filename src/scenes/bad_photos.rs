@@ -1,0 +1,48 @@
+//! Undecodable photos: a training can skip a few; many mean a damaged data set.
+
+use super::LoadOptions;
+use labelgs_files::all::LISTED_MAX;
+use labelgs_scene::{Error, Result, Setting};
+use std::path::Path;
+
+/// Returns how many of `total` photos may be left out.
+pub(super) fn allowed(max_share: f32, total: usize) -> usize {
+    // In floating point, 0.29 of 100 is a little less than 29.
+    ((f64::from(max_share) * total as f64 + 1e-3) as usize).min(total.saturating_sub(1))
+}
+
+/// Notes the skipped photos. If they are more than the options allow, refuses the scene with a list. `bad` has one
+/// error per undecodable photo; `total` is the number of photos with a file.
+pub fn skip(
+    root: &Path,
+    mut bad: Vec<Error>,
+    total: usize,
+    options: &LoadOptions,
+    notes: &mut Vec<String>,
+) -> Result<()> {
+    if bad.is_empty() {
+        return Ok(());
+    }
+    // A read error is the fault of the disk, not of the photo.
+    if let Some(unread) = bad.iter().position(|error| matches!(error, Error::Read { .. })) {
+        return Err(bad.swap_remove(unread));
+    }
+    let count = bad.len();
+    let listed = || bad.iter().take(LISTED_MAX).map(|error| format!("\n  {error}")).collect::<String>();
+    let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };
+    let allowed = allowed(options.max_bad_photos, total);
+    if count <= allowed {
+        notes.push(format!("{count} of {total} photos cannot be read and are skipped:{}{more}", listed()));
+        return Ok(());
+    }
+    if count == 1 && total == 1 {
+        return Err(bad.remove(0));
+    }
+    let problem = format!(
+        "{count} of {total} photos cannot be read, {} allows {allowed}; mend them, take them out \
+         of the scene, or allow more:{}{more}",
+        Setting("max_bad_photos").to(options.max_bad_photos),
+        listed()
+    );
+    Err(Error::data(root, "photos", problem))
+}

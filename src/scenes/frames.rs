@@ -1,0 +1,81 @@
+//! `frames.json`: the frames of a video through the photos of a scene, and the photo of some frames.
+
+use super::camera_json::CameraFile;
+use labelgs_files::{atomic, read};
+use labelgs_scene::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Name of the file in the folder of the video.
+pub const FILE: &str = "frames.json";
+const SCHEMA_VERSION: u32 = 1;
+
+/// A frame of the video.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Frame {
+    /// Its picture, relative to the folder of the file.
+    pub file: String,
+    /// Name of the photo with the same pose, or of a face of a photo through a wide lens; null between photos.
+    pub photo: Option<String>,
+    /// Width and height of the photo, px, which lies in the upper left of the frame; without it, the frame is the photo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
+    /// Its camera, in the layout of `labelgs render --camera`.
+    pub camera: CameraFile,
+}
+
+/// The frames of a video, in order.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Frames {
+    /// Version of the layout.
+    pub schema_version: u32,
+    /// True if photos were taken through lenses, so that their masks are no pictures of a pinhole camera.
+    #[serde(default)]
+    pub lenses: bool,
+    /// The frames.
+    pub frames: Vec<Frame>,
+}
+
+impl Frames {
+    /// Makes a video of these frames.
+    pub fn new(frames: Vec<Frame>, lenses: bool) -> Self {
+        Self { schema_version: SCHEMA_VERSION, lenses, frames }
+    }
+
+    /// Reads the file. Another version, a photo with two frames or beyond its frame, and a video without
+    /// photos are errors.
+    pub fn read(path: &Path) -> Result<Self> {
+        let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
+        let video: Self = read::json(path, expected)?;
+        if video.schema_version != SCHEMA_VERSION {
+            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", video.schema_version);
+            return Err(Error::data(path, "schema_version", problem));
+        }
+        let inside = |frame: &Frame| match frame.size {
+            Some([width, height]) => {
+                width > 0 && height > 0 && width <= frame.camera.width && height <= frame.camera.height
+            }
+            None => true,
+        };
+        if let Some(frame) = video.frames.iter().find(|frame| !inside(frame)) {
+            return Err(Error::data(path, format!("frame {}", frame.file), "has a `size` beyond that of its camera"));
+        }
+        let mut seen = BTreeSet::new();
+        for name in video.frames.iter().filter_map(|frame| frame.photo.as_deref()) {
+            if !seen.insert(name) {
+                return Err(Error::data(path, format!("photo {name}"), "has two frames"));
+            }
+        }
+        if seen.is_empty() {
+            return Err(Error::data(path, "frames", "no frame has the pose of a photo"));
+        }
+        Ok(video)
+    }
+
+    /// Writes the file, atomically.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
+        atomic::write(path, |out| out.write_all(text.as_bytes()))
+    }
+}

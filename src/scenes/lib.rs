@@ -1,0 +1,150 @@
+//! Scenes: posed photos with masks, as reconstructions and data sets store them.
+//!
+//! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses, a [`recipe`] says how a
+//! photo becomes a view ([`lens`], [`window`], size), and the photos that memory cannot hold stay in files
+//! ([`photo_store`]). [`capture`] looks for faults of photos and poses, [`initial_gaussians`] makes the first Gaussians.
+//!
+//! To add a reader, add a file beside `llff` that returns a `Listing`, and a case in `list`.
+
+mod bad_photos;
+pub mod camera_json;
+pub mod capture;
+pub mod colmap;
+pub mod depth;
+mod frame_check;
+pub mod frames;
+pub mod init;
+pub mod lens;
+mod list;
+mod listed_path;
+mod listing;
+mod llff;
+mod load;
+mod lookup;
+mod mask_notes;
+mod metashape;
+mod missing;
+mod photo_finder;
+mod photo_store;
+pub mod points;
+mod pose_convention;
+mod read_options;
+mod recipe;
+mod resample;
+pub mod shelf;
+mod split;
+mod stray;
+mod transforms;
+pub mod truth;
+pub mod window;
+
+use labelgs_files::scratch;
+use labelgs_scene::stage::Stage;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Dataset, Error, Result, Setting};
+use list::{folder_of, list};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub use camera_json::{read_camera, write_cameras};
+pub use depth::DepthFolder;
+pub use frames::{Frame, Frames};
+pub use init::initial_gaussians;
+pub use lookup::Lookup;
+pub use pose_convention::PoseConvention;
+pub use read_options::ReadOptions;
+
+/// The options for reading a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadOptions {
+    /// Folder of id masks; without it no masks are read.
+    pub masks: Option<PathBuf>,
+    /// Folder of pictures named as masks, whose pixels above 0 leave the photo out: of the loss, of votes, of scores. A
+    /// photo without a picture counts as a whole.
+    pub ignore: Option<PathBuf>,
+    /// Limit on the longest side of photos, px.
+    pub max_resolution: Option<u32>,
+    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. Another N than `None` leaves
+    /// a scene its own split.
+    pub test_every: Option<u32>,
+    /// Colour behind transparent photos, R, G, B, 0 to 1.
+    pub background: [f32; 3],
+    /// Keeps the opacity of transparent photos that are not held out, over black, instead.
+    pub keep_opacity: bool,
+    /// Decodes the photos. Their sizes are read in any case.
+    pub photos: bool,
+    /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
+    pub max_bad_photos: f32,
+    /// Where the scene's files are and how its poses are meant, where the scene itself does not say it right.
+    pub lookup: Lookup,
+    /// Turns photos into pinhole views. Without it a view has the pixels of the photo as stored, whatever its lens, and a
+    /// camera that is right for pinholes only.
+    pub undistort: bool,
+    /// Most bytes of memory for photos and masks. In a larger scene some of them wait in a temporary file until they are
+    /// asked for, with the same bits.
+    pub photo_memory: u64,
+    /// Names of the views to read, of those that are in the scene; `None` reads all. The split is that of all views.
+    pub only: Option<Arc<BTreeSet<String>>>,
+    /// Folder for that file; with `None` there is no file, and such photos are decoded again each time.
+    pub photo_folder: Option<PathBuf>,
+}
+
+/// Default for the memory of photos and masks, bytes.
+pub const PHOTO_MEMORY: u64 = 3 << 29;
+
+/// Default for the largest share of undecodable photos.
+pub const MAX_BAD_PHOTOS: f32 = 0.1;
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            masks: None,
+            ignore: None,
+            max_resolution: None,
+            test_every: Some(8),
+            background: [0.0; 3],
+            keep_opacity: false,
+            photos: true,
+            max_bad_photos: MAX_BAD_PHOTOS,
+            lookup: Lookup::default(),
+            undistort: true,
+            photo_memory: PHOTO_MEMORY,
+            only: None,
+            photo_folder: Some(scratch::system_folder()),
+        }
+    }
+}
+
+/// Reads the scene in the folder `scene`: a COLMAP model (in `sparse/0`, `sparse`, `colmap/sparse/0` or the folder
+/// itself), else `transforms_train.json` with `transforms_test.json` or `transforms_val.json`, else `transforms.json`, else `poses_bounds.npy` of
+/// LLFF, else an `.xml` of Metashape. A path to one of the last three reads that file.
+///
+/// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
+/// the result. Pixels outside of the photo get alpha 0 and id 0. A polynomial keeps focal lengths and principal point,
+/// other lenses keep the scale of the middle of the photo; one of 110 degrees and more becomes faces of a cube, each a
+/// view with the face in its name (`00.left.jpg`), all of them held out or none.
+/// Photos without a file are skipped before the split, undecodable ones after it.
+pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+    if options.max_resolution == Some(0) {
+        return Err(Error::usage(Setting("max_resolution"), "0 px leaves no image; expected 1 or more"));
+    }
+    if !(0.0..=1.0).contains(&options.max_bad_photos) {
+        let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
+        return Err(Error::usage(Setting("max_bad_photos"), problem));
+    }
+    let stage = Stage::new("reading poses and points", 0);
+    let listing = list(scene, &options.lookup)?;
+    drop(stage);
+    load::load(folder_of(scene), listing, options)
+}
+
+/// Like [`open`]; logs a summary and the notes.
+pub fn open_logged(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
+    let dataset = open(scene, options)?;
+    dataset.notes.iter().for_each(|note| tracing::warn!("{note}"));
+    let (train, test, points) = (dataset.train.len(), dataset.test.len(), dataset.points.len());
+    let (train, test) = (counted(train, "training view"), counted(test, "test view"));
+    tracing::info!("scene: {train}, {test}, {}", counted(points, "point"));
+    Ok(dataset)
+}

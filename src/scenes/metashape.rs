@@ -1,0 +1,374 @@
+//! Cameras of Agisoft Metashape, as "Export Cameras" writes them: XML with sensors, components and cameras.
+//!
+//! A camera's `transform` is camera-to-component with axes x right, y down, z forward; that of its component, or of the
+//! chunk, goes on to the world. Lenses follow appendix D of Metashape's manual, where the focal length is in px, the
+//! principal point relative to the middle of the photo, and p1 and p2 the other way round than in OpenCV. In a rig, slaves
+//! have no transform but that of their sensor in the master's frame.
+
+use super::lens::{Fisheye, Lens, Polynomial};
+use super::listed_path::Place;
+use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side, with_extension};
+use super::pose_convention::Native;
+use glam::{DAffine3, DMat3, DVec3};
+use labelgs_files::read;
+use labelgs_scene::words::counted;
+use labelgs_scene::{Camera, Error, Result};
+use roxmltree::{Document, Node, ParsingOptions};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Most elements and texts of a file; a photo takes a dozen.
+const NODES_MAX: u32 = 1 << 24;
+/// Most elements in each other. The parser calls itself for each of them, and Metashape has seven.
+const DEPTH_MAX: usize = 64;
+
+/// Reads the scene, if its folder has one XML file of Metashape.
+pub fn list(scene: &Place) -> Result<Option<Listing>> {
+    let is_xml = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("xml"));
+    let mut found: Vec<_> = read::folder(scene.root)?.into_iter().filter(is_xml).collect();
+    found.sort();
+    match found.as_slice() {
+        [] => Ok(None),
+        [path] => list_file(scene, path).map(Some),
+        [first, second, ..] => {
+            let problem = format!("lies beside {}; name the one with the cameras as the scene", second.display());
+            Err(Error::data(first, "", problem))
+        }
+    }
+}
+
+pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+    let text = read::text(path)?;
+    if let Some(line) = too_deep(&text) {
+        let problem = format!("elements are nested deeper than {DEPTH_MAX}; expected cameras of Metashape in XML");
+        return Err(Error::data(path, format!("line {line}"), problem));
+    }
+    let options = ParsingOptions { nodes_limit: NODES_MAX, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(&text, options).map_err(|error| {
+        Error::data(path, format!("line {}", error.pos().row), format!("{error}; expected cameras of Metashape in XML"))
+    })?;
+    let file = File { path, document: &document };
+    let mut chunks = document.root_element().descendants().filter(|node| node.has_tag_name("chunk"));
+    let Some(chunk) = chunks.next() else {
+        return Err(Error::data(path, "", "has no `chunk`; expected the XML of Metashape's \"Export Cameras\""));
+    };
+    let mut listing = Listing::new(path, Native::CAMERA_TO_WORLD);
+    if chunks.next().is_some() {
+        listing.notes.push(format!("only the first chunk of {} is used", path.display()));
+    }
+    let chunk = Chunk::new(&file, chunk)?;
+    let mut reader = Reader { scene, chunk: &chunk, listing, names: BTreeSet::new(), counts: Counts::default() };
+    for camera in chunk.node.descendants().filter(|node| node.has_tag_name("camera") && node.has_attribute("label")) {
+        reader.read(camera)?;
+    }
+    let Reader { mut listing, counts, .. } = reader;
+    require_some(listing.views.len(), &mut listing.bad)?;
+    let told = [
+        (counts.disabled, "disabled in Metashape and left out"),
+        (counts.lost, "without a pose and left out: not aligned, or exported without it"),
+        (
+            counts.slaves,
+            "posed as slaves of a rig: by the master's pose, then rotation and location of the sensor. If they are \
+             displaced, export the cameras without the rig",
+        ),
+    ];
+    let told = told.into_iter().filter(|(count, _)| *count > 0);
+    listing
+        .notes
+        .extend(told.map(|(count, what)| format!("{} of {} {what}", counted(count, "camera"), path.display())));
+    Ok(listing)
+}
+
+/// Numbers of cameras for notes.
+#[derive(Default)]
+struct Counts {
+    disabled: usize,
+    /// Without a pose.
+    lost: usize,
+    /// Posed by the master of their rig.
+    slaves: usize,
+}
+
+/// The cameras of a chunk while they are read.
+struct Reader<'a> {
+    scene: &'a Place<'a>,
+    chunk: &'a Chunk<'a>,
+    listing: Listing,
+    names: BTreeSet<String>,
+    counts: Counts,
+}
+
+impl<'a> Reader<'a> {
+    /// Adds a camera to the listing. One that cannot be used is a photo less.
+    fn read(&mut self, camera: Node<'a, 'a>) -> Result<()> {
+        if matches!(camera.attribute("enabled"), Some("0" | "false")) {
+            self.counts.disabled += 1;
+            return Ok(());
+        }
+        let file = self.chunk.file;
+        let label = camera.attribute("label").unwrap_or_default();
+        let place = format!("{}, camera `{label}`", file.line(camera));
+        let refuse = |problem: &str| Error::data(file.path, place.as_str(), problem);
+        let posed = self.chunk.pose(camera, &refuse);
+        let posed = posed.and_then(|pose| pose.map(|pose| self.chunk.view(camera, pose, &refuse)).transpose());
+        let (own, lens, is_slave) = match posed {
+            Ok(Some(view)) => view,
+            Ok(None) => {
+                self.counts.lost += 1;
+                return Ok(());
+            }
+            Err(error) => {
+                self.listing.bad.push(error);
+                return Ok(());
+            }
+        };
+        self.counts.slaves += usize::from(is_slave);
+        let resolved = self.scene.resolve(file.path, label)?;
+        let photo = self.scene.photos.find(&["images", "."], &resolved.path);
+        let name = with_extension(resolved.name, photo.as_deref());
+        if !self.names.insert(name.clone()) {
+            return Err(refuse("another camera has this label too; rename one of the photos"));
+        }
+        self.listing.views.push(Listed { name, photo, camera: own, lens, test: None });
+        Ok(())
+    }
+}
+
+/// Returns the line in which elements are nested deeper than [`DEPTH_MAX`]. Markup that is not well formed may count more;
+/// the parser refuses it.
+fn too_deep(text: &str) -> Option<usize> {
+    let (mut rest, mut depth) = (text, 0_usize);
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at + 1..];
+        let skipped =
+            [("!--", "-->"), ("![CDATA[", "]]>"), ("?", "?>")].iter().find(|(start, _)| rest.starts_with(start));
+        if let Some((_, end)) = skipped {
+            rest = rest.find(end).map_or("", |at| &rest[at..]);
+        } else if rest.starts_with('/') {
+            depth = depth.saturating_sub(1);
+        } else {
+            // The end of the tag, outside of quotes.
+            let mut quote = None;
+            let end = rest.bytes().position(|byte| match (byte, quote) {
+                (b'"' | b'\'', None) => {
+                    quote = Some(byte);
+                    false
+                }
+                (byte, Some(open)) => {
+                    quote = Some(open).filter(|_| byte != open);
+                    false
+                }
+                (byte, None) => byte == b'>',
+            });
+            let tag = &rest[..end.unwrap_or(rest.len())];
+            depth += usize::from(!tag.ends_with('/'));
+            rest = &rest[tag.len()..];
+        }
+        if depth > DEPTH_MAX {
+            return Some(text[..text.len() - rest.len()].matches('\n').count() + 1);
+        }
+    }
+    None
+}
+
+fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+/// Finds all elements of a name below a node, by their ids.
+fn by_id<'a>(chunk: Node<'a, 'a>, name: &str) -> BTreeMap<&'a str, Node<'a, 'a>> {
+    let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
+    nodes.filter_map(|node| Some((node.attribute("id")?, node))).collect()
+}
+
+/// A chunk: what its cameras refer to by id.
+struct Chunk<'a> {
+    file: &'a File<'a>,
+    node: Node<'a, 'a>,
+    sensors: BTreeMap<&'a str, Node<'a, 'a>>,
+    components: BTreeMap<&'a str, Node<'a, 'a>>,
+    cameras: BTreeMap<&'a str, Node<'a, 'a>>,
+    to_world: Option<DAffine3>,
+}
+
+/// The pose of a camera in the world, with axes x right, y down, z forward.
+struct Pose {
+    to_world: DAffine3,
+    /// It follows from another camera of the rig.
+    is_slave: bool,
+}
+
+impl<'a> Chunk<'a> {
+    fn new(file: &'a File<'a>, node: Node<'a, 'a>) -> Result<Self> {
+        let [sensors, components, cameras] = ["sensor", "component", "camera"].map(|name| by_id(node, name));
+        Ok(Self { file, node, sensors, components, cameras, to_world: file.similarity(node)? })
+    }
+
+    /// Returns the pose of a camera; `None` if it is not aligned. A slave of a rig without a pose of its own has that of its
+    /// sensor in the master's frame.
+    fn pose(&self, camera: Node<'a, 'a>, refuse: &dyn Fn(&str) -> Error) -> Result<Option<Pose>> {
+        if let Some(transform) = child(camera, "transform") {
+            let to_world = self.to_world(camera, refuse)? * self.file.matrix(transform)?;
+            return Ok(Some(Pose { to_world, is_slave: false }));
+        }
+        let master = camera.attribute("master_id").and_then(|id| self.cameras.get(id));
+        let Some((&master, transform)) = master.and_then(|master| Some((master, child(*master, "transform")?))) else {
+            return Ok(None);
+        };
+        let of_master = self.to_world(master, refuse)? * self.file.matrix(transform)?;
+        let in_master = self.file.mounting(self.sensor(camera, refuse)?)?.ok_or_else(|| {
+            refuse("is a slave of a rig, and its sensor has no `rotation` and `location`; export the cameras without the rig")
+        })?;
+        Ok(Some(Pose { to_world: of_master * in_master, is_slave: true }))
+    }
+
+    /// Returns the camera at its pose, its lens, and whether it is a slave.
+    fn view(&self, camera: Node<'a, 'a>, pose: Pose, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens, bool)> {
+        let (intrinsics, lens) = self.file.sensor(self.sensor(camera, refuse)?)?;
+        let rotation = rotation_of(pose.to_world.matrix3)
+            .ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
+        let (rotation, translation) = invert_pose(rotation, pose.to_world.translation);
+        let own = Camera { rotation, translation, ..intrinsics };
+        let place = format!("{}, camera `{}`", self.file.line(camera), camera.attribute("label").unwrap_or_default());
+        check_camera(self.file.path, &place, &own, &lens)?;
+        Ok((own, lens, pose.is_slave))
+    }
+
+    fn sensor(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<Node<'a, 'a>> {
+        let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get(id)).copied();
+        sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))
+    }
+
+    /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.
+    fn to_world(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<DAffine3> {
+        let own = match camera.attribute("component_id") {
+            Some(id) if !self.components.is_empty() => match self.components.get(id) {
+                Some(&component) => self.file.similarity(component)?,
+                None => return Err(refuse("names no component of the chunk; export the cameras again")),
+            },
+            _ => None,
+        };
+        Ok(own.or(self.to_world).unwrap_or(DAffine3::IDENTITY))
+    }
+}
+
+/// A parsed file, for messages.
+struct File<'a> {
+    path: &'a Path,
+    document: &'a Document<'a>,
+}
+
+impl<'a> File<'a> {
+    fn line(&self, node: Node) -> String {
+        format!("line {}", self.document.text_pos_at(node.range().start).row)
+    }
+
+    fn refuse<T>(&self, node: Node, problem: impl Into<String>) -> Result<T> {
+        Err(Error::data(self.path, self.line(node), problem))
+    }
+
+    fn numbers<const N: usize>(&self, node: Node) -> Result<[f64; N]> {
+        let words: Vec<&str> = node.text().unwrap_or_default().split_whitespace().collect();
+        let numbers: Option<Vec<f64>> =
+            words.iter().map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect();
+        match numbers.and_then(|numbers| numbers.try_into().ok()) {
+            Some(numbers) => Ok(numbers),
+            None => self.refuse(node, format!("`{}` holds no {N} finite numbers", node.tag_name().name())),
+        }
+    }
+
+    /// Reads the number in a child; 0 if there is none.
+    fn number(&self, node: Node<'a, 'a>, name: &str) -> Result<f64> {
+        child(node, name).map_or(Ok(0.0), |child| self.numbers::<1>(child).map(|[value]| value))
+    }
+
+    /// Reads a 4 x 4 matrix, row by row.
+    fn matrix(&self, node: Node) -> Result<DAffine3> {
+        let m: [f64; 16] = self.numbers(node)?;
+        let column = |index: usize| DVec3::new(m[index], m[4 + index], m[8 + index]);
+        let matrix3 = DMat3::from_cols(column(0), column(1), column(2));
+        Ok(DAffine3 { matrix3, translation: column(3) })
+    }
+
+    /// Reads the `transform` of a chunk or a component: rotation, row by row, translation and scale.
+    fn similarity(&self, node: Node<'a, 'a>) -> Result<Option<DAffine3>> {
+        let Some(transform) = child(node, "transform") else { return Ok(None) };
+        let rotation = child(transform, "rotation").map(|node| self.numbers::<9>(node)).transpose()?;
+        let rotation = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
+        let translation = child(transform, "translation").map(|node| self.numbers::<3>(node)).transpose()?;
+        let scale = child(transform, "scale").map_or(Ok(1.0), |node| self.numbers::<1>(node).map(|[scale]| scale))?;
+        let translation = translation.map_or(DVec3::ZERO, DVec3::from_array);
+        Ok(Some(DAffine3 { matrix3: rotation * scale, translation }))
+    }
+
+    /// Reads how a sensor is mounted in a rig: from its axes to those of the master, with its centre there, in units of the
+    /// chunk. `None` if the sensor does not say.
+    fn mounting(&self, sensor: Node<'a, 'a>) -> Result<Option<DAffine3>> {
+        let with_text =
+            |name: &str| child(sensor, name).filter(|node| node.text().is_some_and(|text| !text.trim().is_empty()));
+        let (rotation, location) = (with_text("rotation"), with_text("location"));
+        if rotation.or(location).is_none() {
+            return Ok(None);
+        }
+        let rotation = rotation.map(|node| self.numbers::<9>(node)).transpose()?;
+        let matrix3 = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
+        let location = location.map(|node| self.numbers::<3>(node)).transpose()?;
+        Ok(Some(DAffine3 { matrix3, translation: location.map_or(DVec3::ZERO, DVec3::from_array) }))
+    }
+
+    /// Reads a sensor: intrinsics at an identity pose, and the lens.
+    fn sensor(&self, sensor: Node<'a, 'a>) -> Result<(Camera, Lens)> {
+        let place = format!("{}, sensor {}", self.line(sensor), sensor.attribute("id").unwrap_or_default());
+        let mut calibrations = sensor.children().filter(|child| child.has_tag_name("calibration"));
+        let first = calibrations.clone().next();
+        let calibration = calibrations.find(|child| child.attribute("class") == Some("adjusted")).or(first);
+        let resolution = calibration.and_then(|node| child(node, "resolution")).or(child(sensor, "resolution"));
+        let Some(resolution) = resolution else {
+            return self.refuse(sensor, "the sensor has no `resolution`; export the cameras of aligned photos");
+        };
+        let pixels = |name: &str| {
+            let value = resolution.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN);
+            side(self.path, &place, value)
+        };
+        let (width, height) = (pixels("width")?, pixels("height")?);
+        let (w, h) = (f64::from(width), f64::from(height));
+        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let kind = sensor.attribute("type").unwrap_or("frame");
+        if kind == "spherical" {
+            // Pixels are square: what lacks above and below was cut off.
+            let f = w / (2.0 * PI);
+            let (cx, cy) = (w / 2.0, h / 2.0);
+            let camera = Camera { rotation, translation, fx: f, fy: f, cx, cy, width, height };
+            return Ok((camera, Lens::Equirectangular));
+        }
+        let Some(calibration) = calibration else {
+            return self.refuse(sensor, "the sensor has no `calibration`; export the cameras of aligned photos");
+        };
+        if let Some(other) = calibration.attribute("type").filter(|&other| other != kind) {
+            let problem =
+                format!("the sensor is of type {kind} and its calibration of type {other}; export the cameras again");
+            return Err(Error::data(self.path, place, problem));
+        }
+        let value = |name: &str| self.number(calibration, name);
+        if let Some(name) = ["p3", "p4"].into_iter().find(|name| value(name).is_ok_and(|value| value != 0.0)) {
+            let problem =
+                format!("the calibration has {name}, which is not supported; optimize the cameras without it");
+            return Err(Error::data(self.path, place, problem));
+        }
+        let f = value("f")?;
+        let (fx, cx, cy) = (f + value("b1")?, w / 2.0 + value("cx")?, h / 2.0 + value("cy")?);
+        let radial = [value("k1")?, value("k2")?, value("k3")?, value("k4")?];
+        let (tangential, skew) = ([value("p2")?, value("p1")?], value("b2")? / fx);
+        let lens = match kind {
+            "frame" => Polynomial { numerator: radial, tangential, skew, ..Polynomial::default() }.into(),
+            "fisheye" => Lens::Fisheye(Fisheye { radial, tangential, skew, ..Fisheye::default() }),
+            other => {
+                let problem =
+                    format!("a sensor of type {other} is not supported; expected frame, fisheye or spherical");
+                return Err(Error::data(self.path, place, problem));
+            }
+        };
+        Ok((Camera { rotation, translation, fx, fy: f, cx, cy, width, height }, lens))
+    }
+}

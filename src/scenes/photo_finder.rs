@@ -1,0 +1,279 @@
+//! The file of a listed photo.
+//!
+//! Programs rename, convert and move photos after their poses are known. A photo that is not at its listed path is
+//! looked for in the folders in which programs put photos, under the same name in another case or composition, and then
+//! under the same name with another extension. Only a single match counts.
+
+use labelgs_files::names::folded;
+use labelgs_files::read;
+use labelgs_scene::Setting;
+use labelgs_scene::words::counted;
+use std::cell::{OnceCell, RefCell};
+use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+/// Extensions of the photos that can be read.
+const READABLE: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Extensions of photos that cannot be read. They are found, so that the message can say what they are.
+const UNREADABLE: [&str; 13] =
+    ["tif", "tiff", "webp", "heic", "heif", "avif", "bmp", "gif", "jxl", "dng", "cr2", "nef", "arw"];
+/// Folders of photos below a scene, besides all that start with `images`.
+const FOLDERS: [&str; 6] = ["images", "input", "photos", "rgb", "frames", "imgs"];
+
+/// Extensions to try for a photo that is listed without one.
+pub const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
+
+/// Returns true for the name of a photo that can be read.
+pub fn is_readable(path: &Path) -> bool {
+    extension_is_of(path, &READABLE)
+}
+
+fn extension_is_of(path: &Path, extensions: &[&str]) -> bool {
+    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+    extensions.iter().any(|known| known.eq_ignore_ascii_case(extension))
+}
+
+/// True for the name of a folder of photos.
+fn is_folder_of_photos(name: &str) -> bool {
+    name.starts_with("images") || FOLDERS.contains(&name)
+}
+
+/// The entries of a folder, by their keys.
+#[derive(Debug, Default)]
+struct Entries {
+    by_name: HashMap<String, Vec<PathBuf>>,
+    /// Photos, by the key of their name without extension.
+    by_stem: HashMap<String, Vec<PathBuf>>,
+}
+
+impl Entries {
+    fn of(folder: &Path) -> Self {
+        let mut found = Self::default();
+        // A folder that is not there or closed has no photos.
+        for path in read::folder(folder).unwrap_or_default() {
+            let Some(name) = path.file_name().and_then(OsStr::to_str) else { continue };
+            let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or(name);
+            if extension_is_of(&path, &READABLE) || extension_is_of(&path, &UNREADABLE) {
+                found.by_stem.entry(folded(stem)).or_default().push(path.clone());
+            }
+            found.by_name.entry(folded(name)).or_default().push(path);
+        }
+        found
+    }
+}
+
+/// Finds the photos of one scene.
+#[derive(Debug)]
+pub struct PhotoFinder {
+    root: PathBuf,
+    /// The folder that the user named.
+    images: Option<PathBuf>,
+    folders: RefCell<HashMap<PathBuf, Entries>>,
+    bases: OnceCell<Vec<PathBuf>>,
+    /// The folder of photos of a scene of which this is one of the models.
+    above: OnceCell<Option<PathBuf>>,
+    /// Number of photos that are not at their listed paths, and the first of them with its file.
+    elsewhere: RefCell<Option<(usize, PathBuf, PathBuf)>>,
+}
+
+impl PhotoFinder {
+    /// Makes one for the scene in `root`; `images` replaces all folders.
+    pub fn new(root: &Path, images: Option<PathBuf>) -> Self {
+        Self {
+            root: root.to_owned(),
+            images,
+            folders: RefCell::default(),
+            bases: OnceCell::new(),
+            above: OnceCell::new(),
+            elsewhere: RefCell::default(),
+        }
+    }
+
+    /// Returns the folder of photos: the one that the user named, or this one of the scene.
+    pub fn folder(&self, usual: &str) -> PathBuf {
+        let below = || if usual == "." { self.root.clone() } else { self.root.join(usual) };
+        self.images.clone().unwrap_or_else(below)
+    }
+
+    /// Finds the photo listed as `relative`: at this path below one of `folders` of the scene, also with an extension
+    /// if it is listed without one, or elsewhere.
+    pub fn find(&self, folders: &[&str], relative: &Path) -> Option<PathBuf> {
+        let given = self.images.as_deref();
+        let bases: Vec<PathBuf> = match given {
+            Some(images) => vec![images.to_owned()],
+            None => folders.iter().map(|folder| self.folder(folder)).chain(self.above()).collect(),
+        };
+        let paths = trimmed(relative, given.is_some());
+        let listed = if given.is_some() { paths.as_slice() } else { &paths[..1] };
+        let exact = bases.iter().flat_map(|base| listed.iter().map(move |path| base.join(path)));
+        if let Some(found) = exact.clone().find_map(|path| with_any(&path)) {
+            return Some(found);
+        }
+        // A photo that lacks among others is missing, whatever a folder of smaller copies has.
+        let has_others = bases[0].join(relative).parent().is_some_and(|folder| self.has_photos(folder));
+        let bases = if given.is_some() || has_others { bases } else { self.bases() };
+        let found = bases.iter().find_map(|base| paths.iter().find_map(|path| self.alike(base, path)))?;
+        let mut elsewhere = self.elsewhere.borrow_mut();
+        match &mut *elsewhere {
+            Some((count, ..)) => *count += 1,
+            None => *elsewhere = Some((1, relative.to_owned(), found.clone())),
+        }
+        Some(found)
+    }
+
+    /// The folder of photos of a scene of which this is one of the models, as `sparse/1` is.
+    fn above(&self) -> Option<PathBuf> {
+        self.above.get_or_init(|| self.look_above()).clone()
+    }
+
+    fn look_above(&self) -> Option<PathBuf> {
+        let root = std::path::absolute(&self.root).ok()?;
+        let scene = root
+            .ancestors()
+            .skip(1)
+            .take(3)
+            .find(|above| above.join("sparse").is_dir() && root.starts_with(above.join("sparse")))?;
+        Some(scene.join("images")).filter(|images| images.is_dir())
+    }
+
+    /// Returns a note on the photos that were found elsewhere.
+    pub fn note(&self) -> Option<String> {
+        let elsewhere = self.elsewhere.borrow();
+        let (count, listed, found) = elsewhere.as_ref()?;
+        Some(format!(
+            "{} not at the listed path and found by name: {} is {}",
+            counted(count, "photo"),
+            listed.display(),
+            found.strip_prefix(&self.root).unwrap_or(found).display()
+        ))
+    }
+
+    /// Says where photos were looked for and what lies below the scene, for messages.
+    pub fn hint(&self) -> String {
+        if let Some(images) = &self.images {
+            let count = count_photos(images);
+            return format!("the named folder {} holds {count} PNG or JPEG files", images.display());
+        }
+        let counts = self.counts();
+        if counts.is_empty() {
+            return format!(
+                "no folder of the scene holds PNG or JPEG files: name the folder of the photos with {}",
+                Setting("images")
+            );
+        }
+        let list: Vec<String> =
+            counts.iter().take(3).map(|(count, path)| format!("{} ({count})", path.display())).collect();
+        format!(
+            "PNG and JPEG files are in {}; name the folder of the photos with {}",
+            list.join(", "),
+            Setting("images")
+        )
+    }
+
+    /// Returns the folder of the scene with the most photos, and their number.
+    pub fn most_photos(&self) -> Option<(PathBuf, usize)> {
+        self.counts().into_iter().next().map(|(count, folder)| (folder, count))
+    }
+
+    /// Numbers of photos in the scene's folder and those in it, the largest first.
+    fn counts(&self) -> Vec<(usize, PathBuf)> {
+        let below = read::folder(&self.root).unwrap_or_default().into_iter().filter(|path| path.is_dir());
+        let folders = std::iter::once(self.root.clone()).chain(below);
+        let mut counts: Vec<(usize, PathBuf)> =
+            folders.map(|path| (count_photos(&path), path)).filter(|&(count, _)| count > 0).collect();
+        counts.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        counts
+    }
+
+    /// Folders that may hold the photos: those of photos, with the full sizes first, then the scene's own.
+    fn bases(&self) -> Vec<PathBuf> {
+        self.bases.get_or_init(|| self.look_for_bases()).clone()
+    }
+
+    fn look_for_bases(&self) -> Vec<PathBuf> {
+        let entries = read::folder(&self.root).unwrap_or_default();
+        let name = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).unwrap_or_default().to_owned();
+        let mut found: Vec<String> =
+            entries.iter().filter(|path| path.is_dir()).map(name).filter(|name| is_folder_of_photos(name)).collect();
+        let rank = |name: &str| FOLDERS.iter().position(|known| *known == name).unwrap_or(FOLDERS.len());
+        found.sort_by_key(|name| (rank(name), name.len(), name.clone()));
+        found.into_iter().map(|name| self.root.join(name)).chain([self.root.clone()]).collect()
+    }
+
+    fn has_photos(&self, folder: &Path) -> bool {
+        let mut folders = self.folders.borrow_mut();
+        !folders.entry(folder.to_owned()).or_insert_with(|| Entries::of(folder)).by_stem.is_empty()
+    }
+
+    /// Finds the only file below `base` whose path matches, or whose name does but for the extension.
+    fn alike(&self, base: &Path, relative: &Path) -> Option<PathBuf> {
+        let mut folder = base.to_owned();
+        let parts: Vec<&str> = relative.iter().map(OsStr::to_str).collect::<Option<_>>()?;
+        let (name, above) = parts.split_last()?;
+        for part in above {
+            folder = match folder.join(part) {
+                same if same.is_dir() => same,
+                _ => self.only(&folder, |entries| entries.by_name.get(&folded(part)), Path::is_dir)?,
+            };
+        }
+        let key = folded(name);
+        if let Some(found) = self.only(&folder, |entries| entries.by_name.get(&key), Path::is_file) {
+            return Some(found);
+        }
+        let has_extension =
+            extension_is_of(Path::new(name), &READABLE) || extension_is_of(Path::new(name), &UNREADABLE);
+        let stem = if has_extension { Path::new(name).file_stem()?.to_str()? } else { name };
+        let stem = folded(stem);
+        let readable =
+            self.only(&folder, |entries| entries.by_stem.get(&stem), |path| path.is_file() && is_readable(path));
+        readable.or_else(|| self.only(&folder, |entries| entries.by_stem.get(&stem), Path::is_file))
+    }
+
+    /// Returns the only match in a folder that `is_wanted`.
+    fn only(
+        &self,
+        folder: &Path,
+        matches: impl Fn(&Entries) -> Option<&Vec<PathBuf>>,
+        is_wanted: impl Fn(&Path) -> bool,
+    ) -> Option<PathBuf> {
+        let mut folders = self.folders.borrow_mut();
+        let entries = folders.entry(folder.to_owned()).or_insert_with(|| Entries::of(folder));
+        let mut found = matches(entries)?.iter().filter(|path| is_wanted(path));
+        let first = found.next()?;
+        found.next().is_none().then(|| first.clone())
+    }
+}
+
+/// Returns the path, then without its leading folders of photos; with `any`, then its name alone.
+fn trimmed(relative: &Path, any: bool) -> Vec<PathBuf> {
+    let parts: Vec<&OsStr> = relative.iter().filter(|part| *part != "." && *part != "/").collect();
+    let leading = parts.iter().take_while(|part| part.to_str().is_some_and(is_folder_of_photos)).count();
+    let mut starts = vec![0];
+    starts.extend(1..=leading);
+    if any {
+        starts.extend(parts.len().checked_sub(1));
+    }
+    starts.dedup();
+    let rest = |&start: &usize| parts[start.min(parts.len().saturating_sub(1))..].iter().collect::<PathBuf>();
+    let mut paths: Vec<PathBuf> = starts.iter().map(rest).collect();
+    // The first is the path as it is, which may be absolute.
+    paths[0] = relative.to_owned();
+    paths.dedup();
+    paths
+}
+
+/// Returns the file at a path, with one of the extensions if it has none.
+fn with_any(path: &Path) -> Option<PathBuf> {
+    EXTENSIONS.iter().find_map(|extension| {
+        let mut candidate = path.as_os_str().to_owned();
+        candidate.push(extension);
+        let candidate = PathBuf::from(candidate);
+        candidate.is_file().then_some(candidate)
+    })
+}
+
+/// Returns the number of photos in a folder that can be read.
+pub fn count_photos(folder: &Path) -> usize {
+    read::folder(folder).unwrap_or_default().iter().filter(|path| is_readable(path) && path.is_file()).count()
+}

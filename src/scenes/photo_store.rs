@@ -1,0 +1,260 @@
+//! Photos and masks within a budget of memory.
+//!
+//! If the views of a scene fit into the budget, all of them stay in memory. Otherwise the first ones get a half of it, and
+//! the others wait in a temporary file, as made: they cost a read each time, no decoding. Which ones wait has no effect on
+//! any bit. The other half is for the pictures that are just being made or used.
+
+use super::LoadOptions;
+use super::recipe::{MadeView, Recipe};
+use labelgs_files::scratch::{Place, Scratch};
+use labelgs_scene::pixels::{Picture, Source};
+use labelgs_scene::{Error, LabelMap, Photo, Pixels, Result, Setting, View};
+use std::marker::PhantomData;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Bytes per pixel of a photo in memory: RGBA, and the smaller copy for early steps.
+const PHOTO_BYTES: u64 = 8;
+/// Bytes per pixel of a mask: ids, and the layout of the device.
+const MASK_BYTES: u64 = 6;
+/// Bytes per pixel of a photo's file while its views are made: those of the decoder, RGBA, undistorted, and of its mask.
+const MAKING_BYTES: u64 = 16;
+
+/// What happens without space for the file.
+const AGAIN: &str = "photos are decoded again each time, which takes longer";
+
+/// Size in a photo's file, if there is one.
+type Size = Option<(u32, u32)>;
+
+/// Decides which pixels stay in memory.
+#[derive(Debug)]
+pub(super) struct PhotoStore {
+    /// Whether the views of a photo stay in memory.
+    holds: Vec<bool>,
+    files: Arc<Files>,
+}
+
+/// Where the others are.
+#[derive(Debug)]
+struct Files {
+    /// The temporary file; without it pixels are made again.
+    scratch: Option<Scratch>,
+    at_once: usize,
+    was_damaged: AtomicBool,
+}
+
+impl PhotoStore {
+    /// Plans the memory of all photos, of known sizes. Views to train on have it before held-out ones.
+    pub(super) fn new(recipes: &[Arc<Recipe>], stored: &[Result<Size>], test: &[bool], options: &LoadOptions) -> Self {
+        let cost = |(recipe, stored): (&Arc<Recipe>, &Result<Size>)| {
+            let photo = if recipe.photos && recipe.listed.photo.is_some() { PHOTO_BYTES } else { 0 };
+            let mask = if recipe.mask.is_some() { MASK_BYTES } else { 0 };
+            if photo + mask == 0 { 0 } else { stored.as_ref().map_or(0, |&size| recipe.pixels(size)) * (photo + mask) }
+        };
+        let costs: Vec<u64> = recipes.iter().zip(stored).map(cost).collect();
+        let holds = held(&costs, test, options.photo_memory);
+        if holds.contains(&false) {
+            let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+            tracing::info!(
+                "photos and masks take {:.1} GiB, and {} is {:.1} GiB: {} of {} photos stay in memory, the \
+                 others {}",
+                gib(costs.iter().sum()),
+                Setting("photo_memory"),
+                gib(options.photo_memory),
+                holds.iter().filter(|&&holds| holds).count(),
+                holds.len(),
+                match &options.photo_folder {
+                    Some(folder) => format!("in a temporary file in {}", folder.display()),
+                    None => "are decoded again each time".to_owned(),
+                }
+            );
+        }
+        let pixels = |size: &Result<Size>| size.as_ref().map_or(0, |size| size.map_or(0, area));
+        let largest = stored.iter().map(pixels).max().unwrap_or(0) * MAKING_BYTES;
+        let at_once = usize::try_from(options.photo_memory / 2 / largest.max(1)).unwrap_or(usize::MAX).max(1);
+        let scratch = options.photo_folder.as_deref().map(Scratch::new);
+        Self { holds, files: Arc::new(Files { scratch, at_once, was_damaged: false.into() }) }
+    }
+
+    /// Number of photos that may be decoded at the same time.
+    pub(super) fn at_once(&self) -> usize {
+        self.files.at_once
+    }
+
+    /// Takes the views of the photo at `index`.
+    pub(super) fn keep(&self, index: usize, recipe: &Arc<Recipe>, stored: Size, made: Vec<MadeView>) -> Vec<View> {
+        let view = |(at, MadeView { name, camera, photo, mask })| {
+            let origin = Origin { recipe: Arc::clone(recipe), stored, view: at };
+            let mask = mask.map(|mask| self.pixels(index, mask, origin.clone()));
+            View { name, camera, photo: photo.map(|photo| self.pixels(index, photo, origin)), mask }
+        };
+        made.into_iter().enumerate().map(view).collect()
+    }
+
+    fn pixels<T: Kept>(&self, index: usize, picture: T, origin: Origin) -> Pixels<T> {
+        if self.holds[index] {
+            return picture.into();
+        }
+        let (facts, size) = (picture.facts(), picture.size());
+        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), AGAIN));
+        let files = Arc::clone(&self.files);
+        Pixels::made(Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }), facts)
+    }
+}
+
+fn area((width, height): (u32, u32)) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Returns which photos stay in memory.
+fn held(costs: &[u64], test: &[bool], budget: u64) -> Vec<bool> {
+    let fits = costs.iter().sum::<u64>() <= budget;
+    let mut left = if fits { u64::MAX } else { budget / 2 };
+    let mut held = vec![false; costs.len()];
+    for wanted in [false, true] {
+        for index in (0..costs.len()).filter(|&index| test.get(index) == Some(&wanted)) {
+            held[index] = costs[index] <= left;
+            // The first that does not fit ends it: a smaller one later is no better.
+            left = if held[index] { left - costs[index] } else { 0 };
+        }
+    }
+    held
+}
+
+/// What a store keeps: a photo or a mask.
+trait Kept: Picture + std::fmt::Debug + Send + Sync + Sized + 'static {
+    /// Returns width and height, px.
+    fn size(&self) -> (u32, u32);
+    /// Makes one without content, and lets `fill` write its bytes.
+    fn filled(size: (u32, u32), fill: impl FnOnce(&mut [u8]) -> std::io::Result<()>) -> std::io::Result<Self>;
+    /// Returns the recipe of this alone, and its file.
+    fn recipe(all: &Recipe) -> (Recipe, PathBuf);
+    fn of(view: MadeView) -> Option<Self>;
+}
+
+impl Kept for Photo {
+    fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    fn filled(size: (u32, u32), fill: impl FnOnce(&mut [u8]) -> std::io::Result<()>) -> std::io::Result<Self> {
+        let mut rgba = vec![[0_u8; 4]; area(size) as usize];
+        fill(rgba.as_flattened_mut())?;
+        Ok(Self { width: size.0, height: size.1, rgba })
+    }
+
+    fn recipe(all: &Recipe) -> (Recipe, PathBuf) {
+        (Recipe { mask: None, ..all.clone() }, all.listed.photo.clone().unwrap_or_default())
+    }
+
+    fn of(view: MadeView) -> Option<Self> {
+        view.photo
+    }
+}
+
+impl Kept for LabelMap {
+    fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
+    fn filled(size: (u32, u32), fill: impl FnOnce(&mut [u8]) -> std::io::Result<()>) -> std::io::Result<Self> {
+        let mut ids = vec![0_u16; area(size) as usize];
+        fill(bytemuck::cast_slice_mut(&mut ids))?;
+        Ok(Self { width: size.0, height: size.1, ids })
+    }
+
+    fn recipe(all: &Recipe) -> (Recipe, PathBuf) {
+        (Recipe { photos: false, ignore: None, ..all.clone() }, all.mask.clone().unwrap_or_default())
+    }
+
+    fn of(view: MadeView) -> Option<Self> {
+        view.mask
+    }
+}
+
+/// The photo that a view was made of.
+#[derive(Clone, Debug)]
+struct Origin {
+    recipe: Arc<Recipe>,
+    stored: Size,
+    /// Index of the view among those of the photo.
+    view: usize,
+}
+
+/// Pixels that are not in memory.
+#[derive(Debug)]
+struct Waiting<T> {
+    files: Arc<Files>,
+    origin: Origin,
+    /// Place in the temporary file, if it took them.
+    place: Option<Place>,
+    size: (u32, u32),
+    crc: u32,
+    kind: PhantomData<T>,
+}
+
+impl<T: Kept> Source<T> for Waiting<T> {
+    fn make(&self) -> Result<Arc<T>> {
+        match self.place.and_then(|place| self.read(place)) {
+            Some(picture) => Ok(Arc::new(picture)),
+            None => self.again().map(Arc::new),
+        }
+    }
+
+    fn at_once(&self) -> usize {
+        self.files.at_once
+    }
+}
+
+impl<T: Kept> Waiting<T> {
+    /// Reads the temporary file. A disk that returns other bytes than it got costs time, not bits.
+    fn read(&self, place: Place) -> Option<T> {
+        let scratch = self.files.scratch.as_ref()?;
+        let found = T::filled(self.size, |bytes| scratch.read(place, bytes));
+        let problem = match found {
+            Ok(picture) if picture.crc() == self.crc => return Some(picture),
+            Ok(_) => "has other bytes than were written".to_owned(),
+            Err(error) => format!("cannot be read: {error}"),
+        };
+        if !scratch.is_given_up() && !self.files.was_damaged.swap(true, Relaxed) {
+            tracing::warn!("the temporary file of photos {problem}; such photos are decoded again");
+        }
+        None
+    }
+
+    /// Makes the pixels from their files again.
+    fn again(&self) -> Result<T> {
+        let Origin { recipe, stored, view } = &self.origin;
+        let (recipe, path) = T::recipe(recipe);
+        let gone = |error| match error {
+            Error::Read { path, source } => {
+                let problem = format!("{source}; it was there when the scene was opened: bring it back and go on");
+                Error::Read { path, source: std::io::Error::new(source.kind(), problem) }
+            }
+            other => other,
+        };
+        let changed = "has other pixels than when the scene was opened; restore it, or start anew";
+        let changed = || Error::data(&path, "", changed);
+        let photo = recipe.decode(*stored).map_err(gone)?;
+        if photo.as_ref().is_some_and(|photo| Some(photo.size()) != *stored) {
+            return Err(changed());
+        }
+        let made = recipe.views(*stored, photo).map_err(gone)?.views.into_iter().nth(*view).and_then(T::of);
+        made.filter(|made| made.size() == self.size && made.crc() == self.crc).ok_or_else(changed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::held;
+
+    #[test]
+    fn all_stay_or_the_first_ones_to_train_on_get_half() {
+        let test = [true, false, false, false, true];
+        assert_eq!(held(&[10; 5], &test, 50), [true; 5]);
+        assert_eq!(held(&[10; 5], &test, 49), [false, true, true, false, false]);
+        assert_eq!(held(&[10; 5], &test, 1), [false; 5]);
+        assert_eq!(held(&[1, 0, 0, 0, 1], &test, 1), [false, true, true, true, false]);
+    }
+}

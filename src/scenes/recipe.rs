@@ -1,0 +1,192 @@
+//! The views of one photo, made from its files: decoded, without ignored pixels, undistorted, resized.
+
+use super::LoadOptions;
+use super::lens::Lens;
+use super::listing::{Listed, check_camera};
+use super::resample::{resample_ids, undistort_photo};
+use super::window::Window;
+use labelgs_files::image::{check_size, photo_size, read_open_photo, read_photo};
+use labelgs_files::resize::{bounded_size, same_aspect, shrink_photo};
+use labelgs_masks::mask::{read_checked, read_ignored};
+use labelgs_scene::{Camera, Error, LabelMap, Photo, Result};
+use std::path::{Path, PathBuf};
+
+/// The files of a photo and how its views are made of them.
+#[derive(Clone, Debug)]
+pub struct Recipe {
+    pub listed: Listed,
+    /// The file that lists the photo, for messages.
+    pub source: PathBuf,
+    pub mask: Option<PathBuf>,
+    pub ignore: Option<PathBuf>,
+    /// Decodes the photo.
+    pub photos: bool,
+    /// Colour behind a transparent photo; `None` keeps its opacity.
+    pub background: Option<[f32; 3]>,
+    pub max_resolution: Option<u32>,
+    pub undistort: bool,
+}
+
+/// A view with its pixels.
+pub struct MadeView {
+    pub name: String,
+    pub camera: Camera,
+    pub photo: Option<Photo>,
+    pub mask: Option<LabelMap>,
+}
+
+/// All views of a photo.
+pub struct MadeViews {
+    pub views: Vec<MadeView>,
+    /// Number of masks with another size than the photo.
+    pub resampled: usize,
+}
+
+impl Recipe {
+    /// `source` lists the photo. `[mask, ignore]` are files of the photo, which is held out if `test`.
+    pub fn new(
+        (listed, source): (Listed, PathBuf),
+        [mask, ignore]: [Option<PathBuf>; 2],
+        test: bool,
+        options: &LoadOptions,
+    ) -> Self {
+        let LoadOptions { photos, max_resolution, undistort, .. } = *options;
+        let background = (test || !options.keep_opacity).then_some(options.background);
+        Self { listed, source, mask, ignore, photos, background, max_resolution, undistort }
+    }
+
+    /// Reads the size in the photo's file; `None` without a file.
+    pub fn stored(&self) -> Result<Option<(u32, u32)>> {
+        self.listed.photo.as_deref().map(stored_size).transpose()
+    }
+
+    /// Decodes the photo, if photos are wanted. `stored` is the size in its file.
+    pub fn decode(&self, stored: Option<(u32, u32)>) -> Result<Option<Photo>> {
+        let camera = &self.listed.camera;
+        // Check the shape before the pixels take memory; the error comes later.
+        match (&self.listed.photo, stored) {
+            (Some(path), Some(size)) if self.photos && same_aspect(size, (camera.width, camera.height)) => {
+                let read = |colour| read_photo(path, colour);
+                self.background.map_or_else(|| read_open_photo(path), read).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Makes the views, one or several, of the decoded photo.
+    pub fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
+        let original = at_size(&self.listed, stored)?;
+        let size = (original.width, original.height);
+        let mask = self.mask.as_deref().map(|path| read_checked(path, |found| fits_photo(path, found, size)));
+        let mask = mask.transpose()?;
+        let is_other = |mask: &LabelMap| usize::from((mask.width, mask.height) != size);
+        let mut resampled = mask.as_ref().map_or(0, is_other);
+        if let (Some(path), Some(photo)) = (&self.ignore, &mut photo) {
+            let ignored = read_ignored(path, |found| fits_photo(path, found, size))?;
+            resampled += is_other(&ignored);
+            leave_out(photo, &ignored);
+        }
+        let windows = self.windows(&original);
+        let (path, place) = match &self.listed.photo {
+            Some(photo) => (photo, String::new()),
+            None => (&self.source, format!("photo {}", self.listed.name)),
+        };
+        if windows.is_empty() {
+            return Err(Error::data(path, place, NO_WINDOW));
+        }
+        // A lens of odd coefficients may have no scale at its axis.
+        for window in windows.iter().filter(|window| !window.is_photo()) {
+            check_camera(path, &format!("view {}", window.name), &window.camera, &Lens::Pinhole)?;
+        }
+        let view = |window: Window| {
+            let size = self.size_of(&window);
+            MadeView {
+                camera: window.camera.resized(size.0, size.1),
+                photo: photo.as_ref().map(|photo| fitted(photo, &window, size)),
+                mask: mask.as_ref().map(|mask| resample_ids(mask, &window, size)),
+                name: window.name,
+            }
+        };
+        Ok(MadeViews { views: windows.into_iter().map(view).collect(), resampled })
+    }
+
+    /// Returns the number of pixels of all views.
+    pub fn pixels(&self, stored: Option<(u32, u32)>) -> u64 {
+        // The error comes when the views are made.
+        let Ok(original) = at_size(&self.listed, stored) else { return 0 };
+        let sizes = self.windows(&original).into_iter().map(|window| self.size_of(&window));
+        sizes.map(|(width, height)| u64::from(width) * u64::from(height)).sum()
+    }
+
+    fn windows(&self, original: &Camera) -> Vec<Window> {
+        match self.undistort {
+            true => Window::all(&self.listed.name, original, &self.listed.lens),
+            false => vec![Window::stored(&self.listed.name, original)],
+        }
+    }
+
+    fn size_of(&self, window: &Window) -> (u32, u32) {
+        bounded_size((window.camera.width, window.camera.height), self.max_resolution)
+    }
+}
+
+/// Takes the weight of the pixels where `ignored`, of any scale, is not 0.
+fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
+    let nearest = |at: u32, side: u32, from: u32| {
+        (((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as u32).min(from - 1)
+    };
+    let (width, height) = (photo.width, photo.height);
+    for (at, texel) in (0..).zip(&mut photo.rgba) {
+        let (x, y) = (at % width, at / width);
+        if ignored.at(nearest(x, width, ignored.width), nearest(y, height, ignored.height)) != 0 {
+            *texel = [0; 4];
+        }
+    }
+}
+
+const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";
+
+/// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
+pub fn at_photo_size(listed: &Listed) -> Result<Camera> {
+    at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
+}
+
+fn stored_size(path: &Path) -> Result<(u32, u32)> {
+    let size = photo_size(path)?;
+    check_size(path, size)?;
+    Ok(size)
+}
+
+fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
+    let (Some(path), Some(size)) = (&listed.photo, stored) else { return Ok(listed.camera.clone()) };
+    let camera = &listed.camera;
+    if !same_aspect(size, (camera.width, camera.height)) {
+        let problem = format!(
+            "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
+             cameras were made for (an EXIF orientation is ignored, because poses belong to the stored pixels)",
+            size.0, size.1, camera.width, camera.height
+        );
+        return Err(Error::data(path, "", problem));
+    }
+    Ok(camera.resized(size.0, size.1))
+}
+
+/// Undistorts the photo and scales it to the final size.
+fn fitted(photo: &Photo, window: &Window, (width, height): (u32, u32)) -> Photo {
+    if window.is_photo() {
+        return shrink_photo(photo, width, height);
+    }
+    let whole = undistort_photo(photo, window);
+    if (width, height) == (whole.width, whole.height) { whole } else { shrink_photo(&whole, width, height) }
+}
+
+fn fits_photo(path: &Path, found: (u32, u32), photo: (u32, u32)) -> Result<()> {
+    if same_aspect(found, photo) {
+        return Ok(());
+    }
+    let problem = format!(
+        "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
+        found.0, found.1, photo.0, photo.1
+    );
+    Err(Error::data(path, "", problem))
+}

@@ -1,0 +1,48 @@
+//! What pages in a browser share: the frame of a page in one file, and the camera with its mouse and keys.
+//!
+//! A page in one file opens from disk: style and script are inside, and nothing is asked from the network. All text goes
+//! through `maud`, which escapes it.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Vectors and rotations, a module of JavaScript.
+pub const ALGEBRA: &str = include_str!("algebra.js");
+/// The camera, a module that imports [`ALGEBRA`].
+pub const CAMERA: &str = include_str!("camera.js");
+/// Mouse, touch and keys that move the camera, a module.
+pub const INPUT: &str = include_str!("input.js");
+
+/// Colours and buttons of every page in one file.
+const THEME: &str = include_str!("theme.css");
+/// What a browser may load for a page: pictures inside it or beside it, nothing else.
+const POLICY: &str =
+    "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// Returns a page in one file. `body` and text of `title` are escaped already or by `maud`; the others come from this
+/// program.
+pub fn page(title: &str, style: &str, body: &Markup, script: &str) -> String {
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { (title) " – labelgs" }
+                style { (PreEscaped(THEME)) (PreEscaped(style)) }
+            }
+            body {
+                (body)
+                script type="module" { (PreEscaped(script)) }
+            }
+        }
+    };
+    markup.into_string() + "\n"
+}
+
+/// Returns modules as one script: a page on disk cannot import, so their names share one scope.
+pub fn joined(modules: &[&str]) -> String {
+    let lines = modules.iter().flat_map(|module| module.lines()).filter(|line| !line.starts_with("import "));
+    lines.flat_map(|line| [line.strip_prefix("export ").unwrap_or(line), "\n"]).collect()
+}
