@@ -10,7 +10,7 @@ use crate::train::TrainConfig;
 use crate::train::extension::Joined;
 use crate::train::input::step_input::{self, SceneScale, StepInput};
 use crate::train::input::views::Views;
-use crate::train::objective::{Objective, Parameter};
+use crate::train::objective::Objective;
 use crate::train::setup::region::Region;
 use crate::train::setup::{self, TrainerOptions};
 use crate::train::shared::Shared;
