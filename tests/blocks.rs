@@ -235,7 +235,7 @@ fn a_merge_lists_all_that_is_wrong() {
     copy(&place.path("models/b000"), &place.path("models/b001"));
     assert!(stderr(&merge(&place, &[])).contains("another block or split"));
     std::fs::remove_dir_all(place.path("models/b001")).expect("removed");
-    succeeded(&train_block(&place, "b001", &["--sh-degree", "1"]));
+    succeeded(&train_block(&place, "b001", &["--set", "sh_degree=1"]));
     let text = stderr(&merge(&place, &[]));
     assert!(text.contains("sh degree is 1, and 3 in"), "{text}");
     // One label with two names.

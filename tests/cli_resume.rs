@@ -148,7 +148,7 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
         assert!(parts.iter().all(|part| text.contains(part)), "{flags:?}: {text}");
     };
     refused(&["--seed", "4"], 2, &["--seed: 0 in the checkpoint, now 4"]);
-    refused(&["--sh-degree", "1"], 2, &["--sh-degree: 3 in the checkpoint, now 1"]);
+    refused(&["--set", "sh_degree=1"], 2, &["--set sh_degree: 3 in the checkpoint, now 1"]);
     refused(&["--set", "label_rule=main"], 2, &["--set label_rule"]);
     refused(&["--test-every", "0"], 2, &["--test-every: 8 in the checkpoint, now 0"]);
     refused(&["--iterations", "5"], 2, &["--iterations", "6 steps"]);
@@ -157,7 +157,9 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     // The checkpoint records the folder of the masks.
     let args = ["train", &place.text("scene"), "-o", &place.text("out"), "--resume", "--iterations", "9"];
     let text = succeeded(&place.labelgs(&[&args[..], &["--set", "feature_lr=0.003", "--memory-limit", "2G"]].concat()));
-    for part in ["--iterations: 6 in the checkpoint, now 9", "--feature-lr: 0.0025 in", "--memory-limit: not set in"] {
+    for part in
+        ["--iterations: 6 in the checkpoint, now 9", "--set feature_lr: 0.0025 in", "--memory-limit: not set in"]
+    {
         assert!(text.contains(part), "{part} is not in {text}");
     }
     assert!(!place.model("out", 9).is_empty());
@@ -173,7 +175,7 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     std::fs::write(place.path("few.toml"), "iterations = 10\n").expect("settings");
     let text = succeeded(&place.trained("out", &["--resume", "--config", &place.text("few.toml")]));
     assert!(before.0 > 0.0 && before.1 > 0 && decided() == before, "{before:?}, {:?}: {text}", decided());
-    assert!(!text.contains("--near") && !text.contains("--budget"), "{text}");
+    assert!(!text.contains("--set near") && !text.contains("--budget"), "{text}");
 
     // Masks that differ from the run's are refused.
     std::fs::rename(place.path("scene/masks"), place.path("masks")).expect("moved");

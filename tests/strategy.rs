@@ -13,6 +13,7 @@ use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
 use labelgs::run::{Densified, LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scenes::initial_gaussians;
+use labelgs::train::{Loss, Objective, Parameter};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
@@ -216,4 +217,21 @@ fn gaussians_across_contours_split_in_place_of_others() {
     let mut bare = masked;
     bare.train.iter_mut().for_each(|view| view.mask = None);
     assert_eq!(exchanged(0.05, &bare).1.split, 0, "no masks, no contours");
+}
+
+/// Of the Gaussians, only what the objective names changes, and without a loss nothing does.
+#[test]
+fn an_objective_trains_what_it_names() {
+    let Some(turn) = device() else { return };
+    let trained = |objective| {
+        let mut trainer = fresh(&turn, TrainerOptions { objective, ..TrainerOptions::default() });
+        let before = trainer.model().expect("a model");
+        go_on(&mut trainer, 20);
+        (before, trainer.model().expect("a model"))
+    };
+    let (before, after) = trained(Objective { parameters: &[Parameter::Colours], losses: &[Loss::Photo] });
+    assert_ne!(before.sh0, after.sh0);
+    assert_eq!(before, Gaussians { sh0: before.sh0.clone(), sh_rest: before.sh_rest.clone(), ..after });
+    let (before, after) = trained(Objective { parameters: &[Parameter::Positions], losses: &[] });
+    assert_eq!(before, after);
 }

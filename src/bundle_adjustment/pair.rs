@@ -10,18 +10,18 @@ pub(super) const POSE: usize = 6;
 /// Numbers that a comparison depends on: the pose of the other photo, that of the patch's own, the logarithm of its depth.
 pub(super) const NUMBERS: usize = 2 * POSE + 1;
 /// Most photos with which the patches of one are compared.
-const PARTNERS: usize = 12;
+const PARTNERS_MAX: usize = 12;
 /// Least cosine of the angle between the axes of two of them: 60 degrees.
-const SAME_SIDE: f64 = 0.5;
+const AXES_COSINE_MIN: f64 = 0.5;
 /// Least share of the patches of a photo that a partner shows.
-const SHARED: f64 = 0.25;
+const SHOWN_SHARE_MIN: f64 = 0.25;
 /// About this many patches tell which photos are partners.
-const SAMPLE: usize = 100;
+const SAMPLE_PATCHES: usize = 100;
 /// Largest difference of the depth of a patch and that of the model in its place, as a share.
-const SAME_DEPTH: f64 = 0.03;
+const DEPTH_DIFFERENCE_MAX: f64 = 0.03;
 /// Least correlation of the colours of a patch and those in its place. With more, just the patches that are off most are left
 /// out in the first rounds.
-const ALIKE: f64 = 0.5;
+const CORRELATION_MIN: f64 = 0.5;
 /// Difference of colours from which a patch counts less.
 const NOISE: f64 = 0.02;
 
@@ -36,20 +36,20 @@ pub(super) fn moved(camera: &Camera, step: &[f64; POSE]) -> Camera {
 /// and far: two photos from almost one place tell no depth.
 pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usize>> {
     let of = |host: usize| {
-        let every = patches[host].len().div_ceil(SAMPLE).max(1);
+        let every = patches[host].len().div_ceil(SAMPLE_PATCHES).max(1);
         let sample: Vec<DVec3> = patches[host].iter().step_by(every).map(|patch| patch.places[MIDDLE]).collect();
         let axis = frames[host].camera.axis();
         let mut found: Vec<(usize, usize)> = Vec::new();
         for (other, frame) in frames.iter().enumerate() {
-            if other != host && axis.dot(frame.camera.axis()) > SAME_SIDE {
+            if other != host && axis.dot(frame.camera.axis()) > AXES_COSINE_MIN {
                 let way = Way::new(&frames[host].camera, &frame.camera);
                 let shown = sample.iter().filter(|&&place| shows(frame, way.there(place))).count();
                 found.push((shown, other));
             }
         }
-        found.retain(|&(shown, _)| shown > 0 && shown as f64 >= SHARED * sample.len() as f64);
+        found.retain(|&(shown, _)| shown > 0 && shown as f64 >= SHOWN_SHARE_MIN * sample.len() as f64);
         found.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
-        let chosen = found.len().min(PARTNERS);
+        let chosen = found.len().min(PARTNERS_MAX);
         (0..chosen).map(|k| found[k * found.len() / chosen].1).collect()
     };
     (0..frames.len()).map(of).collect()
@@ -58,7 +58,7 @@ pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usiz
 /// Returns true if a frame shows a place of its camera space.
 fn shows(frame: &Frame, place: DVec3) -> bool {
     let at = frame.camera.project(place);
-    place.z > 0.0 && (frame.depth_at(at.x, at.y) - place.z).abs() <= SAME_DEPTH * place.z
+    place.z > 0.0 && (frame.depth_at(at.x, at.y) - place.z).abs() <= DEPTH_DIFFERENCE_MAX * place.z
 }
 
 /// The way from one camera space to another.
@@ -82,7 +82,7 @@ impl Way {
 /// What a comparison adds to the equations: second moments of the derivatives of the difference by place, their product
 /// with the difference, and the derivatives of the place.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Compared {
+pub(super) struct Comparison {
     /// Of xx, xy and yy, 1 / px^2.
     pub(super) moments: [f64; 3],
     /// Of x and y, 1 / px.
@@ -92,7 +92,7 @@ pub(super) struct Compared {
 }
 
 /// Compares a patch with a frame. `None` if the frame does not show it, `Some(None)` if it shows something else there.
-pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<Compared>> {
+pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<Comparison>> {
     let middle = way.there(patch.places[MIDDLE]);
     if !shows(frame, middle) {
         return None;
@@ -111,7 +111,7 @@ pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<
         a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
     };
     let (own, there) = (product(&patch.colours, &patch.colours), product(&colours, &colours));
-    if product(&patch.colours, &colours) <= ALIKE * (own * there).sqrt() {
+    if product(&patch.colours, &colours) <= CORRELATION_MIN * (own * there).sqrt() {
         return Some(None);
     }
     // Photos may differ in exposure.
@@ -123,7 +123,7 @@ pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<
     let count = (3 * PIXELS) as f64;
     let square = product(&difference, &difference) / count;
     let weight = 1.0 / (count * (1.0 + square / (NOISE * NOISE)));
-    Some(Some(Compared {
+    Some(Some(Comparison {
         moments: [product(&by_x, &by_x), product(&by_x, &by_y), product(&by_y, &by_y)].map(|sum| weight * sum),
         pull: [product(&by_x, &difference), product(&by_y, &difference)].map(|sum| weight * sum),
         places: derivatives(way, &frame.camera, patch.places[MIDDLE]),

@@ -10,13 +10,13 @@ pub(super) const PIXELS: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
 /// Index of the middle.
 pub(super) const MIDDLE: usize = PIXELS / 2;
 /// Smallest side of the cells of a frame, px, each of which has at most one patch.
-const CELL: u32 = 8;
+const CELL_MIN: u32 = 8;
 /// Most cells of a frame.
-const CELLS: f64 = 2000.0;
+const CELLS_MAX: f64 = 2000.0;
 /// Least mean square of the derivatives of colours, 1 / px^2, all channels together.
-const CONTRAST: f32 = 0.03 * 0.03;
+const CONTRAST_MIN: f32 = 0.03 * 0.03;
 /// Largest range of depths in a patch, as a share of them: it lies on one surface.
-const FLAT: f32 = 0.04;
+const DEPTH_RANGE_MAX: f32 = 0.04;
 
 /// A patch of a frame, with its pixels in rows.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub(super) struct Patch {
 /// Returns the patches of a frame: in each cell where the colours change most.
 pub(super) fn of_frame(frame: &Frame) -> Vec<Patch> {
     let (width, height) = (frame.camera.width, frame.camera.height);
-    let cell = CELL.max((f64::from(width) * f64::from(height) / CELLS).sqrt().ceil() as u32);
+    let cell = CELL_MIN.max((f64::from(width) * f64::from(height) / CELLS_MAX).sqrt().ceil() as u32);
     // The square of the derivatives of each pixel, all channels together.
     let square = |[_, by_x, by_y]: &[[f32; 3]; 3]| by_x.iter().chain(by_y).map(|value| value * value).sum::<f32>();
     let change: Vec<f32> = frame.colours.iter().map(square).collect();
@@ -41,7 +41,7 @@ pub(super) fn of_frame(frame: &Frame) -> Vec<Patch> {
             let pixels = (top..top + cell).flat_map(|y| (left..left + cell).map(move |x| (x, y)));
             let sum = |&(x, y): &(u32, u32)| around(x, y).map(|(x, y)| change[(y * width + x) as usize]).sum::<f32>();
             let largest = pixels.map(|at| (sum(&at), at)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let strong = largest.filter(|(sum, _)| *sum >= CONTRAST * PIXELS as f32);
+            let strong = largest.filter(|(sum, _)| *sum >= CONTRAST_MIN * PIXELS as f32);
             found.extend(strong.and_then(|(_, (x, y))| patch(frame, x, y)));
         }
     }
@@ -67,7 +67,7 @@ fn patch(frame: &Frame, x: u32, y: u32) -> Option<Patch> {
         colours[k] = frame.colours[index][0].map(f64::from);
     }
     without_mean(&mut colours);
-    (farthest - nearest <= FLAT * nearest).then_some(Patch { places, colours })
+    (farthest - nearest <= DEPTH_RANGE_MAX * nearest).then_some(Patch { places, colours })
 }
 
 /// Takes the mean of each channel away.

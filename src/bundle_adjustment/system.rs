@@ -1,7 +1,7 @@
 //! The equations of all poses, and their solution.
 
 use super::Frame;
-use super::pair::{Compared, NUMBERS, POSE, Way, compare};
+use super::pair::{Comparison, NUMBERS, POSE, Way, compare};
 use super::patch::Patch;
 use rayon::prelude::*;
 
@@ -10,9 +10,9 @@ const DAMPING: f64 = 1e-7;
 /// The same for depths.
 const DEPTH_DAMPING: f64 = 1e-3;
 /// Largest step of the logarithm of a depth.
-const DEPTH_STEP: f64 = 0.02;
+const DEPTH_STEP_MAX: f64 = 0.02;
 /// Fewest rows of a matrix that are worth another thread.
-const ROWS: usize = 64;
+const ROWS_MIN: usize = 64;
 
 /// Comparisons of a frame.
 #[derive(Clone, Copy, Debug, Default)]
@@ -86,7 +86,7 @@ impl Sums {
     }
 
     /// Adds a patch, by its comparison with each partner.
-    fn add(&mut self, each: impl Iterator<Item = Option<Option<Compared>>>) {
+    fn add(&mut self, each: impl Iterator<Item = Option<Option<Comparison>>>) {
         let mut own = [0.0; POSE];
         let mut depth = Depth { curvature: 0.0, pull: 0.0, mixed: Vec::new() };
         for (partner, compared) in each.enumerate().filter_map(|(k, compared)| Some((k + 1, compared?))) {
@@ -135,7 +135,7 @@ impl Sums {
     pub(super) fn move_depths(&self, patches: &mut [Patch], steps: &[[f64; POSE]]) {
         for (patch, depth) in patches.iter_mut().zip(&self.depths).filter(|(_, depth)| depth.curvature > 0.0) {
             let by_poses: f64 = depth.mixed.iter().map(|(frame, by)| dot(by, &steps[*frame])).sum();
-            let step = ((depth.pull - by_poses) / depth.curvature).clamp(-DEPTH_STEP, DEPTH_STEP);
+            let step = ((depth.pull - by_poses) / depth.curvature).clamp(-DEPTH_STEP_MAX, DEPTH_STEP_MAX);
             patch.places.iter_mut().for_each(|place| *place *= step.exp());
         }
     }
@@ -147,7 +147,7 @@ fn index(partner: usize, number: usize) -> usize {
 }
 
 /// Returns the matrix and the right side of a comparison.
-fn products(compared: &Compared) -> ([[f64; NUMBERS]; NUMBERS], [f64; NUMBERS]) {
+fn products(compared: &Comparison) -> ([[f64; NUMBERS]; NUMBERS], [f64; NUMBERS]) {
     let ([xx, xy, yy], [x, y]) = (compared.moments, compared.places);
     let matrix = std::array::from_fn(|i| {
         let (by_x, by_y) = (xx * x[i] + xy * y[i], xy * x[i] + yy * y[i]);
@@ -222,7 +222,7 @@ pub(crate) fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
         }
         pivot[column] = square.sqrt();
         let pivot = &*pivot;
-        below.par_chunks_mut(side).with_min_len(ROWS).for_each(|row| {
+        below.par_chunks_mut(side).with_min_len(ROWS_MIN).for_each(|row| {
             row[column] = (row[column] - dot(&row[..column], &pivot[..column])) / pivot[column];
         });
     }

@@ -11,7 +11,7 @@ use crate::train::{TrainState, Trainer};
 use std::path::{Path, PathBuf};
 
 /// Number of checkpoints that a run keeps while it goes on. The older one is the fallback if the newest is damaged.
-const KEPT: usize = 2;
+const FILES_MAX: usize = 2;
 
 pub(super) struct Checkpoints {
     out: PathBuf,
@@ -72,8 +72,10 @@ impl Checkpoints {
         self.hold_folder()?;
         match self.save(trainer, history) {
             Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
-                let last = self.kept.last().map_or("there is none yet".to_owned(), |path| path.display().to_string());
-                tracing::warn!("{error}; training goes on, the last checkpoint is: {last}");
+                let last = self.kept.last().map_or("there is no checkpoint yet".to_owned(), |path| {
+                    format!("the last checkpoint is {}", path.display())
+                });
+                tracing::warn!("{error}; training goes on, {last}");
                 Ok(None)
             }
             other => other,
@@ -95,7 +97,7 @@ impl Checkpoints {
         state.write(&path)?;
         self.step = step;
         self.kept.push(path.clone());
-        self.keep(KEPT)?;
+        self.keep(FILES_MAX)?;
         Ok(Some(path))
     }
 

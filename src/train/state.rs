@@ -4,8 +4,8 @@
 //! sampled objects from seed and step, gradients and votes from the passes of the next step.
 
 use super::TrainConfig;
-use super::shared::KeptShared;
-use super::strategy::Kept;
+use super::shared::SharedState;
+use super::strategy::StrategyState;
 use crate::engine::GrownSizes;
 use crate::engine::state::{self, Counts};
 use crate::error::{Error, Result, Setting};
@@ -51,9 +51,9 @@ pub struct TrainState {
     /// Data of the caller; null for none.
     pub run: serde_json::Value,
     /// State of the strategy.
-    pub strategy: Kept,
+    pub strategy: StrategyState,
     /// Entry of the shared parameters, if there are any.
-    pub shared: Option<KeptShared>,
+    pub shared: Option<SharedState>,
     /// Parameters, moments, statistics and labels.
     #[serde(skip)]
     pub planes: Vec<Plane>,

@@ -9,12 +9,7 @@ static LOGS: Mutex<Vec<MessageLog>> = Mutex::new(Vec::new());
 
 /// The device that LABELGS_DEVICE names, or the best.
 pub fn open() -> Result<Arc<Gpu>> {
-    open_as(&GpuOptions::from_env()?)
-}
-
-/// The device of these options.
-pub fn open_as(options: &GpuOptions) -> Result<Arc<Gpu>> {
-    let gpu = Gpu::new(options)?;
+    let gpu = Gpu::new(&GpuOptions::from_env()?)?;
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).push(gpu.message_log());
     Ok(gpu)
 }

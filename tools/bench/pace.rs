@@ -21,8 +21,6 @@ pub struct Pace {
     pub passes: Vec<f64>,
     /// The same by stage.
     pub stages: BTreeMap<Stage, Vec<f64>>,
-    /// The same by kernel.
-    pub kernels: BTreeMap<String, Vec<f64>>,
     /// Host's clock from submit to end, ms, by step.
     pub wall: Vec<f64>,
     /// Processor time of all threads, ms, by step.
@@ -50,7 +48,6 @@ impl Pace {
             trainer,
             passes: Vec::new(),
             stages: BTreeMap::new(),
-            kernels: BTreeMap::new(),
             wall: Vec::new(),
             processor: Vec::new(),
             pairs: Vec::new(),
@@ -91,13 +88,11 @@ impl Pace {
         }
         self.items = times.items.len();
         self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
-        let (mut stages, mut kernels): (BTreeMap<Stage, f64>, BTreeMap<&str, f64>) = Default::default();
-        for (stage, kernel, ns) in &times.items {
+        let mut stages: BTreeMap<Stage, f64> = BTreeMap::new();
+        for (stage, _, ns) in &times.items {
             *stages.entry(*stage).or_default() += *ns as f64 / 1e6;
-            *kernels.entry(kernel).or_default() += *ns as f64 / 1e6;
         }
         stages.into_iter().for_each(|(stage, ms)| self.stages.entry(stage).or_default().push(ms));
-        kernels.into_iter().for_each(|(kernel, ms)| self.kernels.entry(kernel.to_owned()).or_default().push(ms));
         self.wall.push(cost.wall);
         self.processor.push(cost.cpu);
         let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());

@@ -134,7 +134,7 @@ pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
 
 /// Returns the trust in the mask of each view by label, at most 1: the squared ratio of the view's agreement with the
 /// model to the agreement of all views together. So masks with swapped or merged ids count little in the next round.
-/// The ratio is relative, because a label with poor agreement in all views is the fault of no mask: otherwise thin
+/// The ratio is relative, because low agreement in every view indicates a hard label, not a bad mask: otherwise thin
 /// objects would lose to their background, and a lost label could not return.
 pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
     let mut together = Agreement::new();

@@ -66,7 +66,7 @@ pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     let text = read::text(path)?;
     serde_json::from_str(&text).map(Some).map_err(|error| {
         let place = format!("line {}", error.line());
-        Error::data(path, place, format!("has not the content that a training writes ({error}); correct or delete it"))
+        Error::data(path, place, format!("is not a valid record of a training ({error}); correct or delete it"))
     })
 }
 

@@ -46,8 +46,8 @@ pub fn refusal<T: Args + Options>(key: &str, value: &str) -> Option<clap::Error>
 /// Returns every option of `T` as an argument with a value.
 pub fn all<T: Args + Options>() -> Command {
     let command = T::augment_args_for_update(Command::new("options").no_binary_name(true).disable_help_flag(true));
-    let with_value = |command: Command, key: &str| {
-        command.mut_arg(key.to_owned(), |arg| arg.action(ArgAction::Set).num_args(1).value_parser(switch))
+    let with_value = |command: Command, key: &'static str| {
+        command.mut_arg(key, |arg| arg.action(ArgAction::Set).num_args(1).value_parser(switch))
     };
     switches::<T>().iter().fold(command, |command, key| with_value(command, key))
 }

@@ -12,10 +12,10 @@ use rand::Rng;
 /// Most Gaussians to take depths from, evenly chosen.
 const SAMPLE: usize = 65_536;
 /// Near plane of a camera in the depths of the Gaussians that it sees: this share of this quantile.
-const FREE: f64 = 0.25;
-const NEAREST: f64 = 0.01;
+const NEAR_SHARE: f64 = 0.25;
+const NEAR_QUANTILE: f64 = 0.01;
 /// The quantile in a scene without points, where some of the first Gaussians are before everything.
-const NEAREST_RANDOM: f64 = 0.1;
+const NEAR_QUANTILE_RANDOM: f64 = 0.1;
 /// Number of cameras whose median a camera takes, itself included.
 const NEIGHBOURS: usize = 5;
 
@@ -23,7 +23,7 @@ const NEIGHBOURS: usize = 5;
 /// anything so much nearer than all that the camera sees of the initial `model`.
 pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
     let cameras = dataset.train.iter().map(|view| &view.camera);
-    let quantile = if init::has_points(dataset) { NEAREST } else { NEAREST_RANDOM };
+    let quantile = if init::has_points(dataset) { NEAR_QUANTILE } else { NEAR_QUANTILE_RANDOM };
     let every = model.len().div_ceil(SAMPLE).max(1);
     let rows: Vec<DVec3> = (0..model.len()).step_by(every).map(|row| model.world(row)).collect();
     let nearest = |camera: &Camera| {
@@ -42,14 +42,14 @@ pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least:
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut depths: Vec<f64> = near.iter().take(NEIGHBOURS).map(|&(_, depth)| depth).collect();
         depths.sort_by(f64::total_cmp);
-        least.max((FREE * depths[depths.len() / 2]) as f32)
+        least.max((NEAR_SHARE * depths[depths.len() / 2]) as f32)
     };
     found.iter().map(|&(centre, _)| plane(centre)).collect()
 }
 
 /// Number of other cameras to which the space is free, and the least cosine of the angle between the directions.
-const PARTNERS: usize = 4;
-const ALIKE: f64 = 0.85;
+const PARTNERS_MAX: usize = 4;
+const AXES_COSINE_MIN: f64 = 0.85;
 /// Random stream of the partner of a step, beside those of the step numbers.
 const STREAM: u64 = 1 << 40;
 
@@ -59,13 +59,13 @@ pub(in crate::train) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec
     let places: Vec<(DVec3, DVec3)> = cameras.iter().map(|camera| (camera.centre(), camera.axis())).collect();
     let of = |index: usize| {
         let distance = |other: usize| places[index].0.distance(places[other].0);
-        let reach = f64::from(planes[index]) / FREE;
+        let reach = f64::from(planes[index]) / NEAR_SHARE;
         let is_partner = |&other: &usize| {
-            other != index && distance(other) <= reach && places[index].1.dot(places[other].1) >= ALIKE
+            other != index && distance(other) <= reach && places[index].1.dot(places[other].1) >= AXES_COSINE_MIN
         };
         let mut found: Vec<usize> = (0..places.len()).filter(is_partner).collect();
         found.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        found.truncate(PARTNERS);
+        found.truncate(PARTNERS_MAX);
         found
     };
     (0..places.len()).map(of).collect()

@@ -19,7 +19,7 @@ const STEPS_MAX: usize = 8;
 
 /// The pixels of a step.
 #[derive(Debug)]
-pub(in crate::train) struct Ready {
+pub(in crate::train) struct StepPixels {
     pub(in crate::train) photo: Arc<Photo>,
     /// The mask in the layout of the device; empty without a mask and in smaller sizes.
     pub(in crate::train) view_labels: Arc<Vec<u32>>,
@@ -29,8 +29,8 @@ pub(in crate::train) struct Ready {
     pub(in crate::train) small: Option<(Camera, u64)>,
 }
 
-/// What a step needs.
-pub(in crate::train) struct Wanted {
+/// What a step asks for.
+pub(in crate::train) struct Request {
     step: u32,
     /// Index of the part.
     index: usize,
@@ -43,7 +43,7 @@ pub(in crate::train) struct Wanted {
     small: Option<Camera>,
 }
 
-impl Wanted {
+impl Request {
     /// Asks for a part, the one with this index, of a view at a share of its size.
     pub(in crate::train) fn new(
         step: u32,
@@ -57,31 +57,31 @@ impl Wanted {
         Self { step, index, band: part.band, photo, view_labels, depths, small }
     }
 
-    fn make(self) -> Result<Ready> {
+    fn make(self) -> Result<StepPixels> {
         let whole = self.photo.get()?;
         let full = (whole.width, whole.height);
         let photo = photo_of(self.band, whole);
         let drawn = |photo: &Photo| self.depths.as_ref().map_or(Vec::new(), |of| of.drawn(full, self.band, photo));
         let Some(camera) = self.small else {
             let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
-            return Ok(Ready { depths: drawn(&photo), photo, view_labels, small: None });
+            return Ok(StepPixels { depths: drawn(&photo), photo, view_labels, small: None });
         };
         let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
         let valid = valid_pixels(&photo.rgba);
         let depths = drawn(&photo);
-        Ok(Ready { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
+        Ok(StepPixels { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
     }
 }
 
-/// The threads, by step: index of the part, and its pixels.
+/// Threads that make the pixels of the next steps, by step: index of the part, and its pixels.
 #[derive(Debug)]
-pub(in crate::train) struct Ahead {
-    running: BTreeMap<u32, (usize, JoinHandle<Result<Ready>>)>,
+pub(in crate::train) struct Prefetch {
+    running: BTreeMap<u32, (usize, JoinHandle<Result<StepPixels>>)>,
     steps: usize,
     last: u32,
 }
 
-impl Ahead {
+impl Prefetch {
     /// Makes one for the steps up to `last`.
     pub(in crate::train) fn new(views: &[TrainView], last: u32) -> Self {
         let waits = views.iter().map(|view| &view.photo).filter(|photo| !photo.is_held());
@@ -95,28 +95,28 @@ impl Ahead {
     }
 
     /// Begins to make the pixels of a step, unless that was done before.
-    pub(in crate::train) fn begin(&mut self, wanted: Wanted) {
-        let is_running = self.running.get(&wanted.step).is_some_and(|(index, _)| *index == wanted.index);
-        if is_running || wanted.step > self.last {
+    pub(in crate::train) fn begin(&mut self, request: Request) {
+        let is_running = self.running.get(&request.step).is_some_and(|(index, _)| *index == request.index);
+        if is_running || request.step > self.last {
             return;
         }
-        let (step, index) = (wanted.step, wanted.index);
+        let (step, index) = (request.step, request.index);
         // Without a thread, the step makes its pixels itself.
-        if let Ok(thread) = thread::Builder::new().name("photos".to_owned()).spawn(|| wanted.make()) {
+        if let Ok(thread) = thread::Builder::new().name("photos".to_owned()).spawn(|| request.make()) {
             self.running.insert(step, (index, thread));
         }
     }
 
     /// Returns the pixels of a step. Those of other steps than the next ones are dropped: a training may go back.
-    pub(in crate::train) fn take(&mut self, wanted: Wanted) -> Result<Ready> {
-        let found = self.running.remove(&wanted.step).filter(|(index, _)| *index == wanted.index);
-        let next = wanted.step..=wanted.step.saturating_add(self.steps as u32);
+    pub(in crate::train) fn take(&mut self, request: Request) -> Result<StepPixels> {
+        let found = self.running.remove(&request.step).filter(|(index, _)| *index == request.index);
+        let next = request.step..=request.step.saturating_add(self.steps as u32);
         self.running.retain(|step, _| next.contains(step));
         match found {
             Some((_, thread)) => {
                 thread.join().unwrap_or_else(|_| Err(Error::Bug("a thread that reads photos panicked".to_owned())))
             }
-            None => wanted.make(),
+            None => request.make(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::free_space;
 use super::part::Part;
-use super::prefetch::{Ahead, Ready, Wanted};
+use super::prefetch::{Prefetch, Request, StepPixels};
 use super::step_input::{self, Shown, StepInput, StepView, TrainView};
 use crate::error::{Error, Result};
 use crate::label::vote::ballot::Voter;
@@ -29,11 +29,11 @@ pub(in crate::train) struct Views {
     /// What steps train on.
     parts: Vec<Part>,
     /// Shrunk photos of those in memory, by size and part, until no step in flight uses the size.
-    shrunk: BTreeMap<(u32, usize), Arc<Ready>>,
+    shrunk: BTreeMap<(u32, usize), Arc<StepPixels>>,
     /// Pixels of the steps in flight.
-    ready: BTreeMap<u32, Arc<Ready>>,
+    ready: BTreeMap<u32, Arc<StepPixels>>,
     /// Pixels of the next steps, if they are not in memory.
-    ahead: Ahead,
+    prefetch: Prefetch,
     /// Other views of each view, with free space on the way; empty without pruning of fog.
     partners: Vec<Vec<usize>>,
     free_space: bool,
@@ -49,13 +49,13 @@ impl Views {
     /// Makes the views of a training.
     pub(in crate::train) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
-        let ahead = Ahead::new(&whole, config.iterations);
+        let prefetch = Prefetch::new(&whole, config.iterations);
         Self {
             whole,
             parts,
             shrunk: BTreeMap::new(),
             ready: BTreeMap::new(),
-            ahead,
+            prefetch,
             partners: Vec::new(),
             free_space: config.free_space,
             refined: Vec::new(),
@@ -153,8 +153,8 @@ impl Views {
         let ready = match self.shrunk.get(&key) {
             Some(ready) => Arc::clone(ready),
             None => {
-                let wanted = self.wanted(step, part);
-                Arc::new(self.ahead.take(wanted)?)
+                let request = self.request(step, part);
+                Arc::new(self.prefetch.take(request)?)
             }
         };
         let is_held = |part: usize| self.whole[self.parts[part].view].photo.is_held();
@@ -165,21 +165,21 @@ impl Views {
         let waiting: Vec<(u32, usize)> =
             (step + 1..).zip(next.iter().copied()).filter(|&(_, part)| !is_held(part)).collect();
         for (step, part) in waiting {
-            let wanted = self.wanted(step, part);
-            self.ahead.begin(wanted);
+            let request = self.request(step, part);
+            self.prefetch.begin(request);
         }
         Ok(())
     }
 
     /// Number of steps whose pixels are made ahead.
     pub(in crate::train) fn steps_ahead(&self) -> usize {
-        self.ahead.steps()
+        self.prefetch.steps()
     }
 
-    fn wanted(&self, step: u32, index: usize) -> Wanted {
+    fn request(&self, step: u32, index: usize) -> Request {
         let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
         let part = &self.parts[index];
-        Wanted::new(step, (index, part), &self.whole[part.view], (share, step < self.depths_until))
+        Request::new(step, (index, part), &self.whole[part.view], (share, step < self.depths_until))
     }
 
     /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.

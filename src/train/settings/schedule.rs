@@ -4,9 +4,9 @@ use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
 const LONG_RUN: f64 = 30_000.0;
-/// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MOST.
+/// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MAX.
 const RATE_POWER: f64 = 0.3;
-const RATE_MOST: f64 = 3.0;
+const RATE_MAX: f64 = 3.0;
 /// Share of the run after which the rates fall.
 const RATE_FALL_FROM: f64 = 0.6;
 /// Step with the final learning rate of positions: LabelGS keeps that of 3DGS for its 15000 steps.
@@ -14,7 +14,7 @@ const POSITION_LR_STEPS: f64 = 30_000.0;
 /// Learning rate of the colours of higher degrees, by that of degree 0 (3DGS).
 const FEATURE_REST: f64 = 20.0;
 /// Fewest steps of densification with the strategy of 3DGS.
-const ADC_LEAST: u32 = 1000;
+const ADC_STEPS_MIN: u32 = 1000;
 /// Gaussians of a run by default: at most for each step.
 const BUDGET_PER_STEP: f64 = 30.0;
 /// Size of the photos in the first steps: share of the full one, and longest side at most, px.
@@ -24,7 +24,7 @@ const START_PX: f32 = 160.0;
 const FULL_FROM: f64 = 0.6;
 const FULL_FROM_LATEST: f64 = 0.9;
 /// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
-const REGULAR: f64 = 0.01;
+const REGULARISER_WEIGHT: f64 = 0.01;
 const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
 /// Share of the run after which Gaussians with little weight are pruned, and those across contours split: soon after
 /// growth, so that the others adapt.
@@ -66,7 +66,7 @@ impl TrainConfig {
 
     /// Returns the factor of the learning rates.
     pub(in crate::train) fn rate_factor(&self) -> f64 {
-        let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MOST);
+        let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MAX);
         self.rate_factor.unwrap_or(derived)
     }
 
@@ -237,7 +237,8 @@ impl TrainConfig {
     /// Returns the step at which densification stops.
     pub fn densify_until(&self) -> u32 {
         // The schedule of 3DGS starts late, whatever the length of the run.
-        let least = if self.strategy == StrategyKind::Adc { self.densify_from().saturating_add(ADC_LEAST) } else { 0 };
+        let least =
+            if self.strategy == StrategyKind::Adc { self.densify_from().saturating_add(ADC_STEPS_MIN) } else { 0 };
         self.densify_until.unwrap_or(self.share(0.5).max(least))
     }
 
@@ -252,7 +253,7 @@ impl TrainConfig {
     }
 
     fn regular(&self) -> f64 {
-        if self.strategy == StrategyKind::Mcmc { REGULAR } else { 0.0 }
+        if self.strategy == StrategyKind::Mcmc { REGULARISER_WEIGHT } else { 0.0 }
     }
 
     /// Returns true for steps that end with a relocation.

@@ -19,9 +19,9 @@ use std::sync::Arc;
 const RATE: f64 = 0.01;
 /// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
 /// 0.04, by what shines and by noise.
-const DIFFERS: f64 = 0.07;
+const SPREAD_MIN: f64 = 0.07;
 /// Share of the photos whose gains must be known for a decision.
-const KNOWN: f64 = 0.5;
+const KNOWN_SHARE_MIN: f64 = 0.5;
 
 /// Name of the parameters.
 pub(in crate::train) const NAME: &str = "exposure";
@@ -95,7 +95,7 @@ impl Exposure {
 /// Returns the root mean square of ln gain over photos and channels; `None` if too few gains are known.
 fn spread(gains: &[Gains]) -> Option<f64> {
     let known: Vec<f64> = gains.iter().flatten().flatten().map(|gain| gain.ln().powi(2)).collect();
-    let enough = known.len() as f64 >= 3.0 * KNOWN * gains.len() as f64 && !known.is_empty();
+    let enough = known.len() as f64 >= 3.0 * KNOWN_SHARE_MIN * gains.len() as f64 && !known.is_empty();
     enough.then(|| (known.iter().sum::<f64>() / known.len() as f64).sqrt())
 }
 
@@ -106,7 +106,7 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
     }
     let exposure = match spread(gains) {
         _ if config.random_background => ExposureMode::Off,
-        Some(spread) if spread >= DIFFERS => {
+        Some(spread) if spread >= SPREAD_MIN => {
             tracing::info!(
                 "exposure: on, because the photos' brightness differs by {:.0} %; set {} to train without",
                 100.0 * spread,

@@ -183,14 +183,14 @@ impl Shared {
         self.placed().map(|(of, place)| of.extension(place)).collect()
     }
 
-    pub(in crate::train) fn kept(&self) -> Option<KeptShared> {
+    pub(in crate::train) fn kept(&self) -> Option<SharedState> {
         let names: Vec<&str> = self.0.iter().map(|of| of.name()).collect();
-        (!names.is_empty()).then(|| KeptShared { name: names.join(" and "), layout: self.layout() })
+        (!names.is_empty()).then(|| SharedState { name: names.join(" and "), layout: self.layout() })
     }
 
-    pub(in crate::train) fn check(&self, kept: Option<&KeptShared>) -> Result<(), String> {
+    pub(in crate::train) fn check(&self, kept: Option<&SharedState>) -> Result<(), String> {
         let own = self.kept();
-        let text = |kept: Option<&KeptShared>| kept.map_or("none".to_owned(), ToString::to_string);
+        let text = |kept: Option<&SharedState>| kept.map_or("none".to_owned(), ToString::to_string);
         if own.as_ref() == kept {
             return Ok(());
         }
@@ -208,14 +208,14 @@ fn checked(rows: Vec<[f32; 4]>, wanted: u32, what: &str) -> Result<Vec<[f32; 4]>
 /// The entry of the shared parameters in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct KeptShared {
+pub struct SharedState {
     /// Name of the parameters.
     pub name: String,
     /// Number of their rows.
     pub layout: SharedLayout,
 }
 
-impl std::fmt::Display for KeptShared {
+impl std::fmt::Display for SharedState {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{} ({} rows of the scene, {} of each photo)", self.name, self.layout.scene, self.layout.photo)
     }

@@ -141,7 +141,7 @@ impl FirstCount {
 /// The state of a strategy in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Kept {
+pub struct StrategyState {
     /// Name of the strategy.
     pub name: String,
     /// Names of its planes.
@@ -150,7 +150,7 @@ pub struct Kept {
     pub value: Value,
 }
 
-impl Kept {
+impl StrategyState {
     /// Returns the state of a strategy.
     pub fn of(strategy: &dyn Strategy) -> Self {
         let planes = strategy.planes().iter().map(|buf| TABLE[buf.index()].name.to_owned()).collect();

@@ -12,7 +12,7 @@ use crate::train::input::step_input::TrainView;
 use crate::train::setup::region::Region;
 use crate::train::setup::{TrainerOptions, engine_size};
 use crate::train::state::{TrainState, ViewFingerprint};
-use crate::train::strategy::Kept;
+use crate::train::strategy::StrategyState;
 use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ impl Trainer {
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: serde_json::Value::Null,
-            strategy: Kept::of(&*self.context.strategy),
+            strategy: StrategyState::of(&*self.context.strategy),
             shared: self.context.shared.kept(),
             planes: self.finite_planes()?,
             path: PathBuf::new(),
