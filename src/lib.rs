@@ -62,30 +62,24 @@
 #![deny(unsafe_code)]
 #![warn(unreachable_pub)]
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
-#![cfg_attr(
-    not(feature = "cli"),
-    allow(dead_code, unused_imports, reason = "what only the commands use is left out by the linker")
-)]
 
 pub mod blocks;
 mod bundle_adjustment;
 #[cfg(feature = "cli")]
-mod cli;
+pub mod cli;
 pub mod engine;
 pub mod eval;
 pub mod gpu;
 pub mod guide;
-#[doc(hidden)]
-pub mod internals;
 pub mod label;
-mod pass;
+pub mod pass;
 pub mod records;
 pub mod render;
 pub mod run;
-mod scheduler;
-mod shaders;
+pub mod scheduler;
+pub mod shaders;
 pub mod train;
-mod verify;
+pub mod verify;
 mod version;
 #[cfg(feature = "viewer")]
 pub mod viewer;

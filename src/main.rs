@@ -56,5 +56,5 @@ fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
 const COMMIT: Option<&str> = option_env!("LABELGS_COMMIT");
 
 fn main() -> std::process::ExitCode {
-    labelgs::internals::cli::main(std::env::args_os(), COMMIT).into()
+    labelgs::cli::main(std::env::args_os(), COMMIT).into()
 }

@@ -14,6 +14,7 @@ const FEATURES: [(&str, bool); 4] = [
 ];
 
 /// Notes the commit of the program, once.
+#[cfg(feature = "cli")]
 pub(crate) fn note_commit(commit: Option<&'static str>) {
     if let Some(commit) = commit {
         // A second call comes from a test that calls the program's function twice.

@@ -2,11 +2,10 @@
 
 use crate::support::device;
 use glam::{DVec2, DVec3};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{REFIT_STEPS, refitted};
 use labelgs::scene::{Camera, Gaussians, LabelMap, Occluders, Photo, View};
-use labelgs::synth::SynthOptions;
-use labelgs::synth::ring_of_cameras;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::synth::{SynthOptions, ring_of_cameras};
+use labelgs::train::refit::{REFIT_STEPS, refitted};
 use labelgs::{Error, Result};
 use std::collections::BTreeMap;
 

@@ -2,11 +2,12 @@
 
 use crate::exposure::go_on;
 use crate::support::device;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{TrainState, Trainer, first_model};
 use labelgs::run::{StrategyKind, TrainConfig};
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
+use labelgs::train::state::TrainState;
+use labelgs::train::{Trainer, first_model};
 
 /// No Gaussian is finer than its limit, which densification hands on; a resumed training has the same bits.
 #[test]

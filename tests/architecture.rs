@@ -150,9 +150,7 @@ fn unsafe_code_has_three_places() {
 /// Above the engine, only the modules that verify it use its scheduler.
 #[test]
 fn the_scheduler_is_the_engines_own() {
-    let above = |path: &Path| {
-        floor(&module(path)) > floor("engine") && !["verify", "internals"].contains(&module(path).as_str())
-    };
+    let above = |path: &Path| floor(&module(path)) > floor("engine") && module(path) != "verify";
     let touches =
         |text: &str| [".raw()", ".raw_mut()", "Scheduler::", "ListId", "Ticket"].iter().any(|w| text.contains(w));
     let found = files("src", &["rs"]).into_iter().filter(|(path, text)| above(path) && touches(text));
@@ -162,7 +160,7 @@ fn the_scheduler_is_the_engines_own() {
 /// The command line alone knows flags and commands; a message of the library has a [`labelgs::Setting`].
 #[test]
 fn the_library_speaks_of_no_flags() {
-    let root = labelgs::internals::cli::command::command();
+    let root = labelgs::cli::command::command();
     let commands: Vec<String> =
         root.get_subcommands().map(|command| format!("labelgs {}", command.get_name())).collect();
     let has_flag = |line: &str| {
@@ -200,7 +198,7 @@ fn settings_in_messages_are_typed() {
         command.get_subcommands().for_each(|command| fields(command, found));
     }
     let mut flags = std::collections::BTreeSet::new();
-    fields(&labelgs::internals::cli::command::command(), &mut flags);
+    fields(&labelgs::cli::command::command(), &mut flags);
     flags.extend(labelgs::run::Settings::keys().map(|key| key.name.to_owned()));
     let mut wrong = Vec::new();
     for (path, text) in files("src", &["rs"]) {

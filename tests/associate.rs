@@ -1,7 +1,7 @@
 //! Masks of different views that show one object, and their repair, on models of a few Gaussians.
 
-use labelgs::internals::label::masks::associate::{Owners, Segment, associate};
-use labelgs::internals::label::masks::repair::{adopt, mend, name_groups, rename};
+use labelgs::label::masks::associate::{Owners, Segment, associate};
+use labelgs::label::masks::repair::{adopt, mend, name_groups, rename};
 use labelgs::label::masks::{Naming, Repairs};
 use labelgs::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};

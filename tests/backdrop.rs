@@ -4,14 +4,15 @@ use crate::exposure::go_on;
 use crate::support::device::{Turn, device};
 use image::{Rgba, RgbaImage};
 use labelgs::engine::Engine;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{TrainState, Trainer, first_model};
 use labelgs::render::{RenderOptions, render};
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians, Photo, View};
 use labelgs::scenes::{self, LoadOptions};
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth;
 use labelgs::synth::{Preset, SynthOptions};
+use labelgs::train::state::TrainState;
+use labelgs::train::{Trainer, first_model};
 use std::fs;
 
 /// The made scene with nothing but its objects in the photos.

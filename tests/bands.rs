@@ -5,11 +5,13 @@ use crate::invariants::training::{budgeted, small};
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::device::Turn;
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
+use labelgs::pass::KernelShape;
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scenes::initial_gaussians;
+use labelgs::train::Trainer;
+use labelgs::train::setup::TrainerOptions;
+use labelgs::train::state::TrainState;
 
 /// Rows of tiles in a band; `None` trains on whole photos.
 fn options(turn: &Turn, tile_rows: Option<u32>, dataset: &Dataset) -> TrainerOptions {

@@ -2,9 +2,9 @@
 
 use assert_cmd::Command;
 use clap::Parser;
+use labelgs::cli::command::{Cli, Command as Verb, command};
+use labelgs::cli::support::setting_names::flag;
 use labelgs::formats::{read_model, write_model};
-use labelgs::internals::cli::command::{Cli, Command as Verb, command};
-use labelgs::internals::cli::wording::flag;
 use labelgs::run::{Occlusion, Settings, TrainConfig};
 use labelgs::scene::Gaussians;
 use serde_json::Value;

@@ -2,15 +2,13 @@
 
 use assert_cmd::Command;
 use glam::DVec3;
-use labelgs::files::run_folder;
-use labelgs::files::{LabelEntry, LabelTable};
+use labelgs::cli::support::exit_status::exit_status;
+use labelgs::cli::support::scene::near_plane;
+use labelgs::files::{LabelEntry, LabelTable, run_folder};
 use labelgs::formats::{read_model, write_model};
-use labelgs::internals::cli::scene::near_plane;
-use labelgs::internals::cli::status::exit_status;
 use labelgs::masks::read_mask;
 use labelgs::scene::Gaussians;
-use labelgs::synth::SynthOptions;
-use labelgs::synth::ring_of_cameras;
+use labelgs::synth::{SynthOptions, ring_of_cameras};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Output;

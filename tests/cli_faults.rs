@@ -339,7 +339,7 @@ fn a_nan_is_found_and_undone() {
     assert!(said.contains("all learning rates are half of what they were"), "{said}");
     assert!(place.model("slower", 40) != place.model("right", 40));
     let rates =
-        labelgs::internals::train::TrainState::read(&place.checkpoints("slower")[0].path).expect("a checkpoint").config;
+        labelgs::train::state::TrainState::read(&place.checkpoints("slower")[0].path).expect("a checkpoint").config;
     assert_eq!(rates.feature_lr, 0.00125, "a resumed run goes on with them");
     let output = place.trained_with(Some("nan:27:NUMBER:1000"), "broken", &flags);
     assert_eq!(output.status.code(), Some(8), "{}", stderr(&output));

@@ -71,7 +71,7 @@ fn imported_masks_pass_the_check_until_they_are_broken() {
 
 #[test]
 fn every_flag_is_explained() {
-    let root = labelgs::internals::cli::command::command();
+    let root = labelgs::cli::command::command();
     let masks = root.find_subcommand("masks").expect("masks");
     for verb in masks.get_subcommands() {
         assert!(verb.get_about().is_some());

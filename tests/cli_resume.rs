@@ -3,7 +3,7 @@
 use crate::support::device;
 use crate::support::runs::{Place, all_whole, files, kills, stderr, succeeded};
 use labelgs::files::run_folder::Lock;
-use labelgs::internals::train::TrainState;
+use labelgs::train::state::TrainState;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::collections::BTreeSet;

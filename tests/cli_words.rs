@@ -2,9 +2,9 @@
 
 use assert_cmd::Command;
 use clap::Parser;
+use labelgs::cli::command::{Cli, Command as Verb};
 use labelgs::files::{LabelEntry, LabelTable};
 use labelgs::formats::write_model;
-use labelgs::internals::cli::command::{Cli, Command as Verb};
 use labelgs::scene::Gaussians;
 use serde_json::json;
 use std::path::Path;

@@ -1,12 +1,12 @@
 //! Steps on small photos.
 
 use crate::support::device;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Photo};
 use labelgs::scenes::init;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
+use labelgs::train::{StepReport, Trainer};
 use std::sync::Arc;
 
 const SCENE: SynthOptions = SynthOptions {

@@ -1,8 +1,8 @@
 //! Schedules and checks of the training configuration.
 
-use labelgs::internals::train::strategy::adc::resets_opacity_at;
 use labelgs::run::TrainConfig;
 use labelgs::scenes::ReadOptions;
+use labelgs::train::strategy::adc::resets_opacity_at;
 
 #[test]
 fn schedules_follow_the_reference() {

@@ -1,7 +1,7 @@
 //! From votes to labels.
 
-use labelgs::internals::label::vote::ballot::Ballot;
-use labelgs::internals::label::vote::decide::{Agreement, agreement, decide, trust};
+use labelgs::label::vote::ballot::Ballot;
+use labelgs::label::vote::decide::{Agreement, agreement, decide, trust};
 use labelgs::scene::LabelMap;
 
 /// A ballot of rows in whole pixels.

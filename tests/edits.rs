@@ -1,6 +1,7 @@
 //! Choosing and editing labels, on Gaussians and label maps made by hand.
 
 use glam::{DQuat, DVec3};
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::edit::components::components;
 use labelgs::edit::rename::{give_name, keep, renumber, split};
 use labelgs::edit::{
@@ -8,7 +9,6 @@ use labelgs::edit::{
     split_components, without_specks,
 };
 use labelgs::files::{LabelEntry, LabelTable};
-use labelgs::internals::cli::status::exit_status;
 use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Gaussians, LabelMap};
 use std::collections::{BTreeMap, BTreeSet};
@@ -257,8 +257,8 @@ fn points_and_boxes_mean_labels() {
 /// The colour towards each direction is turned with the model, by any turn.
 #[test]
 fn harmonics_are_turned_along() {
-    use labelgs::internals::verify::reference::Rules;
-    use labelgs::internals::verify::reference::sh::basis;
+    use labelgs::verify::reference::Rules;
+    use labelgs::verify::reference::sh::basis;
     let rules = Rules::default();
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.3);
     let before = Gaussians {

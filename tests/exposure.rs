@@ -5,12 +5,13 @@ use crate::invariants::training::{config, small};
 use crate::reference::exposure::{ExposureRows, backward, exposed};
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::exposure::decided;
-use labelgs::internals::train::{TrainState, Trainer};
 use labelgs::run::{ExposureMode, LabelRule, TrainConfig};
 use labelgs::scene::{ColourMatrix, Dataset};
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::train::Trainer;
+use labelgs::train::shared::exposure::decided;
+use labelgs::train::state::TrainState;
 
 /// The loss sum (c' - t)^2 / 2, which has no kink.
 fn loss(image: &[[f64; 3]], rows: &ExposureRows, photo: &[[f64; 3]]) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, stderr, succeeded};
-use labelgs::internals::shaders;
+use labelgs::shaders;
 use rspirv::dr::Operand;
 use rspirv::spirv::{Capability, Op};
 

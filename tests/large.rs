@@ -9,13 +9,12 @@ use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DMat3, DVec3};
 use labelgs::edit;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::formats::{LazyModel, ModelRef};
-use labelgs::formats::{read_model, write_model};
+use labelgs::formats::{LazyModel, ModelRef, read_model, write_model};
 use labelgs::gpu::Gpu;
-use labelgs::internals::render::large::{Index, Painter, fits};
-use labelgs::internals::scheduler::SchedulerOptions;
+use labelgs::render::large::{Index, Painter, fits};
 use labelgs::render::{Parts, RenderOptions, Rendered, label_map, render};
 use labelgs::scene::{Camera, Gaussians};
+use labelgs::scheduler::SchedulerOptions;
 use rand::Rng;
 use std::path::Path;
 

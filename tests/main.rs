@@ -5,7 +5,7 @@
     reason = "the rules of files and lengths are those of the library"
 )]
 
-use labelgs::internals::verify::reference;
+use labelgs::verify::reference;
 
 #[allow(dead_code, reason = "not every helper is always in use")]
 mod support;

@@ -1,19 +1,16 @@
 //! Scores, choice of labels and selections against brute force or values worked out by hand.
 
-use labelgs::edit::Catalogue;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::edit::choose::{candidates, choose_labels, require_labels};
-use labelgs::edit::{MIN_LABEL_CONFIDENCE, extract, remove, summarise};
-use labelgs::eval::psnr;
-use labelgs::eval::ssim;
-use labelgs::eval::{Scores, ViewScores};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::eval::boundary::{boundary_iou, rim, rim_width};
-use labelgs::internals::eval::crop::Crop;
-use labelgs::internals::eval::metrics::{Overlap, paper_score};
-use labelgs::internals::eval::scores::{ObjectRender, ObjectTruth};
-use labelgs::internals::eval::specks::specks;
-use labelgs::internals::eval::ssim::{ssim_map, window};
-use labelgs::internals::eval::ssim8::{ssim8, to_bytes};
+use labelgs::edit::{Catalogue, MIN_LABEL_CONFIDENCE, extract, remove, summarise};
+use labelgs::eval::boundary::{boundary_iou, rim, rim_width};
+use labelgs::eval::crop::Crop;
+use labelgs::eval::metrics::{Overlap, paper_score};
+use labelgs::eval::scores::{ObjectRender, ObjectTruth};
+use labelgs::eval::specks::specks;
+use labelgs::eval::ssim::{ssim_map, window};
+use labelgs::eval::ssim8::{ssim8, to_bytes};
+use labelgs::eval::{Scores, ViewScores, psnr, ssim};
 use labelgs::scene::{Gaussians, LabelMap, Photo};
 use std::collections::BTreeMap;
 

@@ -12,7 +12,7 @@ use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules};
 use crate::support::compare::{Tolerance, close};
 use crate::support::scenes::{Scene, Shape, population, scene};
-use labelgs::internals::verify::selftest::model::large;
+use labelgs::verify::selftest::model::large;
 
 /// Opaque and faint Gaussians, half of them far outside the image.
 fn wide_scene() -> (Scene, Model) {

@@ -3,12 +3,12 @@
 use crate::support::device;
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::Trainer;
 use labelgs::render::{NEAR, Parts, RenderOptions, Rendered, render};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo, Point, View};
 use labelgs::scenes::init;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::train::Trainer;
 
 const SIZE: (u32, u32) = (96, 72);
 /// Depths of a wall and of a ball before it: most Gaussians belong to the wall.

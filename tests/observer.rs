@@ -2,12 +2,11 @@
 
 use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
-use labelgs::Result;
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::run;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::render::Parts;
 use labelgs::run::{Event, Flow, Live, Observer, Request, Settings, Start, Summary};
 use labelgs::scene::Camera;
+use labelgs::{Result, run};
 use std::collections::BTreeMap;
 
 /// Counts events, downloads the scene, and returns the answer that a test set.

@@ -1,12 +1,12 @@
 //! Occlusion: both rules against answers by hand and by brute force, and against the ground truth of a made scene.
 
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::label::occlusion::{distances, picture};
+use labelgs::cli::support::exit_status::exit_status;
+use labelgs::label::occlusion::draw::picture;
+use labelgs::label::occlusion::mean::distances;
 use labelgs::label::occlusion::{Rule, by_contour, by_mean};
 use labelgs::records::OcclusionTable;
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
-use labelgs::synth::{Preset, SynthOptions};
-use labelgs::synth::{World, ring_of_cameras};
+use labelgs::synth::{Preset, SynthOptions, World, ring_of_cameras};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A repeatable number in 0 to 1.

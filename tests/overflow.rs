@@ -1,12 +1,12 @@
 //! A buffer that is too small costs a lost step, never a wrong update.
 
 use crate::support::device;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::Trainer;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
 use labelgs::scenes::init;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
+use labelgs::train::Trainer;
 
 const SCENE: SynthOptions = SynthOptions {
     preset: Preset::Simple,

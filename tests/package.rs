@@ -29,7 +29,7 @@ fn every_command_has_a_page_and_completions() {
         let path = folder.path().join(name);
         std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
-    let mut root = labelgs::internals::cli::command::command();
+    let mut root = labelgs::cli::command::command();
     root.build();
     let mut all = Vec::new();
     commands(&root, "labelgs", &mut all);

@@ -8,13 +8,14 @@ use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use glam::{DQuat, DVec3};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{TrainState, Trainer, aligned};
 use labelgs::run::{ExposureMode, TrainConfig};
 use labelgs::scene::{Camera, Point, View};
 use labelgs::scenes::initial_gaussians;
-use labelgs::synth::dataset;
-use labelgs::synth::{Preset, SynthOptions};
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::Trainer;
+use labelgs::train::alignment::aligned;
+use labelgs::train::state::TrainState;
 
 /// Decisions nearer than this (relative) could flip within a difference.
 const SAFE: f64 = 1e-4;

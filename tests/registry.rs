@@ -1,16 +1,15 @@
 //! One stem, four places: every shader has its header, its mirror and its pass; every buffer has its pass.
 
+use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::internals::engine::capacity;
-use labelgs::internals::pass;
-use labelgs::internals::pass::{KernelShape, Supervision, Variant};
-use labelgs::internals::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
-use labelgs::internals::shaders;
-use labelgs::internals::train::exposure::Exposure;
-use labelgs::internals::train::poses::Poses;
-use labelgs::internals::train::shared::{Place, SharedParameters};
-use labelgs::internals::train::strategy;
+use labelgs::pass::{KernelShape, Supervision, Variant};
 use labelgs::run::StrategyKind;
+use labelgs::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
+use labelgs::train::shared::exposure::Exposure;
+use labelgs::train::shared::poses::Poses;
+use labelgs::train::shared::{Place, SharedParameters};
+use labelgs::train::strategy;
+use labelgs::{pass, shaders};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -201,7 +200,7 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     let bytes = |room: &EngineSize| {
         let capacity = capacity(&shape, room);
         let lists = Engine::lists_of(&shape, &capacity, room);
-        let report = labelgs::internals::scheduler::plan::MemoryReport::predict(
+        let report = labelgs::scheduler::plan::MemoryReport::predict(
             TABLE,
             &capacity,
             &lists,

@@ -5,12 +5,13 @@ use crate::reference::{blend, lift, model::Model, project, rules::Rules};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{Trainer, TrainerOptions};
+use labelgs::pass::KernelShape;
 use labelgs::render::{RenderOptions, render};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Gaussians};
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::train::Trainer;
+use labelgs::train::setup::TrainerOptions;
 
 /// Tiny, faint Gaussians in front of one 8 x 8 tile.
 fn crowd(count: usize) -> (Gaussians, Camera) {

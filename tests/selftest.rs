@@ -3,7 +3,7 @@
 use crate::reference::Rules;
 use crate::reference::rules::mutants;
 use crate::support::device;
-use labelgs::internals::verify::selftest;
+use labelgs::verify::selftest;
 use std::sync::Arc;
 
 fn failures(rules: &Rules, gpu: &Arc<labelgs::gpu::Gpu>) -> Vec<String> {

@@ -6,14 +6,14 @@ use crate::reference::step::step;
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::Error;
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::train::Trainer;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::run::TrainConfig;
 use labelgs::scene::Gaussians;
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
 use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::Trainer;
 
 /// A scene with one changed Gaussian in full view.
 fn with(change: impl Fn(&mut Gaussians, usize)) -> (Scene, usize) {

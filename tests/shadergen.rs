@@ -156,7 +156,7 @@ fn the_same_input_gives_the_same_files() {
 
 #[test]
 fn constants_have_the_bits_of_the_shaders() {
-    use labelgs::internals::shaders::constants::{ALPHA_MAX, ALPHA_MIN, LOG2_ALPHA_MIN, TRANSMITTANCE_MIN};
+    use labelgs::shaders::constants::{ALPHA_MAX, ALPHA_MIN, LOG2_ALPHA_MIN, TRANSMITTANCE_MIN};
     assert_eq!(ALPHA_MIN.to_bits(), (1.0f32 / 255.0).to_bits());
     assert_eq!(ALPHA_MAX.to_bits(), 0.99f32.to_bits());
     assert_eq!(TRANSMITTANCE_MIN.to_bits(), 1e-4f32.to_bits());

@@ -5,23 +5,22 @@ use crate::pass::fixture::prove;
 use crate::reference::adam::adam_value;
 use crate::scheduler::{R, RW, S, W, toy_shader};
 use crate::support::compare::{Tolerance, close};
-use crate::support::device;
 use crate::support::device::Turn;
-use crate::support::toy;
+use crate::support::{device, toy};
+use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::internals::engine::capacity;
-use labelgs::internals::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::{
-    Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work,
-};
-use labelgs::internals::shaders::ShaderDesc;
-use labelgs::internals::train::shared::{Place, SharedLayout, SharedParameters};
-use labelgs::internals::train::strategy::At;
-use labelgs::internals::train::{TrainState, Trainer, TrainerOptions};
+use labelgs::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work};
+use labelgs::shaders::ShaderDesc;
+use labelgs::train::Trainer;
+use labelgs::train::setup::TrainerOptions;
+use labelgs::train::shared::{Place, SharedLayout, SharedParameters};
+use labelgs::train::state::TrainState;
+use labelgs::train::strategy::At;
 use std::sync::Arc;
 
 /// Views of the scene.

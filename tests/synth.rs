@@ -1,12 +1,11 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::files::LabelTable;
-use labelgs::internals::cli::status::exit_status;
 use labelgs::masks::read_mask;
 use labelgs::scene::Camera;
 use labelgs::scenes::LoadOptions;
-use labelgs::synth::{self, Picture, World, alone, picture, ring_of_cameras};
-use labelgs::synth::{Preset, SynthOptions};
+use labelgs::synth::{self, Picture, Preset, SynthOptions, World, alone, picture, ring_of_cameras};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -14,7 +14,7 @@ pub const SHELLS: [Shell; 3] = [Shell::Bash, Shell::Zsh, Shell::Fish];
 /// Writes all of them.
 pub fn write(folder: &Path) -> io::Result<()> {
     // Pages of one version are the same for every commit and set of features.
-    let mut command = labelgs::internals::cli::command::command().long_version(None::<&'static str>);
+    let mut command = labelgs::cli::command::command().long_version(None::<&'static str>);
     let (pages, completions) = (folder.join("man"), folder.join("completions"));
     std::fs::create_dir_all(&pages)?;
     std::fs::create_dir_all(&completions)?;

@@ -1,8 +1,8 @@
 //! The command line: what is typed (`command`), a file per command (`commands`), and what they share (`support`).
 
-pub(crate) mod command;
-pub(crate) mod commands;
-pub(crate) mod support;
+pub mod command;
+pub mod commands;
+pub mod support;
 
 use crate::error::speak_of;
 use crate::{Error, version};

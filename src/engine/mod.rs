@@ -7,11 +7,11 @@
 mod bands;
 mod card;
 mod data;
-pub(crate) mod growth;
+pub mod growth;
 mod input;
 mod label_ids;
 pub(crate) mod model;
-pub(crate) mod run;
+pub mod run;
 mod size;
 pub(crate) mod state;
 pub(crate) mod uniforms;

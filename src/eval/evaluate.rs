@@ -170,6 +170,7 @@ fn show(
 }
 
 /// Returns the number of pictures that [`evaluate`] renders.
+#[cfg(feature = "cli")]
 pub(crate) fn picture_count(views: &[&View]) -> u64 {
     (views.len() * (1 + objects(views).len())) as u64
 }

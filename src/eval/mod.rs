@@ -4,22 +4,22 @@
 //! published benchmarks of object masks. [`psnr`] and [`ssim`] score single pictures. A [`Watch`] receives every scored
 //! picture with its ground truth. [`removals`] scores what is left where objects were removed.
 
-pub(crate) mod boundary;
+pub mod boundary;
 pub(crate) mod compared;
 mod corrected;
-pub(crate) mod crop;
+pub mod crop;
 pub(crate) mod evaluate;
-pub(crate) mod lpips;
-pub(crate) mod metrics;
-pub(crate) mod page;
+pub mod lpips;
+pub mod metrics;
+pub mod page;
 mod places;
 pub mod protocol;
 pub(crate) mod regions;
 pub(crate) mod removal;
-pub(crate) mod scores;
-pub(crate) mod specks;
-pub(crate) mod ssim;
-pub(crate) mod ssim8;
+pub mod scores;
+pub mod specks;
+pub mod ssim;
+pub mod ssim8;
 pub(crate) mod subject;
 
 pub use compared::{Compared, Watch};

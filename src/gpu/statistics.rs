@@ -38,7 +38,7 @@ impl Gpu {
 
     /// Compiles a kernel for subgroups of a size, and returns what the compiler tells of it. `spec` has a word for each
     /// constant of the shader.
-    pub(crate) fn statistics(&self, shader: &'static ShaderDesc, spec: &[u32], size: u32) -> Result<Vec<Statistic>> {
+    pub fn statistics(&self, shader: &'static ShaderDesc, spec: &[u32], size: u32) -> Result<Vec<Statistic>> {
         let Some(functions) = &self.statistics else { return Err(unknown(&self.capabilities)) };
         let pipeline = Pipeline::new(self, shader, spec, self.pinned(shader, size))?;
         // A compute pipeline is one executable.

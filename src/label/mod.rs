@@ -5,7 +5,7 @@
 
 pub mod masks;
 pub mod occlusion;
-pub(crate) mod vote;
+pub mod vote;
 
 pub use vote::decide::Decision;
 pub use vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};

@@ -7,7 +7,7 @@ use crate::shaders::{self, ShaderDesc};
 
 /// A kernel as compiled for one subgroup size.
 #[derive(Clone, Debug)]
-pub(crate) struct CompiledKernel {
+pub struct CompiledKernel {
     /// Name of the variant, such as `blend_forward_labels`.
     pub name: &'static str,
     /// Subgroup size.
@@ -17,7 +17,7 @@ pub(crate) struct CompiledKernel {
 }
 
 /// Names under which drivers (Mesa's for AMD and Intel, NVIDIA's) tell the same figure.
-pub(crate) const FIGURES: [(&str, &[&str]); 7] = [
+pub const FIGURES: [(&str, &[&str]); 7] = [
     ("registers", &["VGPRs", "Register Count", "Max live registers"]),
     ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size"]),
     ("shared B", &["LDS size", "Shared Memory Size", "Workgroup Memory Size"]),
@@ -29,21 +29,21 @@ pub(crate) const FIGURES: [(&str, &[&str]); 7] = [
 
 impl CompiledKernel {
     /// Sum of the statistics with these names; `None` if the driver tells none of them.
-    pub(crate) fn figure(&self, names: &[&str]) -> Option<f64> {
+    pub fn figure(&self, names: &[&str]) -> Option<f64> {
         let values =
             self.statistics.iter().filter(|found| names.contains(&found.name.as_str())).map(|found| found.value);
         values.fold(None, |sum, value| Some(sum.unwrap_or(0.0) + value))
     }
 
     /// Registers that did not fit, and were put into memory.
-    pub(crate) fn spills(&self) -> f64 {
+    pub fn spills(&self) -> f64 {
         FIGURES.iter().find(|(name, _)| *name == "spills").and_then(|(_, names)| self.figure(names)).unwrap_or(0.0)
     }
 }
 
 /// Compiles every variant of every kernel with the default constants: for each subgroup size that the device offers, and
 /// with emulated subgroups. `gpu` must be open for statistics.
-pub(crate) fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
+pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
     let (own, is_cpu) = (&gpu.capabilities().subgroup, gpu.is_cpu());
     let own_sizes = [8, 16, 32, 64].into_iter().filter(|size| !own.is_emulated && (own.min..=own.max).contains(size));
     let shapes = own_sizes.map(|size| KernelShape::new(size, is_cpu));

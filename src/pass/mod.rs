@@ -3,7 +3,7 @@
 //! Start with [`training_step`]: it lists all stages of a step.
 
 mod blend;
-pub(crate) mod build;
+pub mod build;
 pub(crate) mod densify;
 mod gather;
 mod kernels;
@@ -11,14 +11,14 @@ mod lift;
 pub(crate) mod loss;
 pub(crate) mod optimize;
 pub(crate) mod project;
-pub(crate) mod scan;
+pub mod scan;
 pub(crate) mod shape;
-pub(crate) mod sort;
-pub(crate) mod stage;
+pub mod sort;
+pub mod stage;
 mod tile;
 
 pub use build::Builder;
-pub(crate) use kernels::{CompiledKernel, FIGURES, compiled_kernels};
+pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
 pub use shape::KernelShape;
 

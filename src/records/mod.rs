@@ -1,8 +1,8 @@
 //! What a training leaves for later ones: checkpoints, blocks, occluders, compiled pipelines.
 
-pub(crate) mod block_file;
-pub(crate) mod checkpoint;
-pub(crate) mod checkpoint_folder;
+pub mod block_file;
+pub mod checkpoint;
+pub mod checkpoint_folder;
 pub(crate) mod occlusion_table;
 pub(crate) mod pipeline_file;
 

@@ -3,7 +3,7 @@
 //! [`render()`] draws the model of an [`Engine`] from a [`Camera`]. [`RenderOptions`] has near plane, background and
 //! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
 
-pub(crate) mod large;
+pub mod large;
 pub(crate) mod pictures;
 
 pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};

@@ -10,7 +10,7 @@ mod depths;
 mod finish;
 pub(crate) mod history;
 pub(crate) mod info;
-pub(crate) mod models;
+pub mod models;
 mod objects;
 pub(crate) mod observer;
 mod occluders;

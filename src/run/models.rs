@@ -50,7 +50,7 @@ pub(crate) fn open(path: &Path) -> Result<ReadModel> {
 }
 
 /// Opens a model as [`open`] does, without reading it if it can stay in its file.
-pub(crate) fn open_lazily(path: &Path) -> Result<LazyModel> {
+pub fn open_lazily(path: &Path) -> Result<LazyModel> {
     let path = &file_of(path)?;
     let model = LazyModel::open(path)?;
     if let LazyModel::Whole(read) = &model {
@@ -60,7 +60,7 @@ pub(crate) fn open_lazily(path: &Path) -> Result<LazyModel> {
 }
 
 /// Looks at each row of a model that was opened from `path`, and logs the notes of the reader.
-pub(crate) fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> Result<()> {
+pub fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> Result<()> {
     log_notes(&file_of(path)?, &model.scan(see)?);
     Ok(())
 }

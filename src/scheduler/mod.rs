@@ -4,14 +4,14 @@
 //! so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
 
 mod guard;
-pub(crate) mod plan;
+pub mod plan;
 pub(crate) mod profiler;
 mod recorder;
 mod recording;
 mod storage;
 mod transfer;
 
-pub(crate) use profiler::{PassTime, Profiler};
+pub use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};

@@ -7,7 +7,7 @@ const WARM_UP: usize = 2;
 
 /// Times of one pass label.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PassTime {
+pub struct PassTime {
     /// Label of the pass.
     pub label: String,
     /// Number of items with this label in the list.
@@ -22,7 +22,7 @@ pub(crate) struct PassTime {
 
 /// Collects the timings of one list.
 #[derive(Clone, Debug)]
-pub(crate) struct Profiler {
+pub struct Profiler {
     seen: usize,
     warm_up: usize,
     /// Labels in the order of the list.
@@ -39,17 +39,17 @@ impl Default for Profiler {
 
 impl Profiler {
     /// Creates an empty profiler.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self::with_warm_up(WARM_UP)
     }
 
     /// Creates a profiler that ignores the first `warm_up` steps.
-    pub(crate) fn with_warm_up(warm_up: usize) -> Self {
+    pub fn with_warm_up(warm_up: usize) -> Self {
         Self { seen: 0, warm_up, order: Vec::new(), items: HashMap::new(), samples: HashMap::new() }
     }
 
     /// Adds the [`Scheduler::timings`](super::Scheduler::timings) of a step; the first steps are ignored.
-    pub(crate) fn add(&mut self, timings: &[(String, u64)]) {
+    pub fn add(&mut self, timings: &[(String, u64)]) {
         self.seen += 1;
         if self.seen <= self.warm_up || timings.is_empty() {
             return;
@@ -75,7 +75,7 @@ impl Profiler {
     }
 
     /// Returns one row per label, in the order of the list.
-    pub(crate) fn rows(&self) -> Vec<PassTime> {
+    pub fn rows(&self) -> Vec<PassTime> {
         let mut rows = Vec::new();
         for label in &self.order {
             let Some(samples) = self.samples.get(label) else { continue };

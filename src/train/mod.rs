@@ -14,19 +14,19 @@
 //! `context`, what a step uses; `input`, photos and masks of a step; `strategy` and `shared`; `between`, the work between steps;
 //! `report` and `state`. `refit` and `alignment` are trainings of their own.
 
-pub(crate) mod alignment;
+pub mod alignment;
 pub(crate) mod between;
 mod context;
 mod extension;
-pub(crate) mod input;
+pub mod input;
 pub(crate) mod objective;
-pub(crate) mod refit;
+pub mod refit;
 mod report;
 pub(crate) mod settings;
-pub(crate) mod setup;
-pub(crate) mod shared;
-pub(crate) mod state;
-pub(crate) mod strategy;
+pub mod setup;
+pub mod shared;
+pub mod state;
+pub mod strategy;
 mod trainer;
 
 pub use crate::pass::{Builder, Extension, Hook};
@@ -44,8 +44,8 @@ pub use state::TrainState;
 pub use strategy::{At, Densified, Population, Strategy};
 pub use trainer::Trainer;
 
-pub(crate) use alignment::aligned;
-pub(crate) use refit::{REFIT_STEPS, refitted};
+pub use alignment::aligned;
+pub use refit::{REFIT_STEPS, refitted};
 pub(crate) use setup::first_model::go_on_from;
 pub(crate) use setup::start_size;
 pub(crate) use trainer::StepTimes;

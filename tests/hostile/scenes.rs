@@ -2,7 +2,7 @@
 
 use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions, initial_gaussians};
 

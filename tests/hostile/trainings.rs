@@ -2,12 +2,12 @@
 
 use crate::support::device;
 use assert_cmd::Command;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::Trainer;
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, LabelMap, Photo, View};
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::Trainer;
 use std::path::Path;
 
 /// Four views of 40 x 30 px with masks.

@@ -7,10 +7,10 @@ use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::{Buf, Work};
 use labelgs::render::{RenderOptions, render};
 use labelgs::scene::Gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Buf, Work};
 
 fn shape(gaussians: usize, width: u32, height: u32) -> Shape {
     Shape { gaussians, width, height, opacities: (0.0, 4.0), ..Shape::default() }

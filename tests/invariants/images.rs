@@ -4,14 +4,14 @@ use super::training::{small, train, train_with};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::Error;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::PlanOptions;
+use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::render::{Parts, RenderOptions, render};
 use labelgs::run::LabelRule;
 use labelgs::scene::{Camera, Gaussians, LabelMap};
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::PlanOptions;
 
 /// Guards behind the buffers are checked after each run.
 fn guarded() -> SchedulerOptions {

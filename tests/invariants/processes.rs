@@ -2,8 +2,8 @@
 
 use super::training::train;
 use crate::support::device;
-use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::run::LabelRule;
+use labelgs::scheduler::SchedulerOptions;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
 

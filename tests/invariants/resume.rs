@@ -4,15 +4,16 @@ use super::training::{budgeted, config, labels_of, small};
 use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
 use labelgs::formats::write_model;
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::records::checkpoint::Plane;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{StepReport, TrainState, Trainer};
+use labelgs::records::checkpoint::Plane;
 use labelgs::run::{LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::Dataset;
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::train::state::TrainState;
+use labelgs::train::{StepReport, Trainer};
 use std::path::Path;
 
 /// Densification, opacity resets, votes and occluder updates before and after step 30, all at different steps.
@@ -131,7 +132,7 @@ fn a_training_without_masks_goes_on_to_the_same_bits() {
 #[test]
 fn a_training_that_memory_bounds_goes_on_to_the_same_bits() {
     let Some(turn) = device() else { return };
-    let room = labelgs::internals::train::engine_size(&small(), &long(LabelRule::Votes), 600).expect("views");
+    let room = labelgs::train::setup::engine_size(&small(), &long(LabelRule::Votes), 600).expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     let options = SchedulerOptions { memory_limit: Some(limit), ..SchedulerOptions::default() };
     let free = go_on(

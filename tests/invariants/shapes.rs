@@ -4,8 +4,8 @@ use crate::pass::fixture::{Fixture, GRADIENTS};
 use crate::support::compare::{Band, Tolerance, check, close_with_band, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::scheduler::plan::Buf;
+use labelgs::pass::KernelShape;
+use labelgs::scheduler::plan::Buf;
 
 fn crowd() -> Scene {
     scene(201, &Shape { gaussians: 300, width: 61, height: 45, opacities: (-4.0, 8.0), ..Shape::default() })

@@ -3,16 +3,16 @@
 use crate::support::compare::{check, exact};
 use crate::support::device;
 use crate::support::device::Turn;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
 use labelgs::formats::write_model;
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::{Capacity, PlanOptions};
-use labelgs::internals::train::{StepReport, Trainer};
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Capacity, PlanOptions};
 use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::{StepReport, Trainer};
 
 /// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
 /// reset.
@@ -183,7 +183,7 @@ fn a_memory_limit_bounds_the_gaussians() {
     let free = train(&turn, LabelRule::Votes, SchedulerOptions::default(), |_| ());
     let (start, end) = free.counts;
     // Room for half of the growth.
-    let room = labelgs::internals::train::engine_size(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2)
+    let room = labelgs::train::setup::engine_size(&small(), &config(LabelRule::Votes), (start + end) as u64 / 2)
         .expect("views");
     let limit = Engine::predict(&turn.gpu(), &room, SchedulerOptions::default()).expect("it fits").total;
     assert!(limit < free.memory, "{limit} bytes bound nothing: {} were used", free.memory);

@@ -1,9 +1,9 @@
 //! Checkpoint files: exact round trips, and damaged files refused.
 
 use super::fixtures::*;
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::records::checkpoint::{Checkpoint, Plane, VERSION};
-use labelgs::internals::records::checkpoint_folder;
+use labelgs::cli::support::exit_status::exit_status;
+use labelgs::records::checkpoint::{Checkpoint, Plane, VERSION};
+use labelgs::records::checkpoint_folder;
 use serde_json::json;
 use std::fs;
 

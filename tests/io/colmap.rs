@@ -2,7 +2,7 @@
 
 use super::fixtures::*;
 use glam::{DQuat, DVec3};
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions};
 use std::fs;

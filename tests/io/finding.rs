@@ -1,7 +1,7 @@
 //! Photos at other places than the scene lists, photos that are missing, and files that are no photos.
 
 use super::fixtures::*;
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions, Lookup};
 use std::fs;

@@ -1,6 +1,6 @@
 //! Small scenes in temporary folders.
 
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

@@ -1,13 +1,13 @@
 //! The first Gaussians of a scene.
 
 use glam::{DMat3, DVec3};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::train::first_model;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::run::{StrategyKind, TrainConfig};
 use labelgs::scene::harmonics::SH_C0;
 use labelgs::scene::{Camera, Dataset, Photo, Point, View};
 use labelgs::scenes::init::add_far_gaussians;
 use labelgs::scenes::initial_gaussians;
+use labelgs::train::first_model;
 
 fn point(x: f64, y: f64, z: f64) -> Point {
     Point { position: DVec3::new(x, y, z), colour: [255, 0, 51] }

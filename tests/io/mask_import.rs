@@ -2,9 +2,9 @@
 
 use super::fixtures::*;
 use super::mask_forms::*;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::files::LabelTable;
 use labelgs::files::label_table::FILE;
-use labelgs::internals::cli::status::exit_status;
 use labelgs::masks::{Format, ImportOptions, Imported, Overlap, import, read_mask};
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions};

@@ -2,8 +2,8 @@
 
 use super::fixtures::*;
 use glam::{DMat3, DVec3};
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::files::{atomic, image as images};
-use labelgs::internals::cli::status::exit_status;
 use labelgs::scene::Camera;
 use labelgs::scenes::camera_json;
 use std::fs;

@@ -2,9 +2,9 @@
 
 use super::fixtures::*;
 use glam::DVec2;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::files::image::{photo_size, write_png_grey16};
 use labelgs::files::read_photo;
-use labelgs::internals::cli::status::exit_status;
 use labelgs::scene::{Dataset, Photo};
 use labelgs::scenes::lens::{Lens, Polynomial, Projection};
 use labelgs::scenes::{self, LoadOptions};

@@ -3,7 +3,7 @@
 use crate::support::device;
 use crate::support::device::options;
 use labelgs::gpu::{Gpu, GpuOptions, PipelineStore};
-use labelgs::internals::pass::KernelShape;
+use labelgs::pass::KernelShape;
 use labelgs::records::PipelineFolder;
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ fn a_device_saves_what_it_compiled_and_takes_it_back() {
         let messages = gpu.message_log();
         let room = labelgs::engine::EngineSize::new(10, (16, 16));
         let mut engine = labelgs::engine::Engine::with_shape(gpu, shape, room, Default::default()).expect("an engine");
-        engine.list(labelgs::internals::engine::ListKey::Render { sh_degree: 0, label_rounds: 0 }).expect("pipelines");
+        engine.list(labelgs::engine::run::ListKey::Render { sh_degree: 0, label_rounds: 0 }).expect("pipelines");
         drop(engine);
         assert!(messages.messages().is_empty(), "{:?}", messages.messages());
         device

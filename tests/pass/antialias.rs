@@ -4,9 +4,9 @@ use super::fixture::{prove, readable};
 use crate::support::device;
 use crate::support::device::Turn;
 use crate::support::scenes::Scene;
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::verify::selftest::antialias::{Antialiased, Smoothed, around, fine};
-use labelgs::internals::verify::selftest::fixture::Fixture;
+use labelgs::pass::KernelShape;
+use labelgs::verify::selftest::antialias::{Antialiased, Smoothed, around, fine};
+use labelgs::verify::selftest::fixture::Fixture;
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
     Fixture::new(turn.gpu(), scene, false, KernelShape::of(turn.capabilities()), readable())

@@ -5,7 +5,7 @@ use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::engine::{Engine, EngineSize};
-use labelgs::internals::pass::KernelShape;
+use labelgs::pass::KernelShape;
 use labelgs::render::{RenderOptions, Rendered, label_map, render};
 
 #[test]

@@ -8,8 +8,8 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{Band, GradientBounds, Tolerance, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::verify::selftest::judge;
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::judge;
 
 /// Faint to opaque, so that pixels stop and alphas are clamped.
 pub fn opaque_scene(seed: u64) -> Scene {

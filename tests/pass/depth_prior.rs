@@ -6,7 +6,7 @@ use crate::reference::disagreement::depth_error;
 use crate::support::compare::{check, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::internals::scheduler::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 /// Weight of the depths, far above that of the photo.
 const WEIGHT: f64 = 1e5;

@@ -5,8 +5,8 @@ use crate::reference::disagreement::disagreement;
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::internals::scheduler::plan::Buf;
 use labelgs::run::LabelRule;
+use labelgs::scheduler::plan::Buf;
 
 /// Gradients of the photo are 1e-5 of those of the labels, and both are sums in f32; 0.6 of it seen.
 pub(super) const BOUNDS: GradientBounds = GradientBounds {

@@ -7,11 +7,11 @@ use crate::support::compare::{Verdict, check};
 use crate::support::device::Turn;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
-use labelgs::internals::engine::{ListKey, Report};
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::verify::selftest::fixture;
+use labelgs::engine::run::{ListKey, Report};
+use labelgs::pass::KernelShape;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
 pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};

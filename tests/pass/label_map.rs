@@ -8,12 +8,12 @@ use crate::support::compare::Tolerance;
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::engine::Engine;
-use labelgs::internals::engine::ListKey;
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::verify::selftest::judge;
+use labelgs::engine::run::ListKey;
+use labelgs::pass::KernelShape;
 use labelgs::render::{Parts, RenderOptions, label_map, render};
 use labelgs::scene::Gaussians;
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::judge;
 
 /// Faint Gaussians of `objects` labels and none, many of them in each tile and pixel.
 fn haze(objects: u32) -> Scene {

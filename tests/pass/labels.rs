@@ -8,10 +8,10 @@ use crate::reference::{Row, Rules};
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, dot, plain_camera};
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::train::step_input;
-use labelgs::internals::verify::selftest::model::{Lifted, dominant};
 use labelgs::scene::Gaussians;
+use labelgs::scheduler::plan::Buf;
+use labelgs::train::input::step_input;
+use labelgs::verify::selftest::model::{Lifted, dominant};
 
 #[test]
 fn lift_equals_its_mirror_with_and_without_the_filter() {

@@ -5,7 +5,7 @@ use crate::reference::loss::photo_loss;
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::internals::scheduler::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 /// Sums of 121 f32 products of the window, twice; SSIM divides by variances that are small differences. Seen: 0.75 of
 /// (1e-5, 1e-5) by element, 0.31 of 1e-5 as a whole.

@@ -9,11 +9,11 @@ use crate::reference::step::{Target, splats_of, step};
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, population, scene};
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::train::step_input::SceneScale;
-use labelgs::internals::verify::selftest::judge;
-use labelgs::internals::verify::selftest::model::{Densified, Fog, Reset, large, scene_of};
 use labelgs::run::StrategyKind;
+use labelgs::scheduler::plan::Buf;
+use labelgs::train::input::step_input::SceneScale;
+use labelgs::verify::selftest::judge;
+use labelgs::verify::selftest::model::{Densified, Fog, Reset, large, scene_of};
 
 /// Parameters and moments of the trained Gaussians.
 fn states(fixture: &mut Fixture) -> Vec<Optimised> {

@@ -10,9 +10,9 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::internals::scheduler::plan::Buf;
-use labelgs::internals::shaders::constants::KEY_INVISIBLE;
-use labelgs::internals::verify::selftest::judge;
+use labelgs::scheduler::plan::Buf;
+use labelgs::shaders::constants::KEY_INVISIBLE;
+use labelgs::verify::selftest::judge;
 
 /// Half of the Gaussians far outside, so that slopes are clamped and many are culled; some behind the near plane.
 pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {

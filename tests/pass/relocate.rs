@@ -7,12 +7,11 @@ use crate::reference::relocate::regularised;
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
 use crate::support::device::Turn;
-use crate::support::scenes::Scene;
-use crate::support::scenes::{Shape, population, scene};
-use labelgs::internals::pass::KernelShape;
-use labelgs::internals::verify::selftest::fixture::Fixture;
-use labelgs::internals::verify::selftest::model::scene_of;
-use labelgs::internals::verify::selftest::relocation::{COPIES, Explored, MOVES, Relocated, TERMS};
+use crate::support::scenes::{Scene, Shape, population, scene};
+use labelgs::pass::KernelShape;
+use labelgs::verify::selftest::fixture::Fixture;
+use labelgs::verify::selftest::model::scene_of;
+use labelgs::verify::selftest::relocation::{COPIES, Explored, MOVES, Relocated, TERMS};
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
     Fixture::new(turn.gpu(), scene, true, KernelShape::of(turn.capabilities()), readable())

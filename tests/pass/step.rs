@@ -7,7 +7,7 @@ use crate::reference::{Row, Rules};
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
-use labelgs::internals::verify::selftest::judge;
+use labelgs::verify::selftest::judge;
 
 /// Errors of all passes add up; 0.89 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
 const BOUNDS: GradientBounds = GradientBounds {

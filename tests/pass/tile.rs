@@ -7,7 +7,7 @@ use crate::reference::sort::radix_sort;
 use crate::reference::tile::{TileGrid, tile_lengths, tile_ranges, tiles_within, touched_tiles};
 use crate::support::compare::{Summary, check, exact};
 use crate::support::device;
-use labelgs::internals::scheduler::plan::Buf;
+use labelgs::scheduler::plan::Buf;
 
 /// Log2 units that the device's test may err on the side of one tile too many: 0.01, and 2e-6 of the exponent's terms.
 const SLACK: f64 = 0.02;

@@ -6,10 +6,10 @@ use crate::reference::lift::{vote, vote_alone};
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
-use labelgs::internals::label::vote::ballot::{Sweep, Voter, sweep};
-use labelgs::internals::train::strategy::weights;
+use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::label::vote_engine;
 use labelgs::scene::{LabelMap, Photo, View};
+use labelgs::train::strategy::weights::weights;
 use std::collections::BTreeMap;
 
 /// More labels than a walk counts and than the engine has columns for, many of them in one tile.

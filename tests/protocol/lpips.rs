@@ -1,10 +1,10 @@
 //! LPIPS with weights for which the distance is known.
 
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
+use labelgs::eval::lpips::convolution::{Layer, Planes, convolve, halve};
+use labelgs::eval::lpips::{CHANNELS, STAGES, Weights};
 use labelgs::eval::{Distance, Rendering, evaluate};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::eval::lpips::convolution::{Layer, Planes, convolve, halve};
-use labelgs::internals::eval::lpips::{CHANNELS, STAGES, Weights};
 use labelgs::render::RenderOptions;
 use labelgs::scene::Photo;
 use labelgs::scenes::init::initial_gaussians;

@@ -5,11 +5,11 @@ mod lpips;
 mod refusals;
 mod rules;
 
+use labelgs::cli::support::exit_status::exit_status;
+use labelgs::eval::protocol::score::Drawn;
 use labelgs::eval::protocol::{Ask, Bench, By, Layout, Painter, Protocol, Report, run};
 use labelgs::files::image::write_png_grey8;
 use labelgs::files::{LabelEntry, LabelTable};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::eval::protocol::score::Drawn;
 use labelgs::scene::{Camera, LabelMap, Photo, View};
 use labelgs::scenes::truth::{files_below, read_truth};
 use labelgs::{Error, Result};

@@ -1,11 +1,11 @@
 //! Rules of scoring: missing predictions, empty selections, variants of the published scorers, and the HTML page.
 
 use super::{Columns, columns_file, run_on, view};
+use labelgs::cli::support::exit_status::exit_status;
+use labelgs::eval::page::Page;
 use labelgs::eval::protocol::{By, Protocol};
 use labelgs::eval::{Compared, Watch};
 use labelgs::files::image::{read_grey, write_png_grey8};
-use labelgs::internals::cli::status::exit_status;
-use labelgs::internals::eval::page::Page;
 use labelgs::scenes::truth::read_truth;
 use std::collections::BTreeMap;
 use tempfile::tempdir;

@@ -1,7 +1,7 @@
 //! Every injected failure of Vulkan ends in an error, never in a crash or a hang.
 
 use super::*;
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 use std::process::Command;
 
 const CHILD: &str = "LABELGS_FAULT_CHILD";

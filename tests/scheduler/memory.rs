@@ -2,7 +2,7 @@
 
 use super::*;
 use labelgs::Error;
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 
 toy_shader!(
     overrun,

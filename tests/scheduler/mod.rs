@@ -9,13 +9,13 @@ mod replay;
 mod shaders;
 
 use crate::support::{device, toy};
-use labelgs::internals::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList, PlanOptions};
-use labelgs::internals::scheduler::{Scheduler, SchedulerOptions};
-use labelgs::internals::shaders::{Access, BindingKind, ShaderDesc};
+use labelgs::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList, PlanOptions};
+use labelgs::scheduler::{Scheduler, SchedulerOptions};
+use labelgs::shaders::{Access, BindingKind, ShaderDesc};
 
 /// Buffers of the toy passes.
 mod table {
-    use labelgs::internals::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
+    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
     labelgs::buffers! { consts;
         MODEL "model": 4, Domain::Gaussians, Class::Model, Some(TexelFormat::R32Uint), "Kept.";
         PLANES "planes": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept vectors.";

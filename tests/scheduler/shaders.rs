@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::support::device::options as gpu_options;
+use labelgs::cli::support::exit_status::exit_status;
 use labelgs::gpu::{Gpu, GpuOptions};
-use labelgs::internals::cli::status::exit_status;
 
 toy_shader!(
     fetch,
@@ -157,12 +157,10 @@ fn nothing_is_left_when_the_device_is_dropped() {
 fn the_lists_of_the_engine_can_be_prepared() {
     let Some(gpu) = device() else { return };
     for texel in [false, true] {
-        let shape = labelgs::internals::pass::KernelShape::of(gpu.capabilities());
-        let (capacity, lists) =
-            crate::scheduler::plan::engine_lists(labelgs::internals::pass::KernelShape { texel, ..shape });
+        let shape = labelgs::pass::KernelShape::of(gpu.capabilities());
+        let (capacity, lists) = crate::scheduler::plan::engine_lists(labelgs::pass::KernelShape { texel, ..shape });
         let with = SchedulerOptions { timestamps: true, poison_step: true, ..SchedulerOptions::default() };
-        let mut scheduler =
-            Scheduler::new(gpu.gpu(), labelgs::internals::scheduler::plan::TABLE, capacity, with).unwrap();
+        let mut scheduler = Scheduler::new(gpu.gpu(), labelgs::scheduler::plan::TABLE, capacity, with).unwrap();
         let ids = scheduler.prepare_all(&lists.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(ids.len(), lists.len());
     }

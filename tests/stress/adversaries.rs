@@ -29,7 +29,7 @@ fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     let mut fixture = Fixture::new(turn, scene, labels);
     fixture.train();
     let pixels = fixture.pixels();
-    let image = fixture.get::<[f32; 4]>(labelgs::internals::scheduler::plan::Buf::IMAGE, pixels);
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
     let actual = fixture.gradient_rows();
     let (model, camera, mut target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());
     if !labels {
@@ -155,7 +155,7 @@ fn rotations_of_length_zero_are_counted_and_not_drawn() {
     assert!((1..=10).contains(&counters.unprojected_count), "{counters:?}");
     assert!(fixture.gradient_rows().iter().all(|row| row.floats().iter().all(|value| value.is_finite())));
     let pixels = fixture.pixels();
-    let image = fixture.get::<[f32; 4]>(labelgs::internals::scheduler::plan::Buf::IMAGE, pixels);
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
     assert!(image.iter().flatten().all(|value| value.is_finite()));
 }
 
@@ -275,7 +275,7 @@ fn harmonics_that_overflow_f32_are_counted_and_leave_no_nan() {
     assert!(counters.unprojected_count > 0 && counters.nonfinite_count > 0, "{counters:?}");
     assert!(counters.unprojected_first.is_multiple_of(8), "{counters:?}");
     let pixels = fixture.pixels();
-    let image = fixture.get::<[f32; 4]>(labelgs::internals::scheduler::plan::Buf::IMAGE, pixels);
+    let image = fixture.get::<[f32; 4]>(labelgs::scheduler::plan::Buf::IMAGE, pixels);
     assert!(image.iter().flatten().all(|value| value.is_finite()), "a pixel is not finite");
     assert!(image.iter().flatten().any(|value| *value > 1e30), "what is a float is drawn");
     assert!(fixture.gradient_rows().iter().flat_map(|row| row.floats()).all(f64::is_finite));

@@ -4,13 +4,13 @@ use crate::support::device;
 use glam::DVec3;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::formats::{read_model, write_model};
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::Trainer;
 use labelgs::render::{Parts, RenderOptions, render};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians, View};
 use labelgs::scenes::initial_gaussians;
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
+use labelgs::train::Trainer;
 use std::sync::Arc;
 
 /// UTM coordinates of a place in Bavaria, m.

@@ -1,6 +1,6 @@
 //! Predicates of the tests.
 
-pub use labelgs::internals::verify::selftest::compare::*;
+pub use labelgs::verify::selftest::compare::*;
 
 /// Panics with the verdict's text.
 #[track_caller]

@@ -7,4 +7,4 @@ pub mod runs;
 pub mod toy;
 
 pub use device::device;
-pub use labelgs::internals::verify::selftest::scenes;
+pub use labelgs::verify::selftest::scenes;

@@ -2,8 +2,8 @@
 
 use assert_cmd::Command;
 use labelgs::formats::read_model;
-use labelgs::internals::records::checkpoint_folder::{self, Found};
-use labelgs::internals::train::TrainState;
+use labelgs::records::checkpoint_folder::{self, Found};
+use labelgs::train::state::TrainState;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};

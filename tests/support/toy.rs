@@ -1,7 +1,7 @@
 //! Shaders compiled by the test that uses them.
 
 use crate::shadergen::tool::{interface, reflect};
-use labelgs::internals::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 
 /// Compiles GLSL (without the version line) and describes its bindings: (name, access, kind, bytes of an element).
 pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access, BindingKind, u32)]) -> ShaderDesc {

@@ -2,7 +2,7 @@
 
 use crate::shadergen::compile::{Define, GlslCompiler, Purpose};
 use crate::shadergen::{interface, reflect};
-use labelgs::internals::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 use labelgs::{Error, Result};
 use std::path::Path;
 

@@ -3,11 +3,11 @@
 use super::measure::timed;
 use super::trained::{timed_step, timing_config};
 use labelgs::gpu::Gpu;
-use labelgs::internals::pass::Stage;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::Trainer;
+use labelgs::pass::Stage;
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians};
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::train::Trainer;
 use labelgs::{Error, Result};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -8,11 +8,10 @@ use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
-use labelgs::internals::scheduler::SchedulerOptions;
 use labelgs::render::{NEAR, RenderOptions, render};
 use labelgs::scene::{Dataset, Gaussians};
-use labelgs::synth;
-use labelgs::synth::SynthOptions;
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::synth::{self, SynthOptions};
 use serde_json::{Value, json};
 use std::sync::Arc;
 

@@ -3,11 +3,11 @@
 use super::measure::{Cost, timed};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
-use labelgs::internals::scheduler::SchedulerOptions;
-use labelgs::internals::train::{StepReport, Trainer, first_model};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians};
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
+use labelgs::train::{StepReport, Trainer, first_model};
 use std::sync::Arc;
 
 /// One view in this many of a made scene is held out.

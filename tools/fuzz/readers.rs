@@ -1,19 +1,15 @@
 //! For each target: the other files of its folder, the reader, and checks of its result.
 
 use super::seeds;
-use labelgs::Result;
-use labelgs::files::LabelTable;
-use labelgs::files::image;
-use labelgs::formats;
-use labelgs::internals::cli::profile_compare::{Profile, compare};
-use labelgs::internals::eval::lpips::weights::read_tensors;
-use labelgs::internals::records::checkpoint::Checkpoint;
-use labelgs::masks::mask;
-use labelgs::masks::{Format, ImportOptions, import};
+use labelgs::cli::commands::profile::compare::{Profile, compare};
+use labelgs::eval::lpips::weights::read_tensors;
+use labelgs::files::{LabelTable, image};
+use labelgs::masks::{Format, ImportOptions, import, mask};
 use labelgs::records::OcclusionTable;
+use labelgs::records::checkpoint::Checkpoint;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo};
-use labelgs::scenes::{self, DepthFolder, Frames, LoadOptions};
-use labelgs::scenes::{camera_json, points};
+use labelgs::scenes::{self, DepthFolder, Frames, LoadOptions, camera_json, points};
+use labelgs::{Result, formats};
 use std::path::Path;
 
 pub fn put(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) {
@@ -156,7 +152,7 @@ pub fn photo(_: &Path, file: &Path) -> Result<()> {
 
 pub fn checkpoint(_: &Path, file: &Path) -> Result<()> {
     Checkpoint::read(file)?;
-    labelgs::internals::train::TrainState::read(file).map(|_| ())
+    labelgs::train::state::TrainState::read(file).map(|_| ())
 }
 
 pub fn config(_: &Path, file: &Path) -> Result<()> {

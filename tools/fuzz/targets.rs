@@ -7,9 +7,9 @@
 use super::readers::*;
 use super::seeds;
 use labelgs::gpu::PipelineStore;
-use labelgs::internals::records::checkpoint::VERSION;
 use labelgs::masks::Format;
 use labelgs::records::PipelineFolder;
+use labelgs::records::checkpoint::VERSION;
 use labelgs::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};

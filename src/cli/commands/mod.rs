@@ -17,7 +17,7 @@ pub(crate) mod masks;
 pub(crate) mod merge;
 pub(crate) mod occlusion;
 pub(crate) mod plan;
-pub(crate) mod profile;
+pub mod profile;
 pub(crate) mod recolour;
 pub(crate) mod relabel;
 pub(crate) mod render;

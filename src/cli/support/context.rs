@@ -53,6 +53,6 @@ impl Context {
 }
 
 /// Reads a model, or the last model in the folder of a run, and logs the notes of the reader.
-pub fn open_model(path: &Path) -> Result<Gaussians> {
+pub(crate) fn open_model(path: &Path) -> Result<Gaussians> {
     models::open(path).map(|read| read.gaussians)
 }

@@ -2,7 +2,7 @@
 
 pub(crate) mod args;
 pub(crate) mod context;
-pub(crate) mod exit_status;
+pub mod exit_status;
 pub(crate) mod label_choice;
 pub(crate) mod log;
 pub(crate) mod model_drawer;
@@ -11,9 +11,9 @@ pub(crate) mod model_fit;
 pub(crate) mod model_format;
 pub(crate) mod number_errors;
 pub(crate) mod parsers;
-pub(crate) mod scene;
+pub mod scene;
 pub(crate) mod scoring;
-pub(crate) mod setting_names;
+pub mod setting_names;
 pub(crate) mod settings;
 pub(crate) mod shell_words;
 pub(crate) mod signals;

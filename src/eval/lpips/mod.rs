@@ -4,8 +4,8 @@
 //! scaled to length 1. The squared differences of the channels are weighted, summed over channels, averaged over
 //! pixels, and summed over stages.
 
-pub(crate) mod convolution;
-pub(crate) mod weights;
+pub mod convolution;
+pub mod weights;
 
 use crate::error::{Error, Result, Setting};
 use crate::eval::protocol::score::Distance;

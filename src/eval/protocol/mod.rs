@@ -12,7 +12,7 @@ mod nvos;
 pub(crate) mod paint;
 pub(crate) mod report;
 pub(crate) mod run;
-pub(crate) mod score;
+pub mod score;
 mod select;
 
 pub use bench::Bench;

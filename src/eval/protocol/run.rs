@@ -13,6 +13,7 @@ use crate::scene::View;
 use crate::scenes::truth::photo_at;
 
 /// Returns the largest number of pictures that [`run`] renders, without prompts.
+#[cfg(feature = "cli")]
 pub(crate) fn picture_count(layout: &Layout) -> u64 {
     layout.tasks.iter().map(|task| task.truths.len() as u64).sum()
 }

@@ -40,6 +40,7 @@ pub fn sights(engine: &mut Engine, views: &[&View], near: f32) -> Result<Vec<Sig
 }
 
 /// Returns the number of pictures that [`removals`] shows.
+#[cfg(feature = "cli")]
 pub(crate) fn picture_count(views: &[&View]) -> u64 {
     2 * views.iter().filter_map(|view| view.mask.as_ref()).map(|mask| mask.objects().len() as u64).sum::<u64>()
 }

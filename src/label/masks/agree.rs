@@ -11,7 +11,7 @@ use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
 /// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
-pub(crate) const MIN_VIEWS: usize = 2;
+pub const MIN_VIEWS: usize = 2;
 
 /// The options of [`agree`].
 #[derive(Clone, Copy, Debug)]

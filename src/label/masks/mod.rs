@@ -1,10 +1,10 @@
 //! Masks that agree between views: [`track`] connects frames of a video by overlap, [`agree`] connects views by the
 //! Gaussians of a model.
 
-pub(crate) mod agree;
-pub(crate) mod associate;
-pub(crate) mod names;
-pub(crate) mod repair;
+pub mod agree;
+pub mod associate;
+pub mod names;
+pub mod repair;
 pub(crate) mod track;
 
 pub use agree::{Agreement, agree, follow};

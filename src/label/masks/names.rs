@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Returns the names of the objects in repaired masks: for each, the name of most of its pixels in the masks before.
 /// `pairs` are masks before and after. Names that several objects have get numbers.
-pub(crate) fn carried<'a>(
+pub fn carried<'a>(
     known: &LabelTable,
     pairs: impl Iterator<Item = (&'a LabelMap, &'a LabelMap)>,
 ) -> BTreeMap<u16, String> {

@@ -8,13 +8,13 @@
 
 mod contour;
 mod depths;
-pub(crate) mod draw;
+pub mod draw;
 mod hull;
-pub(crate) mod mean;
+pub mod mean;
 
 pub use contour::{Rule, by_contour};
 pub use depths::from_depths;
-pub(crate) use draw::picture;
+pub use draw::picture;
 pub use mean::by_mean;
 pub(crate) use mean::distances;
 

@@ -66,7 +66,7 @@ impl Index {
     }
 
     /// Returns true without any Gaussian.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
 

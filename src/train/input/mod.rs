@@ -6,5 +6,5 @@ pub(crate) mod known_depths;
 pub(in crate::train) mod part;
 pub(in crate::train) mod prefetch;
 pub(in crate::train) mod sampler;
-pub(crate) mod step_input;
+pub mod step_input;
 pub(in crate::train) mod views;

@@ -2,7 +2,7 @@
 
 pub(in crate::train) mod first_model;
 pub(crate) mod near_plane;
-pub(crate) mod region;
+pub mod region;
 
 use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::{Error, Result};

@@ -6,8 +6,8 @@
 //! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
 //! comes.
 
-pub(crate) mod exposure;
-pub(crate) mod poses;
+pub mod exposure;
+pub mod poses;
 mod preconditioner;
 
 use crate::engine::SharedRow;

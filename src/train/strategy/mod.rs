@@ -1,13 +1,13 @@
 //! Strategies that change the set of Gaussians between steps: [`StrategyKind`] names them. Another one implements
 //! [`Strategy`] and goes into [`TrainerOptions`](super::TrainerOptions).
 
-pub(crate) mod adc;
+pub mod adc;
 pub(crate) mod budget;
 pub(crate) mod exchange;
 pub(crate) mod mcmc;
 pub(crate) mod passes;
-pub(crate) mod population;
-pub(crate) mod weights;
+pub mod population;
+pub mod weights;
 
 use adc::AdcStrategy;
 use budget::BudgetStrategy;

@@ -1,7 +1,7 @@
 //! Checks a plan by brute force, from the rules of Vulkan and independent of the planner.
 
 use super::*;
-use labelgs::internals::scheduler::plan::{Class, Use};
+use labelgs::scheduler::plan::{Class, Use};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
 

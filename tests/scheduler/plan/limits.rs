@@ -2,7 +2,7 @@
 
 use super::*;
 use labelgs::Error;
-use labelgs::internals::cli::status::exit_status;
+use labelgs::cli::support::exit_status::exit_status;
 
 fn plan_with(list: &PassList, limits: &Limits) -> labelgs::Result<Plan> {
     Plan::new(table::TABLE, &capacity(), list, limits, PlanOptions::default())

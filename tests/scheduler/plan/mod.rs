@@ -4,16 +4,16 @@ mod checker;
 mod limits;
 
 use checker::Random;
-use labelgs::internals::pass;
-use labelgs::internals::pass::{KernelShape, Supervision, Variant};
-use labelgs::internals::scheduler::plan::{
+use labelgs::pass;
+use labelgs::pass::{KernelShape, Supervision, Variant};
+use labelgs::scheduler::plan::{
     Buf, Capacity, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan, PlanOptions, TABLE, Work,
 };
-use labelgs::internals::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc};
+use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc};
 
 /// Buffers of the random lists: all classes, and sizes that do not divide each other.
 mod table {
-    use labelgs::internals::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
+    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
     labelgs::buffers! { consts;
         MODEL "model": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept.";
         LABELS "labels": 4, Domain::Gaussians, Class::Model, None, "Kept.";

@@ -1,13 +1,11 @@
 //! The float64 step of the tests (`src/verify/reference`), by blocks of the picture on all cores, so that scenes of the
 //! benchmark's size take seconds. Without labels.
 
-use labelgs::internals::verify::reference::blend;
-use labelgs::internals::verify::reference::blend::{Margins, Upstream};
-use labelgs::internals::verify::reference::loss::photo_loss;
-use labelgs::internals::verify::reference::project;
-use labelgs::internals::verify::reference::splat::{Splat, SplatGradient};
-use labelgs::internals::verify::reference::{Model, Row, Rules, sort};
-use labelgs::internals::verify::selftest::scenes::Scene;
+use labelgs::verify::reference::blend::{self, Margins, Upstream};
+use labelgs::verify::reference::loss::photo_loss;
+use labelgs::verify::reference::splat::{Splat, SplatGradient};
+use labelgs::verify::reference::{Model, Row, Rules, project, sort};
+use labelgs::verify::selftest::scenes::Scene;
 use rayon::prelude::*;
 
 /// Side of a block, px.
@@ -56,9 +54,7 @@ impl<'a> View<'a> {
         let seen = |gaussian| {
             let projection = project::project_forward(rules, camera, &model, gaussian)?;
             let size = (camera.width as usize, camera.height as usize);
-            labelgs::internals::verify::reference::tile::cull(rules, &projection.splat, size)
-                .touches
-                .then_some(projection)
+            labelgs::verify::reference::tile::cull(rules, &projection.splat, size).touches.then_some(projection)
         };
         let found: Vec<_> = (0..model.rows.len()).into_par_iter().filter_map(seen).collect();
         let order = sort::depth_sort(&found.iter().map(|projection| projection.splat.depth).collect::<Vec<_>>());

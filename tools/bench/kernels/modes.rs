@@ -3,8 +3,8 @@
 //! A macro takes the place of a constant of `glsl/include/constants.glsl`, or of a function of GLSL.
 
 use crate::compiler::{GLSL, spirv, texel_define};
-use labelgs::internals::scheduler::plan::{PassList, Work};
-use labelgs::internals::shaders::ShaderDesc;
+use labelgs::scheduler::plan::{PassList, Work};
+use labelgs::shaders::ShaderDesc;
 use labelgs::{Error, Result};
 use std::collections::HashMap;
 use std::fs;

@@ -4,7 +4,7 @@ use super::errors::Errors;
 use super::measure::SceneResult;
 use super::modes::Mode;
 use crate::measure::table;
-use labelgs::internals::pass::Stage;
+use labelgs::pass::Stage;
 
 /// Stages with a column of their own.
 const STAGES: [Stage; 7] = [

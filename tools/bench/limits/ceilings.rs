@@ -3,10 +3,8 @@
 use crate::compiler::shader;
 use labelgs::Result;
 use labelgs::gpu::Gpu;
-use labelgs::internals::scheduler::plan::{
-    Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat,
-};
-use labelgs::internals::scheduler::{Scheduler, SchedulerOptions};
+use labelgs::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
+use labelgs::scheduler::{Scheduler, SchedulerOptions};
 use serde::Serialize;
 use std::sync::Arc;
 

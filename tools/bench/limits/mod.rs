@@ -12,9 +12,8 @@ use super::trained::{TEST_EVERY, plain_model, without_masks};
 use super::{Common, device};
 use ceilings::Ceilings;
 use labelgs::Result;
-use labelgs::internals::pass::{KernelShape, Stage};
-use labelgs::synth;
-use labelgs::synth::SynthOptions;
+use labelgs::pass::{KernelShape, Stage};
+use labelgs::synth::{self, SynthOptions};
 use serde_json::{Value, json};
 
 /// Work of a stage.

@@ -1,6 +1,6 @@
 //! `labelgs profile`.
 
-pub(crate) mod compare;
+pub mod compare;
 pub(crate) mod report;
 pub(crate) mod timed;
 
