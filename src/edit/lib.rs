@@ -1,6 +1,6 @@
 //! Chooses and changes the labels of a model, without a device.
 //!
-//! A [`Catalogue`] resolves ids and names, and [`choose`] resolves points, boxes and masks in a view. [`extract`],
+//! A [`Catalogue`] resolves ids and names, and [`choose()`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
 //! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
 //! moves a model; [`summarise`] lists the labels.

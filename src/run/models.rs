@@ -49,7 +49,7 @@ pub(crate) fn open(path: &Path) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// Opens a model as [`open`] does, without reading it if it can stay in its file.
+/// Opens a model as `open` does, without reading it if it can stay in its file.
 pub fn open_lazily(path: &Path) -> Result<LazyModel> {
     let path = &file_of(path)?;
     let model = LazyModel::open(path)?;

@@ -13,7 +13,7 @@ const COUNT_MIN: usize = 5;
 pub struct Spread {
     /// Medians of the coordinates.
     pub middle: DVec3,
-    /// Distance from the middle within which [`WITHIN`] of the positions lie.
+    /// Distance from the middle within which `WITHIN` of the positions lie.
     pub radius: f64,
 }
 

@@ -165,7 +165,7 @@ impl Dataset {
     }
 
     /// Returns the radius of the training cameras around their mean, times 1.1 (as in 3DGS), world units; 1 if it is
-    /// only rounding errors. Cameras beyond [`EXTENT_RADII`] do not count.
+    /// only rounding errors. Cameras beyond `EXTENT_RADII` do not count.
     pub fn extent(&self) -> f64 {
         let all = self.train.iter().map(|view| view.camera.centre());
         let spread = Spread::of(all.clone());

@@ -1,8 +1,8 @@
 //! Scenes: posed photos with masks, as reconstructions and data sets store them.
 //!
-//! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses, a [`recipe`] says how a
+//! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses, a `recipe` says how a
 //! photo becomes a view ([`lens`], [`window`], size), and the photos that memory cannot hold stay in files
-//! ([`photo_store`]). [`capture`] looks for faults of photos and poses, [`initial_gaussians`] makes the first Gaussians.
+//! (`photo_store`). [`capture`] looks for faults of photos and poses, [`initial_gaussians`] makes the first Gaussians.
 //!
 //! To add a reader, add a file beside `llff` that returns a `Listing`, and a case in `list`.
 

@@ -59,8 +59,8 @@ impl Window {
 
     /// Returns the views of a photo, whose camera has the size of its file.
     ///
-    /// A lens up to [`ONE_VIEW`] becomes one view with the scale of the middle of the photo and the field of view between
-    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show [`KEPT`] of
+    /// A lens up to `ONE_VIEW` becomes one view with the scale of the middle of the photo and the field of view between
+    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show `KEPT` of
     /// that. Wider lenses and panoramas become faces of 90 degrees at that scale, without what the photo does not cover.
     pub fn all(name: &str, camera: &Camera, lens: &Lens) -> Vec<Self> {
         let optics = Optics::new(camera.clone(), *lens);

@@ -1,7 +1,7 @@
 //! Makes posed test scenes with complete ground truth, ray-traced from analytic shapes.
 //!
 //! [`write()`] writes photos, masks of visible and of whole objects, objects alone, depth and points to files.
-//! [`dataset`] keeps photos and masks in memory, and [`spoil`] puts faults into masks. The scenes are not made of
+//! [`dataset`] keeps photos and masks in memory, and [`spoil()`] puts faults into masks. The scenes are not made of
 //! Gaussians, so a score on them does not compare the engine with itself.
 
 pub mod cameras;

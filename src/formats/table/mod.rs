@@ -1,4 +1,4 @@
-//! PLY files as tables; [`super::ply`] reads models from them.
+//! PLY files as tables; `super::ply` reads models from them.
 //!
 //! The crate `ply-rs-bw` reads and writes headers; their length is limited. Rows are decoded here, column by column, in
 //! any order and of any scalar type: a 3DGS file has 62 columns and millions of rows, and the row reader of the crate

@@ -1,4 +1,4 @@
-//! Masks that agree between views: [`track`] connects frames of a video by overlap, [`agree`] connects views by the
+//! Masks that agree between views: [`track`] connects frames of a video by overlap, [`agree()`] connects views by the
 //! Gaussians of a model.
 
 pub mod agree;
