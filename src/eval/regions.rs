@@ -84,7 +84,7 @@ pub(super) struct Witnesses {
 impl Witnesses {
     /// Renders the depth of every training view.
     pub(super) fn new(subject: &mut dyn Subject, train: &[View], options: RenderOptions) -> Result<Self> {
-        let mut shelf = Shelf::new();
+        let mut shelf = Shelf::default();
         let depth = |view: &View| {
             let of_depth = RenderOptions { parts: Parts::DEPTH, sh_degree: Some(0), ..options };
             let depth = subject.render(&view.camera, &of_depth)?.mean_depth()?;

@@ -49,7 +49,7 @@ impl Sample {
     }
 
     /// Number of points.
-    pub fn len(&self) -> usize {
+    pub fn point_count(&self) -> usize {
         self.points.len()
     }
 

@@ -7,15 +7,15 @@ pub const COEFFICIENTS: usize = 15;
 
 /// The basis function of degree 0.
 pub const SH_C0: f64 = 0.282_094_791_773_878_14;
-const SH_C1: f64 = 0.488_602_511_902_919_92;
+const SH_C1: f64 = 0.488_602_511_902_919_9;
 const SH_C2_0: f64 = 1.092_548_430_592_079_2;
 const SH_C2_2: f64 = 0.315_391_565_252_520_05;
-const SH_C2_4: f64 = 0.546_274_215_296_039_59;
-const SH_C3_0: f64 = 0.590_043_589_926_643_52;
-const SH_C3_1: f64 = 2.890_611_442_640_553_8;
-const SH_C3_2: f64 = 0.457_045_799_464_465_77;
+const SH_C2_4: f64 = 0.546_274_215_296_039_6;
+const SH_C3_0: f64 = 0.590_043_589_926_643_5;
+const SH_C3_1: f64 = 2.890_611_442_640_554;
+const SH_C3_2: f64 = 0.457_045_799_464_465_8;
 const SH_C3_3: f64 = 0.373_176_332_590_115_46;
-const SH_C3_5: f64 = 1.445_305_721_320_276_9;
+const SH_C3_5: f64 = 1.445_305_721_320_277;
 
 /// Returns the coefficient of degree 0 that shows a value, 0 to 1.
 pub fn sh0_of(value: f64) -> f32 {

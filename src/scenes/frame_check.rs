@@ -42,11 +42,11 @@ fn find(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Res
     let views = dataset.all();
     let mut found = Found::default();
     let sample = Sample::new(&views, dataset.points.iter().copied())?;
-    if sample.len() < POINTS_MIN || views.len() < 2 {
+    if sample.point_count() < POINTS_MIN || views.len() < 2 {
         return Ok(found);
     }
     let as_is = sample.agreement(|_| ());
-    let is_empty = as_is.in_median_picture * sample.len() as f64 <= 1.0;
+    let is_empty = as_is.in_median_picture * sample.point_count() as f64 <= 1.0;
     if !is_doubtful(&as_is, is_empty) {
         found.notes.extend(blind(&sample, &views, &as_is));
         return Ok(found);

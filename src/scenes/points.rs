@@ -2,7 +2,7 @@
 
 use super::listing::FAR;
 use glam::DVec3;
-use labelgs_formats::table::Table;
+use labelgs_formats::ply_table::Table;
 use labelgs_scene::{Error, Point, Result};
 use std::path::Path;
 

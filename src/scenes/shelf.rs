@@ -16,12 +16,13 @@ pub struct Shelf {
     scratch: Arc<Scratch>,
 }
 
-impl Shelf {
-    /// Makes an empty one.
-    pub fn new() -> Self {
+impl Default for Shelf {
+    fn default() -> Self {
         Self::of(MEMORY)
     }
+}
 
+impl Shelf {
     fn of(memory: u64) -> Self {
         Self { left: memory, scratch: Arc::new(Scratch::new(&system_folder())) }
     }

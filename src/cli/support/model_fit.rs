@@ -34,7 +34,7 @@ pub(crate) fn warn_of_misfit(path: &Path, model: &Gaussians, dataset: &Dataset) 
         colour: model.sh0[row].map(|value| to_byte(0.5 + SH_0 * value)),
     };
     let sample = Sample::new(&views, opaque.iter().map(point))?;
-    if sample.len() < GAUSSIANS_MIN || views.is_empty() {
+    if sample.point_count() < GAUSSIANS_MIN || views.is_empty() {
         return Ok(());
     }
     let found = sample.agreement(|_| ());

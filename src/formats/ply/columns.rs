@@ -1,7 +1,7 @@
 //! The columns of a 3DGS PLY: which of them are read, and which are named because they would change the picture.
 
+use crate::ply_table::Table;
 use crate::rows::Rows;
-use crate::table::Table;
 use labelgs_scene::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -12,7 +12,7 @@ pub(super) use joined::fitting;
 pub use joined::write_joined;
 
 use super::format::{ModelFormat, ReadModel};
-use super::table::Table;
+use crate::ply_table::Table;
 use columns::Columns;
 use decode::Decoder;
 use glam::DVec3;

@@ -2,8 +2,8 @@
 //! only read: its readers refuse any further element, so labels have no place.
 
 use crate::format::ReadModel;
+use crate::ply_table::Elements;
 use crate::rows::{Row, Rows};
-use crate::table::Elements;
 use crate::values::logit_of_byte;
 use labelgs_scene::harmonics::sh0_of;
 use labelgs_scene::{Error, Result};

@@ -3,8 +3,8 @@
 use super::columns::Columns;
 use super::decode::Decoder;
 use super::{add_notes, is_antialiased, origin, packed};
+use crate::ply_table::Table;
 use crate::rows::{Row, Sieve};
-use crate::table::Table;
 use glam::DVec3;
 use labelgs_scene::{Error, Gaussians, Result};
 use std::path::{Path, PathBuf};
