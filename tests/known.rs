@@ -159,11 +159,11 @@ fn a_model_in_the_place_of_a_checkpoint_is_refused() {
 fn a_training_that_prunes_everything_says_so() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--config", &place.settings(), "--min-opacity", "0.999"];
+    let flags = ["--config", &place.settings(), "--set", "opacity_lr=1", "--set", "opacity_weight=1000"];
     let output = place.trained("out", &flags);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     let said = stderr(&output);
-    assert!(said.contains("after step 8") && said.contains("--min-opacity"), "{said}");
+    assert!(said.contains("after step 8") && said.contains("poses do not fit"), "{said}");
     assert!(!said.contains("goes back"), "the same would come again: {said}");
     assert!(!place.checkpoints("out").is_empty(), "the checkpoint before is still there");
 }
