@@ -2,25 +2,15 @@
 
 mod axes;
 mod checkpoint;
-mod colmap;
-mod depths;
-mod finding;
+#[path = "../src/scenes/tests/fixtures.rs"]
+#[allow(dead_code, reason = "tests of readers use the rest")]
 pub mod fixtures;
-mod foreign;
 mod formats;
-mod frames;
 mod init;
-mod label_table;
 mod mask_check;
 mod mask_forms;
 mod mask_import;
 mod mask_tools;
-mod masks;
-mod model;
 mod output;
-mod photos;
 mod pipeline_file;
 mod ply;
-mod poses;
-mod splits;
-mod transforms;

@@ -217,10 +217,16 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
     assert!(without.1 < with.1, "{without:?} {with:?}");
 }
 
-/// The file of a module of the tests, such as `cli_long` or `scheduler::faults`.
+/// The file of a module of the tests, such as `cli_long` or `scheduler::faults`, or of the tests of a crate, such as
+/// `scenes::colmap`.
 fn module_file(path: &[&str]) -> Option<PathBuf> {
+    let (first, rest) = path.split_first()?;
+    let in_crate =
+        rest.iter().fold(Path::new(ROOT).join("src").join(first).join("tests"), |folder, part| folder.join(part));
     let place = path.iter().fold(Path::new(ROOT).join("tests"), |folder, part| folder.join(part));
-    [place.with_extension("rs"), place.join("mod.rs")].into_iter().find(|file| file.is_file())
+    [place.with_extension("rs"), place.join("mod.rs"), in_crate.with_extension("rs")]
+        .into_iter()
+        .find(|file| file.is_file())
 }
 
 /// Each test and module that `tests/README.md` names exists.

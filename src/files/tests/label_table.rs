@@ -1,7 +1,7 @@
 //! labels.json: round trips, and invalid tables refused.
 
-use labelgs::files::label_table::FILE;
-use labelgs::files::{LabelEntry, LabelTable};
+use labelgs_files::label_table::FILE;
+use labelgs_files::{LabelEntry, LabelTable};
 use std::fs;
 
 fn table() -> LabelTable {

@@ -1,8 +1,8 @@
 //! Splits that a data set brings.
 
 use super::fixtures::*;
-use labelgs::scene::{Dataset, View};
-use labelgs::scenes::{self, LoadOptions};
+use labelgs_scene::{Dataset, View};
+use labelgs_scenes::{self as scenes, LoadOptions};
 use std::fs;
 
 fn open(scene: &Scene) -> Dataset {

@@ -1,8 +1,8 @@
 //! Model formats by file extension.
 
 use super::fixtures::*;
-use labelgs::formats::{read_model, write_model};
-use labelgs::scene::Gaussians;
+use labelgs_formats::{read_model, write_model};
+use labelgs_scene::Gaussians;
 
 fn balls() -> Gaussians {
     Gaussians {
@@ -23,7 +23,7 @@ fn an_unknown_extension_is_refused() {
     let bytes = std::fs::read(scene.at("a.PLY")).expect("bytes");
     for name in ["a.obj", "a.ply.bak", "a.usdz", "a.gltf", "a.ksplat", "a"] {
         let error = write_model(scene.at(name), &balls()).expect_err("no format");
-        assert_eq!(labelgs::cli::support::exit_status::exit_status(&error), 2, "{error}");
+        assert!(matches!(error, labelgs_scene::Error::Usage { .. }), "{error}");
         let error = error.to_string();
         assert!(error.contains(".ply, .spz, .glb, .sog, .html") && !scene.path().join(name).exists(), "{error}");
         let read = read_model(scene.write(name, &bytes));

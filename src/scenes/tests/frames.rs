@@ -3,8 +3,8 @@
 use super::fixtures::Scene;
 use glam::{DMat3, DQuat, DVec3};
 use image::{Rgb, RgbImage};
-use labelgs::scene::{Camera, Dataset, Flaw};
-use labelgs::scenes::{self, LoadOptions, Lookup};
+use labelgs_scene::{Camera, Dataset, Flaw};
+use labelgs_scenes::{self as scenes, LoadOptions, Lookup};
 
 const SIZE: u32 = 64;
 const VIEWS: usize = 10;

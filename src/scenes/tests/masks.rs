@@ -1,9 +1,9 @@
 //! Id images: encodings, names, sizes.
 
 use super::fixtures::*;
-use labelgs::masks::read_mask;
-use labelgs::scene::Dataset;
-use labelgs::scenes::{self, LoadOptions};
+use labelgs_masks::read_mask;
+use labelgs_scene::Dataset;
+use labelgs_scenes::{self as scenes, LoadOptions};
 use std::fs;
 use std::path::Path;
 
@@ -18,7 +18,7 @@ fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDep
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");
 }
 
-fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs::Result<Dataset> {
+fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs_scene::Result<Dataset> {
     let masks = Some(scene.path().join("masks"));
     scenes::open(scene.path(), &LoadOptions { masks, max_resolution, test_every: None, ..LoadOptions::default() })
 }

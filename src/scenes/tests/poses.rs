@@ -2,12 +2,12 @@
 
 use super::fixtures::*;
 use glam::{DVec2, DVec3};
-use labelgs::scene::{Camera, Dataset};
-use labelgs::scenes::window::windows;
-use labelgs::scenes::{self, LoadOptions};
+use labelgs_scene::{Camera, Dataset};
+use labelgs_scenes::window::windows;
+use labelgs_scenes::{self as scenes, LoadOptions};
 use std::path::Path;
 
-fn open(scene: &Path) -> labelgs::Result<Dataset> {
+fn open(scene: &Path) -> labelgs_scene::Result<Dataset> {
     scenes::open(scene, &LoadOptions { test_every: None, ..LoadOptions::default() })
 }
 
@@ -130,7 +130,7 @@ fn cameras_of_metashape_are_read_with_their_lens() {
         let bent_x = x * radial + 0.002 * (r2 + 2.0 * x * x) + 2.0 * -0.003 * x * y;
         let bent_y = y * radial + -0.003 * (r2 + 2.0 * y * y) + 2.0 * 0.002 * x * y;
         let expected = DVec2::new(6.0 + 0.5 + bent_x * 10.0 + bent_x * 0.5 + bent_y * 0.2, 4.0 - 0.25 + bent_y * 10.0);
-        let found = windows(scene.path(), &labelgs::scenes::Lookup::default()).expect("windows")["a.png"]
+        let found = windows(scene.path(), &labelgs_scenes::Lookup::default()).expect("windows")["a.png"]
             .optics
             .pixel(DVec3::new(x, y, 1.0))
             .expect("seen");
@@ -149,7 +149,7 @@ fn metashape_has_fisheyes_and_panoramas() {
     let a2 = at.length_squared();
     let radial = 1.0 + 0.1 * a2 + 0.01 * a2 * a2 + 0.001 * a2.powi(3);
     let bent = at.y * radial - 0.003 * (a2 + 2.0 * at.y * at.y) + 2.0 * 0.002 * at.x * at.y;
-    let found = windows(scene.path(), &labelgs::scenes::Lookup::default()).expect("windows")["a.png"]
+    let found = windows(scene.path(), &labelgs_scenes::Lookup::default()).expect("windows")["a.png"]
         .optics
         .pixel(DVec3::new(x, y, 1.0))
         .expect("seen");

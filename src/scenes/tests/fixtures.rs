@@ -1,6 +1,6 @@
 //! Small scenes in temporary folders.
 
-use labelgs::cli::support::exit_status::exit_status;
+use labelgs_scene::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -134,11 +134,11 @@ pub fn simple(count: usize) -> Scene {
 
 /// The text of an error, which must be one of bad input.
 #[track_caller]
-pub fn refusal<T>(result: labelgs::Result<T>) -> String {
+pub fn refusal<T>(result: labelgs_scene::Result<T>) -> String {
     match result {
         Ok(_) => panic!("the input was accepted"),
         Err(error) => {
-            assert_eq!(exit_status(&error), 3, "{error}");
+            assert!(matches!(error, Error::Data { .. } | Error::Read { .. }), "{error}");
             error.to_string()
         }
     }

@@ -1,9 +1,9 @@
 //! Depth maps from every kind of file, brought to their photos.
 
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
-use labelgs::files;
-use labelgs::scene::{Dataset, DepthMap, View};
-use labelgs::scenes::{self, DepthFolder, LoadOptions};
+use labelgs_files as files;
+use labelgs_scene::{Dataset, DepthMap, View};
+use labelgs_scenes::{self as scenes, DepthFolder, LoadOptions};
 use std::path::Path;
 
 const SIZE: (u32, u32) = (12, 8);
@@ -22,9 +22,9 @@ fn open(scene: &Scene, max_resolution: Option<u32>) -> Dataset {
     scenes::open(scene.path(), &options).expect("a scene")
 }
 
-fn read(scene: &Scene) -> labelgs::Result<DepthMap> {
+fn read(scene: &Scene) -> labelgs_scene::Result<DepthMap> {
     let dataset = open(scene, None);
-    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::scenes::Lookup::default())?
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs_scenes::Lookup::default())?
         .read(&dataset.train[0])
 }
 
@@ -135,11 +135,11 @@ fn a_folder_must_have_all_maps() {
     let views: Vec<&View> = dataset.train.iter().collect();
     let folder = scene.path().join("depths");
     assert!(
-        refusal(DepthFolder::open(&folder, scene.path(), &labelgs::scenes::Lookup::default()))
+        refusal(DepthFolder::open(&folder, scene.path(), &labelgs_scenes::Lookup::default()))
             .contains("no such folder")
     );
     scene.write("depths/01.pfm", pfm("-1", f32::to_le_bytes));
-    let depths = DepthFolder::open(&folder, scene.path(), &labelgs::scenes::Lookup::default()).expect("a folder");
+    let depths = DepthFolder::open(&folder, scene.path(), &labelgs_scenes::Lookup::default()).expect("a folder");
     let message = refusal(depths.check_complete(&views));
     assert!(message.contains("2 of 3 photos") && message.contains("00.png, 02.png"), "{message}");
     depths.check_complete(&views[1..2]).expect("01 is there");
@@ -154,7 +154,7 @@ fn maps_follow_the_size_of_the_view() {
     files::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
     assert_eq!(read(&scene).expect("a map").values, values());
     let dataset = open(&scene, Some(6));
-    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs::scenes::Lookup::default())
+    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs_scenes::Lookup::default())
         .expect("a folder");
     let half = folder.read(&dataset.train[0]).expect("a map");
     // The centre of a pixel of half size is a corner of four; the lower right one of them is taken.

@@ -1,7 +1,7 @@
 //! PLY models of other trainers and programs: their columns, labels and headers, and files that are no PLY.
 
 use super::fixtures::*;
-use labelgs::formats::{ReadModel, read_model, write_model};
+use labelgs_formats::{ReadModel, read_model, write_model};
 use std::fs;
 
 /// The columns of a 3DGS PLY of degree 0, and values of a row.

@@ -2,12 +2,12 @@
 
 use super::fixtures::*;
 use glam::DVec3;
-use labelgs::scene::Dataset;
-use labelgs::scenes::{self, LoadOptions};
+use labelgs_scene::Dataset;
+use labelgs_scenes::{self as scenes, LoadOptions};
 
 const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
-fn open(scene: &Scene) -> labelgs::Result<Dataset> {
+fn open(scene: &Scene) -> labelgs_scene::Result<Dataset> {
     scenes::open(scene.path(), &LoadOptions::default())
 }
 

@@ -1,17 +1,17 @@
 //! Photos at other places than the scene lists, photos that are missing, and files that are no photos.
 
 use super::fixtures::*;
-use labelgs::cli::support::exit_status::exit_status;
-use labelgs::scene::Dataset;
-use labelgs::scenes::{self, LoadOptions, Lookup};
+use labelgs_scene::Dataset;
+use labelgs_scene::Error;
+use labelgs_scenes::{self as scenes, LoadOptions, Lookup};
 use std::fs;
 
-fn open_with(scene: &Scene, images: Option<&str>) -> labelgs::Result<Dataset> {
+fn open_with(scene: &Scene, images: Option<&str>) -> labelgs_scene::Result<Dataset> {
     let lookup = Lookup { images: images.map(Into::into), ..Lookup::default() };
     scenes::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() })
 }
 
-fn open(scene: &Scene) -> labelgs::Result<Dataset> {
+fn open(scene: &Scene) -> labelgs_scene::Result<Dataset> {
     open_with(scene, None)
 }
 
@@ -72,7 +72,7 @@ fn the_folder_of_photos_can_be_named() {
         assert_eq!(open_with(&scene, Some(&folder)).expect("a scene").train.len(), 2, "{folder}");
     }
     let error = open_with(&scene, Some("nowhere")).expect_err("no folder");
-    assert_eq!(exit_status(&error), 2);
+    assert!(matches!(error, Error::Usage { .. }));
     assert!(error.to_string().contains("nowhere is no folder"), "{error}");
 }
 

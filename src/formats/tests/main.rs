@@ -1,0 +1,12 @@
+//! Model files, those of other programs too.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
+
+mod extensions; // formats by extension and by first bytes
+#[path = "../../scenes/tests/fixtures.rs"]
+#[allow(dead_code, reason = "most of it is for scenes")]
+mod fixtures;
+mod foreign; // files of other programs
