@@ -159,7 +159,16 @@ fn a_model_in_the_place_of_a_checkpoint_is_refused() {
 fn a_training_that_prunes_everything_says_so() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
-    let flags = ["--config", &place.settings(), "--set", "opacity_lr=1", "--set", "opacity_weight=1000"];
+    let flags = [
+        "--config",
+        &place.settings(),
+        "--set",
+        "strategy=budget",
+        "--set",
+        "opacity_lr=1",
+        "--set",
+        "opacity_weight=1000",
+    ];
     let output = place.trained("out", &flags);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     let said = stderr(&output);

@@ -42,7 +42,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     for part in ["PSNR", "Largest photo loss", "IoU of labels", "Time of a step", "growth ends", "labels begin"] {
         assert!(page.contains(part), "{part}");
     }
-    for part in ["--label-rule votes", "densify_interval", "Device memory", "planned for the last model", "None."] {
+    for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned for the last model", "None."] {
         assert!(page.contains(part), "{part}");
     }
     // A photo, render, label map, mask and difference of the one view that is held out.
