@@ -26,7 +26,7 @@ pub struct StepReport {
 impl StepReport {
     pub(super) fn new(input: &StepInput, view: StepView, config: &TrainConfig, report: Report) -> Self {
         let scale = 1.0 / (3.0 * view.valid_pixels.max(1) as f64);
-        let (counters, lambda) = (&report.counters, f64::from(crate::train::input::step_input::LAMBDA_DSSIM));
+        let (counters, lambda) = (&report.counters, f64::from(step_input::LAMBDA_DSSIM));
         let l1 = f64::from(counters.loss_l1) * scale;
         let ssim = f64::from(counters.loss_ssim) * scale;
         let loss = (1.0 - lambda) * l1 + lambda * (1.0 - ssim);
