@@ -7,7 +7,7 @@
 // Work:    one invocation.
 // Reads:   step, counters
 // Writes:  dispatch_args (blend); failure (sticky bits)
-// Mirror:  none (bookkeeping; tests/overflow.rs)
+// Mirror:  none (bookkeeping; tests/train/overflow.rs)
 
 layout(local_size_x = 1) in;
 layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;

@@ -6,7 +6,7 @@
 // Work:    one invocation.
 // Reads:   counters.instance_count (the need, even beyond capacity)
 // Writes:  on overflow: failure (sticky bit); dispatch_args (splats) become 0
-// Mirror:  none (bookkeeping; tests/overflow.rs)
+// Mirror:  none (bookkeeping; tests/train/overflow.rs)
 
 layout(local_size_x = 1) in;
 layout(constant_id = 3) const uint INSTANCE_CAPACITY = 65536;

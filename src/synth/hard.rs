@@ -1,4 +1,4 @@
-//! Objects that are hard to label. Each has one difficulty; `tests/synth.rs` measures it.
+//! Objects that are hard to label. Each has one difficulty; `tests/truth.rs` measures it.
 
 use super::material::Pattern;
 use super::object::Row;

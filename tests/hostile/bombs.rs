@@ -1,6 +1,6 @@
 //! Files whose header claims more data than the file has, or more than memory holds.
 
-use crate::io::fixtures::{Scene, refusal, simple};
+use crate::scenes::fixtures::{Scene, refusal, simple};
 use crate::support::memory::peak_of;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder,

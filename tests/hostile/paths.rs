@@ -1,6 +1,6 @@
 //! Paths that leave the folder of the scene.
 
-use crate::io::fixtures::{Scene, images_bin, pinhole, refusal};
+use crate::scenes::fixtures::{Scene, images_bin, pinhole, refusal};
 use labelgs::Result;
 use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions};

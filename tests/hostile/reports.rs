@@ -1,6 +1,6 @@
 //! Reported failures of other programs, one test each.
 
-use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
+use crate::scenes::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::files::image::{photo_size, write_png_grey16};
 use labelgs::files::read_photo;
 use labelgs::formats::{read_model, write_model};

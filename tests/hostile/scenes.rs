@@ -1,6 +1,6 @@
 //! Inconsistent scenes, read up to the start of training.
 
-use crate::io::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
+use crate::scenes::fixtures::{ColmapCamera, Scene, images_bin, pinhole, refusal, simple};
 use labelgs::Result;
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::scene::Dataset;

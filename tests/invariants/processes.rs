@@ -66,6 +66,7 @@ fn a_training_is_the_same_on_any_number_of_threads() {
 /// Without an optional feature the bits are the same, because texel and storage reads return the same numbers. Without
 /// pinned subgroups they are those of emulated ones.
 #[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn without_optional_features_a_training_is_the_same() {
     if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
         return;

@@ -1,13 +1,13 @@
 //! The passes of the strategy mcmc.
 
 use super::fixture::{prove, readable};
-use crate::gradient::differences;
 use crate::reference::Row;
 use crate::reference::relocate::regularised;
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
 use crate::support::device::Turn;
 use crate::support::scenes::{Scene, Shape, population, scene};
+use crate::verify::gradient::differences;
 use labelgs::pass::KernelShape;
 use labelgs::verify::selftest::fixture::Fixture;
 use labelgs::verify::selftest::model::scene_of;

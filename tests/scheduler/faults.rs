@@ -62,6 +62,7 @@ fn outcome(fault: &str) -> String {
 }
 
 #[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn failures_become_errors() {
     let Some(turn) = device() else { return };
     // The children have devices of their own; the turn keeps the cores free for them.
@@ -98,6 +99,7 @@ fn outcomes(call: &str, result: &str) -> Vec<String> {
 }
 
 #[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn memory_may_run_out_anywhere() {
     let Some(turn) = device() else { return };
     let outcomes = outcomes("vkAllocateMemory", "DEVICE_MEMORY");
@@ -107,6 +109,7 @@ fn memory_may_run_out_anywhere() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn a_device_may_be_lost_anywhere() {
     let Some(turn) = device() else { return };
     let mut outcomes = outcomes("vkQueueSubmit", "DEVICE_LOST");

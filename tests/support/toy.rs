@@ -1,6 +1,6 @@
 //! Shaders compiled by the test that uses them.
 
-use crate::shadergen::tool::{interface, reflect};
+use crate::shaders::shadergen::tool::{interface, reflect};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, SpecDesc};
 
 /// Compiles GLSL (without the version line) and describes its bindings: (name, access, kind, bytes of an element).

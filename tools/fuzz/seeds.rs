@@ -182,19 +182,19 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
 
 /// A model of another program.
 pub fn golden(name: &str) -> Vec<u8> {
-    golden_file(&format!("formats/{name}"))
+    golden_file("formats", name)
 }
 
 /// A file of masks of another program.
 pub fn golden_mask(name: &str) -> Vec<u8> {
-    golden_file(&format!("masks/{name}"))
+    golden_file("masks", name)
 }
 
-fn golden_file(name: &str) -> Vec<u8> {
+fn golden_file(room: &str, name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     // The fuzzer is a crate of its own, below the engine's.
     let root = if folder.ends_with("tools/fuzz") { folder.join("../..") } else { folder.to_owned() };
-    std::fs::read(root.join("tests/golden").join(name)).expect("a file of the tests")
+    std::fs::read(root.join("src").join(room).join("tests/golden").join(name)).expect("a file of the tests")
 }
 
 /// A model with labels, names and confidences.

@@ -1,5 +1,4 @@
 //! labels.json: round trips, and invalid tables refused.
-#![allow(clippy::disallowed_methods, reason = "the rules of files are those of the library")]
 
 use labelgs_files::label_table::FILE;
 use labelgs_files::{LabelEntry, LabelTable};

@@ -10,3 +10,7 @@ mod extensions; // formats by extension and by first bytes
 #[allow(dead_code, reason = "most of it is for scenes")]
 mod fixtures;
 mod foreign; // files of other programs
+#[allow(dead_code, reason = "pictures are drawn where a device is")]
+mod models;
+mod ply; // the columns of a PLY, whole and damaged
+mod round_trips; // what a format may change, and how bad files are refused

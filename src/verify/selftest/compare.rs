@@ -1,4 +1,4 @@
-//! Comparisons. A failure names the place and the numbers; `tests/compare_self.rs` makes each comparison fail.
+//! Comparisons. A failure names the place and the numbers; `tests/verify/comparisons.rs` makes each comparison fail.
 
 use std::fmt::Debug;
 

@@ -1,0 +1,9 @@
+//! Labels chosen and edited, on Gaussians made by hand.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::too_many_lines,
+    reason = "the rules of files and lengths are those of the library"
+)]
+
+mod fill; // the place of a removed object is closed
+mod labels; // labels by name, pixel and box; parts, specks and colours of a model

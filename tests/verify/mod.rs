@@ -1,0 +1,8 @@
+//! The method in f64, and comparisons with it.
+
+mod axes; // models in other axes, and turned ones, keep their harmonics
+mod comparisons; // the comparisons of all other tests do fail
+pub mod gradient; // gradients of the f64 mirrors, which the kernels are compared with
+mod mirrors; // mirrors against closed forms and brute force
+mod mutants; // a wrong constant in a mirror fails its checks
+mod selftest; // `labelgs selftest` passes, and detects each fault
