@@ -1,5 +1,5 @@
 //! The commands that README.md and the guide show run as they stand, one after the other, in an empty folder. Only the
-//! long trainings are cut short.
+//! long trainings are cut short, and the made scene is smaller.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -60,8 +60,24 @@ fn segment(words: &[String]) -> Vec<String> {
     typed.map(str::to_owned).to_vec()
 }
 
+/// The made scene at half of its size, with fewer photos, and pixels that are named there.
+fn shrink(words: &mut Vec<String>) {
+    if words[1] == "synth" && !words.iter().any(|word| word == "--size") {
+        words.extend(["--size", "160x120", "--views", "16"].map(str::to_owned));
+    }
+    for at in 1..words.len() {
+        if let Some((view, (x, y))) =
+            words[at].split_once(':').and_then(|(view, place)| Some((view, place.split_once(',')?)))
+            && words[at - 1].ends_with("at")
+        {
+            let half = |text: &str| text.parse::<u32>().expect("a pixel") / 2;
+            words[at] = format!("{view}:{},{}", half(x), half(y));
+        }
+    }
+}
+
 /// A training's command with fewer steps.
-fn shortened(words: &mut Vec<String>) {
+fn shorten(words: &mut Vec<String>) {
     match words.iter().position(|word| word == "--iterations") {
         Some(at) => {
             let steps: u32 = words[at + 1].parse().expect("steps");
@@ -107,8 +123,9 @@ fn run(pages: &[PathBuf]) {
                 assert!(is_known, "{}: no command is known for: {line}", page.display());
                 continue;
             }
+            shrink(&mut words);
             if words[1] == "train" {
-                shortened(&mut words);
+                shorten(&mut words);
             }
             let mut command = Command::new(env!("CARGO_BIN_EXE_labelgs"));
             command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", folder.path().join("cache"));

@@ -49,10 +49,12 @@ fn without_a_driver_devices_fails_and_plan_does_not() {
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn required_features_are_missed_by_name() {
     let Some(_gpu) = device() else { return };
+    let place = Place::new();
+    let scene = place.text("scene");
     for (hidden, named) in [("scalar", "scalarBlockLayout"), ("timeline", "timelineSemaphore")] {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_HIDE", hidden).env("LABELGS_VALIDATION", "off");
-        let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+        let output = command.args(["profile", &scene, "--steps", "1"]).output().expect("it runs");
         assert_eq!(output.status.code(), Some(4), "{hidden}: {}", text(&output.stderr));
         assert!(text(&output.stderr).contains(&format!("lacks {named}")), "{hidden}: {}", text(&output.stderr));
     }
@@ -62,7 +64,7 @@ fn required_features_are_missed_by_name() {
     // Without timestamps `profile` cannot measure.
     let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
     command.env("LABELGS_HIDE", "timestamps").env("LABELGS_VALIDATION", "off");
-    let output = command.args(["profile", "--synthetic", "--steps", "1"]).output().expect("it runs");
+    let output = command.args(["profile", &scene, "--steps", "1"]).output().expect("it runs");
     assert_eq!(output.status.code(), Some(4), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("no timestamps"), "{}", text(&output.stderr));
 }
@@ -75,6 +77,7 @@ fn subgroups_that_do_not_serve_are_emulated() {
     if !device().is_some_and(|gpu| gpu.is_cpu()) {
         return;
     }
+    let place = Place::new();
     for (width, hidden) in
         [("256", "size_control,full_subgroups"), ("512", "size_control,full_subgroups"), ("256", "shuffle")]
     {
@@ -86,7 +89,7 @@ fn subgroups_that_do_not_serve_are_emulated() {
             text(&output.stdout)
         };
         assert_eq!(json(&run(&["devices", "--json"]))["devices"][0]["kernels"]["emulated"], true, "{width} {hidden}");
-        run(&["profile", "--synthetic", "--steps", "1"]);
+        run(&["profile", &place.text("scene"), "--steps", "1"]);
     }
 }
 

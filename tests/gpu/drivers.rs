@@ -29,9 +29,11 @@ fn swiftshader() -> Option<Driver> {
     }
 }
 
-/// Lavapipe with vectors of 128 bits, if this is lavapipe. Mesa 25 does not tell vector widths apart in its cache on disk.
+/// Lavapipe with vectors of 128 bits, if this is lavapipe. Mesa 25 does not tell vector widths apart in its cache on disk, so
+/// these have one of their own.
 fn narrow_lavapipe() -> Option<Driver> {
-    let narrow = || vec![("LP_NATIVE_VECTOR_WIDTH", "128".into()), ("MESA_SHADER_CACHE_DISABLE", "true".into())];
+    let cache = concat!(env!("CARGO_TARGET_TMPDIR"), "/narrow-lavapipe");
+    let narrow = || vec![("LP_NATIVE_VECTOR_WIDTH", "128".into()), ("MESA_SHADER_CACHE_DIR", cache.into())];
     device().is_some_and(|turn| turn.is_cpu()).then(narrow)
 }
 

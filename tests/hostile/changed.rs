@@ -1,14 +1,17 @@
 //! Valid files of every kind, changed in one place: each is read, or refused with a reason, in bounded memory.
 //!
-//! Each seed is cut at every length, changed in every byte in four ways, and given hostile numbers at every place:
+//! Each seed is cut at many lengths, changed at many bytes in four ways, and given hostile numbers at many places:
 //! as bytes of every width, and where it is text in place of every number.
 
 use super::targets::{Place, TARGETS, Target};
 use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::LazyLock;
 
-/// Most places of a seed that are changed; longer seeds are changed at evenly spaced places.
-const PLACES: usize = 250;
+/// Most places of a seed that are changed; longer seeds are changed at evenly spaced places. `LABELGS_TEST_PLACES` has another
+/// number.
+static PLACES: LazyLock<usize> =
+    LazyLock::new(|| std::env::var("LABELGS_TEST_PLACES").ok().and_then(|places| places.parse().ok()).unwrap_or(50));
 
 /// Numbers that a field may be given, as text.
 const WORDS: [&str; 11] = [
@@ -44,7 +47,7 @@ fn numbers() -> Vec<Vec<u8>> {
 
 /// Up to [`PLACES`] places below `length`.
 fn places(length: usize) -> impl Iterator<Item = usize> {
-    (0..length).step_by(length.div_ceil(PLACES).max(1))
+    (0..length).step_by(length.div_ceil(*PLACES).max(1))
 }
 
 /// Every change of a file.
@@ -82,7 +85,7 @@ fn words(text: &[u8]) -> Vec<(usize, usize)> {
         }
         at += length.max(1);
     }
-    let step = found.len().div_ceil(PLACES / 4).max(1);
+    let step = found.len().div_ceil(*PLACES / 4).max(1);
     found.into_iter().step_by(step).collect()
 }
 

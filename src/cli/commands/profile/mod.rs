@@ -93,8 +93,8 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         return compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
     }
     let config = decide(args)?;
-    let dataset = open(args, &config)?;
     let gpu = open_gpu(context)?;
+    let dataset = open(args, &config)?;
     let model = match &args.model {
         Some(path) => open_model(path)?,
         None => first_model(&dataset, &config)?,
