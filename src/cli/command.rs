@@ -1,38 +1,13 @@
 //! The command line as a whole: its commands, each with an example that runs where `scene` and `out` are.
 
-use crate::cli::commands::ablate::AblateArgs;
-use crate::cli::commands::benchmark::BenchmarkArgs;
-use crate::cli::commands::blocks::BlocksArgs;
-use crate::cli::commands::check::CheckArgs;
-use crate::cli::commands::clean::CleanArgs;
-use crate::cli::commands::convert::ConvertArgs;
-use crate::cli::commands::devices::DevicesArgs;
-use crate::cli::commands::eval::EvalArgs;
-use crate::cli::commands::extract_remove::{ExtractArgs, RemoveArgs};
-use crate::cli::commands::frames::FramesArgs;
-use crate::cli::commands::kernels::KernelsArgs;
-use crate::cli::commands::label::LabelArgs;
-use crate::cli::commands::list::ListArgs;
-use crate::cli::commands::masks::MasksArgs;
-use crate::cli::commands::merge::MergeArgs;
-use crate::cli::commands::occlusion::OcclusionArgs;
-use crate::cli::commands::plan::PlanArgs;
-use crate::cli::commands::profile::ProfileArgs;
-use crate::cli::commands::recolour::RecolourArgs;
-use crate::cli::commands::relabel::RelabelArgs;
-use crate::cli::commands::render::RenderArgs;
-use crate::cli::commands::report::ReportArgs;
-use crate::cli::commands::selftest::SelftestArgs;
-use crate::cli::commands::simplify::SimplifyArgs;
-use crate::cli::commands::split_components::SplitArgs;
-use crate::cli::commands::synth::SynthArgs;
-use crate::cli::commands::train::args::TrainArgs;
-use crate::cli::commands::transform::TransformArgs;
-use crate::cli::commands::view::ViewArgs;
-use crate::cli::support::args::GlobalArgs;
-use crate::cli::support::settings;
-use crate::version;
-use clap::{CommandFactory, Parser, Subcommand};
+use crate::cli::commands::{
+    ablate, benchmark, blocks, check, clean, convert, devices, eval, extract_remove, frames, kernels, label, list,
+    masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify, split_components,
+    synth, train, transform, view,
+};
+use crate::cli::support::{Context, GlobalArgs, settings};
+use crate::{Result, version};
+use clap::{Arg, ArgAction, ArgMatches, CommandFactory, Parser, Subcommand};
 use std::sync::LazyLock;
 
 const EXIT_STATUSES: &str = "\
@@ -64,128 +39,168 @@ pub enum Command {
     /// Make a test scene: photos with poses, points, masks, outlines of whole objects and depth.
     ///
     /// Example: labelgs synth scene
-    Synth(SynthArgs),
+    Synth(synth::SynthArgs),
     /// Train a model of a scene from its photos. With masks, each Gaussian knows its object.
     ///
     /// Example: labelgs train scene --masks scene/masks --iterations 3000 -o out
-    Train(Box<TrainArgs>),
+    Train(Box<train::args::TrainArgs>),
     /// Score a model against the photos of a scene: PSNR, SSIM and, with masks, IoU.
     ///
     /// Example: labelgs eval out --scene scene --masks scene/masks
-    Eval(Box<EvalArgs>),
+    Eval(Box<eval::EvalArgs>),
     /// Show the labels of a model: Gaussians, position, size and name of each.
     ///
     /// Example: labelgs list out
-    List(ListArgs),
+    List(list::ListArgs),
     /// Write a model of the chosen objects alone.
     ///
     /// Example: labelgs extract out --labels 3 -o object.ply
-    Extract(ExtractArgs),
+    Extract(extract_remove::ExtractArgs),
     /// Write a model without the chosen objects.
     ///
     /// Example: labelgs remove out --labels 3 -o rest.ply
-    Remove(RemoveArgs),
+    Remove(extract_remove::RemoveArgs),
     /// Render pictures, depth or label maps of a model, or of chosen objects.
     ///
     /// Example: labelgs render out --scene scene --only 3 -o pictures
-    Render(RenderArgs),
+    Render(render::RenderArgs),
     /// Write the report of a training anew, or compare several trainings in one page.
     ///
     /// Example: labelgs report out
-    Report(ReportArgs),
+    Report(report::ReportArgs),
     /// Show a model in a browser: from any side, beside its photos, by label; choose, rename, merge and remove objects.
     ///
     /// Example: labelgs view out --scene scene --masks scene/masks --open
-    View(Box<ViewArgs>),
+    View(Box<view::ViewArgs>),
     /// Write a model with the chosen objects in another colour.
     ///
     /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply
     #[command(alias = "recolor")]
-    Recolour(RecolourArgs),
+    Recolour(recolour::RecolourArgs),
     /// Write a model with other label ids.
     ///
     /// Example: labelgs relabel out --map 3=7,4=0 -o relabelled.ply
-    Relabel(RelabelArgs),
+    Relabel(relabel::RelabelArgs),
     /// Write a model in which several labels are one.
     ///
     /// Example: labelgs merge out --labels 3,5 --name group -o merged.ply
-    Merge(MergeArgs),
+    Merge(merge::MergeArgs),
     /// Write a model in which each connected part of a label has a label of its own.
     ///
     /// Example: labelgs split-components out --labels 3 --specks drop -o parts.ply
-    SplitComponents(SplitArgs),
+    SplitComponents(split_components::SplitArgs),
     /// Write a model in another format, by the ending of the file, or a file for each object.
     ///
     /// Example: labelgs convert out scene.spz
-    Convert(ConvertArgs),
+    Convert(convert::ConvertArgs),
     /// Write a model without faint, huge, lonely or far Gaussians.
     ///
     /// Example: labelgs clean out --min-opacity 0.02 --max-gap 10 -o clean.ply
-    Clean(CleanArgs),
+    Clean(clean::CleanArgs),
     /// Write a model with fewer Gaussians: neighbours of a label that the pictures can do without are merged. Prints what
     /// that costs.
     ///
     /// Example: labelgs simplify out --scene scene --psnr-loss 0.2 -o small.ply
-    Simplify(SimplifyArgs),
+    Simplify(simplify::SimplifyArgs),
     /// Write a model turned upright, scaled or moved.
     ///
     /// Example: labelgs transform out --up z --scale 0.5 --origin 0,0,1 -o upright.ply
-    Transform(TransformArgs),
+    Transform(transform::TransformArgs),
     /// Write a model with labels from masks, for a model of any trainer.
     ///
     /// Example: labelgs label out --scene scene --masks scene/masks -o labelled.ply
-    Label(LabelArgs),
+    Label(label::LabelArgs),
     /// Import, check and repair masks before training.
     ///
     /// Example: labelgs masks import scene/masks --scene scene -o imported
-    Masks(MasksArgs),
+    #[command(subcommand)]
+    Masks(masks::MasksVerb),
     /// Look for faults of a capture before training: poses, blur, exposure, white balance, lonely photos, scale. Status
     /// 1 if there are any.
     ///
     /// Example: labelgs check scene
-    Check(CheckArgs),
+    Check(check::CheckArgs),
     /// List which objects hide which in each view, without training.
     ///
     /// Example: labelgs occlusion scene --masks scene/masks --model out -o occlusion.json
-    Occlusion(OcclusionArgs),
+    Occlusion(occlusion::OcclusionArgs),
     /// Render a smooth video through the photos of a scene, as input of an object tracker.
     ///
     /// Example: labelgs frames out --scene scene -o video
-    Frames(FramesArgs),
+    Frames(frames::FramesArgs),
     /// Train a scene in several ways and compare the scores in one table.
     ///
     /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
-    Ablate(Box<AblateArgs>),
+    Ablate(Box<ablate::AblateArgs>),
     /// Train a scene that no one card holds: split it into blocks, join their models.
     ///
     /// Example: labelgs blocks split scene --model out --card 24G --dry-run
-    Blocks(Box<BlocksArgs>),
+    #[command(subcommand)]
+    Blocks(Box<blocks::BlocksVerb>),
     /// Score a model by a published benchmark, with its masks, its choice of objects and its averages.
     ///
     /// Example: labelgs benchmark out --scene scene --protocol binary --truth scene/amodal --objects 3
-    Benchmark(Box<BenchmarkArgs>),
+    Benchmark(Box<benchmark::BenchmarkArgs>),
     /// Show each Vulkan device and whether it meets the requirements.
     ///
     /// Example: labelgs devices
-    Devices(DevicesArgs),
+    Devices,
     /// Check a device: results of every pass against float64, gradients and determinism.
     ///
     /// Example: labelgs selftest
-    Selftest(SelftestArgs),
+    Selftest(selftest::SelftestArgs),
     /// Show the memory, passes and barriers of a training step, without running it.
     ///
     /// Example: labelgs plan --gaussians 500k --size 960x540 --label-samples 10
-    Plan(PlanArgs),
+    Plan(plan::PlanArgs),
     /// Compile every kernel and show its registers, spills and instructions.
     ///
     /// They are what the driver tells. Status 1 if a kernel spills.
     ///
     /// Example: labelgs kernels
-    Kernels(KernelsArgs),
+    Kernels,
     /// Show how long each pass of a training step takes.
     ///
     /// Example: labelgs profile scene --masks scene/masks --steps 50
-    Profile(ProfileArgs),
+    Profile(profile::ProfileArgs),
+}
+
+impl Command {
+    /// Runs the command.
+    pub(super) fn run(&self, context: &Context) -> Result<()> {
+        match self {
+            Self::Synth(args) => synth::run(args, context),
+            Self::Train(args) => train::run(args, context),
+            Self::Eval(args) => eval::run(args, context),
+            Self::List(args) => list::run(args, context),
+            Self::Extract(args) => extract_remove::run_extract(args, context),
+            Self::Remove(args) => extract_remove::run_remove(args, context),
+            Self::Render(args) => render::run(args, context),
+            Self::Report(args) => report::run(args, context),
+            Self::View(args) => view::run(args, context),
+            Self::Recolour(args) => recolour::run(args, context),
+            Self::Relabel(args) => relabel::run(args, context),
+            Self::Merge(args) => merge::run(args, context),
+            Self::SplitComponents(args) => split_components::run(args, context),
+            Self::Convert(args) => convert::run(args, context),
+            Self::Clean(args) => clean::run(args, context),
+            Self::Simplify(args) => simplify::run(args, context),
+            Self::Transform(args) => transform::run(args, context),
+            Self::Label(args) => label::run(args, context),
+            Self::Masks(verb) => verb.run(context),
+            Self::Check(args) => check::run(args, context),
+            Self::Occlusion(args) => occlusion::run(args, context),
+            Self::Frames(args) => frames::run(args, context),
+            Self::Ablate(args) => ablate::run(args, context),
+            Self::Blocks(verb) => verb.run(context),
+            Self::Benchmark(args) => benchmark::run(args, context),
+            Self::Devices => devices::run(context),
+            Self::Selftest(args) => selftest::run(args, context),
+            Self::Plan(args) => plan::run(args, context),
+            Self::Kernels => kernels::run(context),
+            Self::Profile(args) => profile::run(args, context),
+        }
+    }
 }
 
 /// Commands for developers of the engine: the help lists them under a heading of their own.
@@ -196,7 +211,29 @@ static VERSION: LazyLock<String> = LazyLock::new(version::text);
 
 /// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.
 pub fn command() -> clap::Command {
-    Cli::command().after_help(EXIT_STATUSES).long_version(VERSION.as_str()).mut_subcommand("train", settings::in_help)
+    let root = Cli::command().after_help(EXIT_STATUSES).long_version(VERSION.as_str());
+    with_json(root.mut_subcommand("train", settings::in_help))
+}
+
+/// `--json` after the name of a command.
+const JSON_HERE: &str = "json_here";
+
+/// Adds `--json` to all commands that do not define it.
+fn with_json(command: clap::Command) -> clap::Command {
+    if command.has_subcommands() {
+        return command.mut_subcommands(with_json);
+    }
+    if command.get_arguments().any(|arg| arg.get_long() == Some("json")) {
+        return command;
+    }
+    let json = Arg::new(JSON_HERE).long("json").action(ArgAction::SetTrue);
+    command.arg(json.help("Print the result as JSON").help_heading("Output"))
+}
+
+/// Returns true if the added `--json` was typed.
+pub(super) fn has_json(typed: &ArgMatches) -> bool {
+    let here = typed.try_get_one(JSON_HERE).is_ok_and(|flag| flag == Some(&true));
+    here || typed.subcommand().is_some_and(|(_, words)| has_json(words))
 }
 
 /// Returns the command line whose help has the developers' commands under a heading of their own.

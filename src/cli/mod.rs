@@ -7,12 +7,7 @@ pub mod support;
 use crate::error::speak_of;
 use crate::{Error, version};
 use clap::FromArgMatches;
-use command::{Cli, Command, command, with_headings};
-use commands::{
-    ablate, benchmark, blocks, check, clean, convert, devices, eval, extract_remove, frames, kernels, label, list,
-    masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify, split_components,
-    synth, train, transform, view,
-};
+use command::{Cli, command, has_json, with_headings};
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use support::context::Context;
@@ -81,38 +76,7 @@ fn run(args: Vec<OsString>) -> Result<(), Exit> {
     let cli = Cli::from_arg_matches(&typed)?;
     log::start(&cli.global);
     signals::install()?;
-    let context = Context::new(cli.global, cli.json);
-    match cli.command {
-        Command::Ablate(args) => ablate::run(&args, &context),
-        Command::Blocks(args) => blocks::run(&args, &context),
-        Command::Check(args) => check::run(&args, &context),
-        Command::Train(args) => train::run(&args, &context),
-        Command::Render(args) => render::run(&args, &context),
-        Command::View(args) => view::run(&args, &context),
-        Command::Label(args) => label::run(&args, &context),
-        Command::List(args) => list::run(&args, &context),
-        Command::Extract(args) => extract_remove::run_extract(&args, &context),
-        Command::Remove(args) => extract_remove::run_remove(&args, &context),
-        Command::Recolour(args) => recolour::run(&args, &context),
-        Command::Relabel(args) => relabel::run(&args, &context),
-        Command::Merge(args) => merge::run(&args, &context),
-        Command::SplitComponents(args) => split_components::run(&args, &context),
-        Command::Clean(args) => clean::run(&args, &context),
-        Command::Transform(args) => transform::run(&args, &context),
-        Command::Convert(args) => convert::run(&args, &context),
-        Command::Eval(args) => eval::run(&args, &context),
-        Command::Benchmark(args) => benchmark::run(&args, &context),
-        Command::Report(args) => report::run(&args, &context),
-        Command::Frames(args) => frames::run(&args, &context),
-        Command::Occlusion(args) => occlusion::run(&args, &context),
-        Command::Synth(args) => synth::run(&args, &context),
-        Command::Devices(args) => devices::run(&args, &context),
-        Command::Selftest(args) => selftest::run(&args, &context),
-        Command::Simplify(args) => simplify::run(&args, &context),
-        Command::Masks(args) => masks::run(&args, &context),
-        Command::Kernels(args) => kernels::run(&args, &context),
-        Command::Plan(args) => plan::run(&args, &context),
-        Command::Profile(args) => profile::run(&args, &context),
-    }?;
+    let context = Context::new(cli.global, cli.json || has_json(&typed));
+    cli.command.run(&context)?;
     Ok(context.check_rules()?)
 }

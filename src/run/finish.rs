@@ -1,8 +1,9 @@
 //! The records of a run in its folder, and the scores at its end.
 
 use super::history::{Entry, Scored};
+use super::info::Ended;
 use super::pictures::Worst;
-use super::{Event, Run, Summary, info, models, objects, preview, report};
+use super::{Event, Run, Summary, models, objects, preview, report};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::error::Result;
 use crate::eval::evaluate::{Rendering, evaluate};
@@ -106,7 +107,7 @@ impl Run<'_> {
         if !self.stopped {
             self.time_passes(model);
         }
-        info::end(&mut self.info, summary);
+        self.info.ended = Some(Ended { stopped: summary.stopped, seconds: summary.seconds });
         self.write_info()?;
         let out = &self.request.output;
         let path = report::write(std::slice::from_ref(out), &out.join(report::FILE))?;

@@ -2,7 +2,7 @@
 
 use super::history::Entry;
 use super::passes::Pass;
-use super::{Request, Run, Summary};
+use super::{Request, Run};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::files::atomic;
@@ -186,11 +186,6 @@ impl Run<'_> {
             memory.buffers = rows;
         }
     }
-}
-
-/// Ends the record of a run.
-pub(super) fn end(info: &mut Info, &Summary { stopped, seconds, .. }: &Summary) {
-    info.ended = Some(Ended { stopped, seconds });
 }
 
 /// Returns the most memory that this process had, where Linux tells.

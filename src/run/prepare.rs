@@ -5,7 +5,7 @@ use super::checkpoints::Checkpoints;
 use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
-use super::resume::{self, Record, Resumed, absolute};
+use super::resume::{self, Record, Resumed};
 use super::{Inputs, Observer, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
@@ -22,7 +22,7 @@ use crate::scheduler::SchedulerOptions;
 use crate::train::setup::TrainerOptions;
 use crate::train::shared::{Shared, exposure};
 use crate::train::{self, ExposureMode, TrainConfig, Trainer};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -76,10 +76,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     clear(out, &settings)?;
     block::settle(block.as_ref(), resumed.as_ref(), out)?;
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
-    let mut inputs = resumed.as_ref().map_or(request.inputs.clone(), |resumed| resumed.record.inputs.clone());
-    inputs.masks = request.inputs.masks.clone().or(inputs.masks);
-    inputs.ignore = request.inputs.ignore.clone().or(inputs.ignore);
-    inputs.images = request.inputs.images.clone().or(inputs.images);
+    let inputs = resumed.as_ref().map_or(&request.inputs, |resumed| &resumed.record.inputs).clone();
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
@@ -155,13 +152,7 @@ pub(super) fn begin<'a>(
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
     let occlusion = before.or(table.as_ref().map(|table| table.kind.clone()));
     let record = Record {
-        inputs: Inputs {
-            masks: recorded(inputs.masks.as_deref()),
-            ignore: recorded(inputs.ignore.as_deref()),
-            known_depths: recorded(inputs.known_depths.as_deref()),
-            images: inputs.images.as_deref().map(resume::place_of_photos),
-            ..inputs.clone()
-        },
+        inputs: inputs.recorded(),
         occlusion: occlusion.clone(),
         read: settings.read.clone(),
         run: settings.run.clone(),
@@ -195,11 +186,6 @@ pub(super) fn begin<'a>(
         observer,
         stopped: false,
     })
-}
-
-/// Returns the mask folder as a checkpoint stores it. A path that is not Unicode must be given again.
-fn recorded(masks: Option<&Path>) -> Option<PathBuf> {
-    masks.filter(|masks| masks.to_str().is_some()).map(absolute)
 }
 
 /// Makes a trainer with the initial model of the scene, or with a model that was trained before.
@@ -267,14 +253,7 @@ fn facts(request: &Request, masks: Option<&Path>, gpu: &Gpu) -> Vec<(&'static st
         ("device", format!("{} ({} {})", found.name, found.driver_name, found.driver_info)),
         ("subgroups", found.subgroup.to_string()),
     ];
-    if let Some(masks) = masks {
-        facts.push(("masks", masks.display().to_string()));
-    }
-    if let Some(init) = &request.init {
-        facts.push(("init", init.display().to_string()));
-    }
-    if let Some(file) = &request.occluders {
-        facts.push(("occluders", file.display().to_string()));
-    }
+    let named = [("masks", masks), ("init", request.init.as_deref()), ("occluders", request.occluders.as_deref())];
+    facts.extend(named.into_iter().filter_map(|(name, path)| Some((name, path?.display().to_string()))));
     facts
 }

@@ -121,28 +121,28 @@ fn merge(then: &mut Inputs, now: &Inputs) {
         tracing::warn!("{}: {text} in the checkpoint, now {bytes}", Setting("memory_limit"));
         then.memory_limit = Some(bytes);
     }
-    if let Some(masks) = &now.masks {
-        then.masks = Some(absolute(masks));
-    }
-    if let Some(ignore) = &now.ignore {
-        then.ignore = Some(absolute(ignore));
-    }
-    if let Some(depths) = &now.known_depths {
-        then.known_depths = Some(absolute(depths));
-    }
+    let folder = |then: &mut Option<PathBuf>, now: &Option<PathBuf>| *then = now.clone().or(then.take());
+    folder(&mut then.masks, &now.masks);
+    folder(&mut then.ignore, &now.ignore);
+    folder(&mut then.known_depths, &now.known_depths);
+    folder(&mut then.images, &now.images);
     then.max_bad_photos = now.max_bad_photos.or(then.max_bad_photos);
     then.allow_outside |= now.allow_outside;
-    if let Some(images) = &now.images {
-        then.images = Some(place_of_photos(images));
+}
+
+impl Inputs {
+    /// Returns them as a checkpoint stores them: with absolute paths, independent of the working directory.
+    pub(super) fn recorded(&self) -> Self {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        // A path that is not Unicode must be given again.
+        let folder = |path: &Option<PathBuf>| path.as_deref().filter(|path| path.to_str().is_some()).map(absolute);
+        Self {
+            masks: folder(&self.masks),
+            ignore: folder(&self.ignore),
+            known_depths: folder(&self.known_depths),
+            // A folder of the scene keeps its name.
+            images: self.images.as_deref().map(|path| if path.is_dir() { absolute(path) } else { path.to_owned() }),
+            ..self.clone()
+        }
     }
-}
-
-/// Returns a folder of photos as a checkpoint stores it: one of the scene keeps its name.
-pub(super) fn place_of_photos(images: &Path) -> PathBuf {
-    if images.is_dir() { absolute(images) } else { images.to_owned() }
-}
-
-/// Returns an absolute path, independent of the working directory.
-pub(super) fn absolute(folder: &Path) -> PathBuf {
-    std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
 }

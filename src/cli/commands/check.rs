@@ -1,8 +1,6 @@
 //! `labelgs check`: faults of a capture before training.
 
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, ReadArgs};
 use crate::scenes::capture::{Fault, Report, scan};
 use crate::scenes::{self, LoadOptions};
 use crate::words::counted;
@@ -18,12 +16,8 @@ pub struct CheckArgs {
     /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Prints what the scan finds. Fails if it finds a fault.
@@ -37,17 +31,14 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let report = scan(&args.scene, &args.read.lookup(), &dataset)?;
     let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.fault).or_default() += 1);
-    if context.json || args.json.json {
-        let scene = args.scene.display().to_string();
-        stdout::print_json(&json!({ "schema_version": 1, "scene": scene, "counts": counts, "report": report }))?;
-    } else {
-        stdout::print(&table(&report))?;
-    }
+    let scene = args.scene.display().to_string();
+    let found = json!({ "schema_version": 1, "scene": scene, "counts": counts, "report": report });
+    context.show(&found, &table(&report))?;
     if report.findings.is_empty() {
         return Ok(());
     }
     let counts: Vec<String> = counts.iter().map(|(fault, count)| format!("{count} {}", fault.text())).collect();
-    Err(Error::Check(format!("{}: {}", args.scene.display(), counts.join(", "))))
+    Err(Error::Check(format!("{scene}: {}", counts.join(", "))))
 }
 
 fn table(report: &Report) -> String {

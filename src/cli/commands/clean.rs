@@ -1,9 +1,8 @@
 //! `labelgs clean`.
 
 use crate::Result;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{EditArgs, open};
 use crate::cli::support::parsers::{corners, distance, share};
+use crate::cli::support::{Context, EditArgs, Edited};
 use crate::edit::clean::{Cleaning, clean};
 use clap::Args;
 use glam::DVec3;
@@ -14,7 +13,6 @@ use serde_json::json;
 #[command(group(clap::ArgGroup::new("rule").required(true).multiple(true)
     .args(["min_opacity", "max_size", "max_gap", "inside"])))]
 pub struct CleanArgs {
-    /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
     /// Drop Gaussians with a smaller opacity, 0 to 1.
@@ -33,7 +31,7 @@ pub struct CleanArgs {
 
 /// Writes the model without what disturbs.
 pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let (model, known) = args.edit.open()?;
     let CleanArgs { min_opacity, max_size, max_gap, inside, .. } = *args;
     let (cleaned, dropped) = clean(&model, &Cleaning { min_opacity, max_size, max_gap, inside })?;
     tracing::info!(
@@ -43,5 +41,5 @@ pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
         dropped.outside,
         dropped.lonely
     );
-    args.edit.finish(context, (&cleaned, known), model.len(), json!({ "dropped": dropped }))
+    args.edit.finish(context, &Edited::with_labels_of(&cleaned, known, model.len()), json!({ "dropped": dropped }))
 }

@@ -1,12 +1,8 @@
 //! `labelgs convert`.
 
 use crate::Result;
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{Edited, TableArg, Target, open, wants_json};
-use crate::cli::support::model_format::WriteArgs;
 use crate::cli::support::parsers::model_file;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, EditArgs, Edited, TableArg, WriteArgs};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
 use crate::formats::export_model;
@@ -14,7 +10,6 @@ use crate::scene::{Gaussians, UNLABELLED};
 use crate::words::counted;
 use clap::Args;
 use serde_json::json;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// `labelgs convert`.
@@ -30,54 +25,38 @@ pub struct ConvertArgs {
     /// labels. Gaussians without a label go to OUT_000_none.spz.
     #[arg(long, help_heading = "Output")]
     pub per_object: bool,
-    /// How it is written.
     #[command(flatten)]
     pub write: WriteArgs,
-    /// Names.
     #[command(flatten)]
     pub table: TableArg,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes a model in another format.
 pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.model, &args.table)?;
-    let labels: BTreeSet<u32> = known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect();
-    let print_json = wants_json(context, &args.json);
+    let ConvertArgs { model, output, write, table, .. } = args.clone();
+    let edit = EditArgs { model, output, write, table };
+    let (model, known) = edit.open()?;
     if args.per_object {
-        return per_object(args, &model, &known, print_json);
+        return per_object(&edit, &model, &known, context);
     }
-    let edited = Edited { model: &model, table: known.table, of: model.len(), added: 0, labels: &labels };
-    edited.finish(&Target::new((&args.model, &args.output), args.write, print_json), json!({}))
+    let labels = known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect();
+    edit.finish(context, &Edited::new(&model, known.table, model.len(), labels), json!({}))
 }
 
-fn per_object(args: &ConvertArgs, model: &Gaussians, known: &Catalogue, print_json: bool) -> Result<()> {
-    let mut files = Vec::new();
-    let options = args.write.options(&args.model, &args.output)?;
+fn per_object(edit: &EditArgs, model: &Gaussians, known: &Catalogue, context: &Context) -> Result<()> {
+    let (mut files, mut text) = (Vec::new(), String::new());
+    let options = edit.write.options(&edit.model, &edit.output)?;
     for &label in known.gaussians.keys() {
         let name = known.name(label);
-        let path = file_of(&args.output, label, name);
+        let path = file_of(&edit.output, label, name);
         let part = model.filtered(|row| model.label(row) == label);
         let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
         let left_out = export_model(&path, &part, names.as_ref(), options)?;
-        files.push((path, label, name, part.len() as u64 - left_out));
+        let (path, count) = (path.display(), part.len() as u64 - left_out);
+        files.push(json!({ "output": path.to_string(), "label": label, "name": name, "gaussians": count }));
+        text += &format!("{path}: {count} of {}\n", counted(model.len(), "Gaussian"));
     }
-    if print_json {
-        let rows = files.iter().map(|(path, label, name, count)| {
-            json!({ "output": path.display().to_string(), "label": label, "name": name, "gaussians": count })
-        });
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "of": model.len(),
-            "files": rows.collect::<Vec<_>>(),
-        }));
-    }
-    let lines = files
-        .iter()
-        .map(|(path, _, _, count)| format!("{}: {count} of {}\n", path.display(), counted(model.len(), "Gaussian")));
-    stdout::print(&lines.collect::<String>())
+    context.show(&json!({ "schema_version": 1, "of": model.len(), "files": files }), &text)
 }
 
 /// The file of a label: its id and name before the ending. Characters that a file system may refuse become `_`.

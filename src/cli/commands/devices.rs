@@ -1,33 +1,19 @@
 //! `labelgs devices`.
 
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::Context;
 use crate::gpu::{self, Capabilities, Need};
 use crate::pass::KernelShape;
 use crate::{Error, Result};
-use clap::Args;
 use serde_json::{Value, json};
 
-/// `labelgs devices`.
-#[derive(Args, Clone, Debug)]
-pub struct DevicesArgs {
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
-}
-
 /// Prints the devices. Fails if none is usable.
-pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(context: &Context) -> Result<()> {
     let options = context.gpu_options()?;
     let (devices, chosen) = gpu::devices(&options)?;
     let picked = chosen.as_ref().ok().copied();
-    if context.json || args.json.json {
-        let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();
-        stdout::print_json(&json!({ "schema_version": 1, "devices": rows }))?;
-    } else {
-        devices.iter().try_for_each(|device| stdout::print(&to_text(device, picked)))?;
-    }
+    let rows: Vec<Value> = devices.iter().map(|device| to_json(device, picked)).collect();
+    let text: String = devices.iter().map(|device| to_text(device, picked)).collect();
+    context.show(&json!({ "schema_version": 1, "devices": rows }), &text)?;
     match (chosen, devices.is_empty()) {
         (Ok(_), _) => Ok(()),
         (Err(_), true) => Err(Error::NoDevice(
@@ -38,11 +24,6 @@ pub(crate) fn run(args: &DevicesArgs, context: &Context) -> Result<()> {
             Err(Error::NoDevice("none of those listed meets the requirements; lines marked MISSING say why".into()))
         }
     }
-}
-
-/// Returns the kernel shape for a device.
-pub(crate) fn shape_of(device: &Capabilities) -> KernelShape {
-    KernelShape::of(device)
 }
 
 /// Returns the kernel shape as text.
@@ -83,7 +64,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
     text += &needs_text(device);
     if device.missing().is_empty() {
-        text += &format!("   kernels {}\n", shape_text(&shape_of(device)));
+        text += &format!("   kernels {}\n", shape_text(&KernelShape::of(device)));
     } else {
         text += "   cannot be used\n";
     }
@@ -126,7 +107,7 @@ pub(crate) fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
         "needs": needs_json(device),
         "usable": usable,
         "picked": picked == Some(device.index),
-        "kernels": usable.then(|| shape_json(&shape_of(device))),
+        "kernels": usable.then(|| shape_json(&KernelShape::of(device))),
     })
 }
 

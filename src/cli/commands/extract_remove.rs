@@ -1,15 +1,12 @@
 //! `labelgs extract` and `labelgs remove`.
 
 use crate::cli::commands::occlusion::from_model;
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::label_choice::ChooseArgs;
-use crate::cli::support::log::Progress;
-use crate::cli::support::model_edit::{Edited, MinConfidenceArg, Seen, Target, look, open, wants_json};
-use crate::cli::support::model_fit::warn_of_misfit;
-use crate::cli::support::model_format::WriteArgs;
-use crate::cli::support::parsers::{distance, model_file, share};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
+use crate::cli::support::model_edit::look;
+use crate::cli::support::parsers::{distance, share};
+use crate::cli::support::{
+    ChooseArgs, Context, EditArgs, Edited, MinConfidenceArg, Progress, Seen, near_plane, open_gpu, open_model,
+    open_scene, warn_of_misfit,
+};
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
 use crate::edit::fill::{Filled, Light, fill};
@@ -24,43 +21,16 @@ use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// What `labelgs extract` and `labelgs remove` have in common.
-#[derive(Args, Clone, Debug)]
-pub struct SelectArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
-    #[arg(value_name = "MODEL")]
-    pub model: PathBuf,
-    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
-    #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
-    pub output: PathBuf,
-    /// How it is written.
-    #[command(flatten)]
-    pub write: WriteArgs,
-    /// Which labels.
-    #[command(flatten)]
-    pub choice: ChooseArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
-}
-
-impl SelectArgs {
-    /// Returns where the result goes.
-    pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target::new((&self.model, &self.output), self.write, wants_json(context, &self.json))
-    }
-}
 
 /// `labelgs remove`.
 #[derive(Args, Clone, Debug)]
 pub struct RemoveArgs {
-    /// Model, choice and output.
     #[command(flatten)]
-    pub select: SelectArgs,
+    pub edit: EditArgs,
+    #[command(flatten)]
+    pub choice: ChooseArgs,
     /// Close what no view ever saw, under and behind the objects: the surfaces around them are continued. Needs --scene,
     /// whose training views tell what was seen.
     ///
@@ -76,9 +46,10 @@ pub struct RemoveArgs {
 /// `labelgs extract`.
 #[derive(Args, Clone, Debug)]
 pub struct ExtractArgs {
-    /// Model, choice and output.
     #[command(flatten)]
-    pub select: SelectArgs,
+    pub edit: EditArgs,
+    #[command(flatten)]
+    pub choice: ChooseArgs,
     /// Which Gaussians of the labels.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
@@ -118,30 +89,27 @@ impl GroupingArgs {
 
 /// Writes the Gaussians of the chosen labels.
 pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
-    let select = &args.select;
-    let Seen { model, known, .. } = look(&select.model, &select.choice.prompts.table)?;
-    let labels = select.choice.labels(&select.model, model.view(), &known, context)?;
-    let whole = args.sure.extract_seen(&select.model, model.view(), &labels)?;
+    let ExtractArgs { edit, choice, .. } = args;
+    let Seen { model, known, .. } = look(&edit.model, &edit.table)?;
+    let labels = choice.labels(&edit.model, model.view(), &known, context)?;
+    let whole = args.sure.extract_seen(&edit.model, model.view(), &labels)?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
-    let part = match (select.choice.scene.as_deref(), &args.masks) {
-        (Some(scene), Some(masks)) => alone(select, (scene, masks), &part, context)?,
+    let part = match (choice.scene.as_deref(), &args.masks) {
+        (Some(scene), Some(masks)) => alone(args, (scene, masks), &part, context)?,
         _ => part,
     };
-    let edited = Edited {
-        model: &part,
-        table: known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id))),
-        of: known.gaussians.values().sum::<u64>() as usize,
-        added: 0,
-        labels: &labels,
-    };
-    edited.finish(&select.target(context), json!({ "specks": whole.len() - part.len() }))
+    let table = known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id)));
+    let of = known.gaussians.values().sum::<u64>() as usize;
+    let specks = whole.len() - part.len();
+    edit.finish(context, &Edited::new(&part, table, of, labels), json!({ "specks": specks }))
 }
 
 /// Fits the opacities of objects that stand alone.
-fn alone(select: &SelectArgs, (scene, masks): (&Path, &Path), objects: &Gaussians, to: &Context) -> Result<Gaussians> {
-    let (model, near) = (open_model(&select.model)?, near_plane(&select.model, select.choice.prompts.near)?);
-    let dataset = open_scene(scene, &select.choice.reading(&select.model)?, Some(masks.to_owned()), [0.0; 3], true)?;
-    warn_of_misfit(&select.model, &model, &dataset)?;
+fn alone(args: &ExtractArgs, (scene, masks): (&Path, &Path), objects: &Gaussians, to: &Context) -> Result<Gaussians> {
+    let (path, choice) = (&args.edit.model, &args.choice);
+    let (model, near) = (open_model(path)?, near_plane(path, choice.prompts.near)?);
+    let dataset = open_scene(scene, &choice.reading(path)?, Some(masks.to_owned()), [0.0; 3], true)?;
+    warn_of_misfit(path, &model, &dataset)?;
     let views: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     let gpu = open_gpu(to)?;
     let occluders = from_model(Arc::clone(&gpu), (&model, near), &views, to)?;
@@ -153,43 +121,37 @@ fn alone(select: &SelectArgs, (scene, masks): (&Path, &Path), objects: &Gaussian
 
 /// Writes the Gaussians of all other labels.
 pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
-    let select = &args.select;
-    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
-    let labels = select.choice.labels(&select.model, &model, &known, context)?;
-    let (part, added, more) = match select.choice.scene.as_deref().filter(|_| args.fill) {
-        None => (remove(&model, &listed(&labels))?, 0, json!({})),
+    let RemoveArgs { edit, choice, .. } = args;
+    let (model, known) = edit.open()?;
+    let labels = choice.labels(&edit.model, &model, &known, context)?;
+    let listed: Vec<u32> = labels.iter().copied().collect();
+    let (part, added, more) = match choice.scene.as_deref().filter(|_| args.fill) {
+        None => (remove(&model, &listed)?, 0, json!({})),
         Some(scene) => {
-            let filled = filled(args, scene, &model, &listed(&labels), context)?;
-            let added: u64 = filled.added.values().sum();
-            let (hidden, lit) = (filled.hidden, filled.lit);
+            let Filled { model, added, hidden, lit } = filled(args, scene, &model, &listed, context)?;
+            let count: u64 = added.values().sum();
             tracing::info!(
                 "filled: {}; {hidden} that nobody saw are gone; {lit} lost a shadow",
-                counted(added, "new Gaussian")
+                counted(count, "new Gaussian")
             );
-            (filled.model, added, json!({ "added": filled.added, "hidden": hidden, "lit": lit }))
+            (model, count, json!({ "added": added, "hidden": hidden, "lit": lit }))
         }
     };
-    let edited = Edited {
-        model: &part,
-        table: known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))),
-        of: model.len(),
-        added,
-        labels: &labels,
-    };
-    edited.finish(&select.target(context), more)
+    let table = known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id)));
+    edit.finish(context, &Edited { added, ..Edited::new(&part, table, model.len(), labels) }, more)
 }
 
 /// Removes labels and closes their place by what the training views of a scene show.
 fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
-    let RemoveArgs { select: args, keep_shadow, .. } = args;
-    let dataset = open_scene(scene, &args.choice.reading(&args.model)?, None, [0.0; 3], false)?;
+    let RemoveArgs { edit, choice, keep_shadow, .. } = args;
+    let dataset = open_scene(scene, &choice.reading(&edit.model)?, None, [0.0; 3], false)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.is_empty() {
         return Err(Error::data(scene, "", "has no training view to fill from; with --fill a scene needs some"));
     }
     // A choice of nothing or of everything is refused before any picture.
     remove(model, labels)?;
-    let near = near_plane(&args.model, args.choice.prompts.near)?;
+    let near = near_plane(&edit.model, choice.prompts.near)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
     let sights = sights(&mut engine, &views, near)?;
@@ -199,8 +161,4 @@ fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], co
         tracing::info!("light from {towards:.2}; shadows have {share:.2} of the colours beside them");
     }
     fill(model, labels, &sights, light.as_ref())
-}
-
-fn listed(labels: &BTreeSet<u32>) -> Vec<u32> {
-    labels.iter().copied().collect()
 }

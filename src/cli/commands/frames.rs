@@ -1,11 +1,7 @@
 //! `labelgs frames`: a video through the photos. An object tracker loses fewer objects in it than between the photos.
 
-use crate::cli::support::args::{JsonFlag, SceneArgs};
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::log::Progress;
 use crate::cli::support::parsers::{colour, near};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, Progress, SceneArgs, largest, near_plane, open_gpu, open_model, open_scene};
 use crate::engine::Engine;
 use crate::render::pictures::{Format, write_rgb};
 use crate::render::{Parts, RenderOptions, render};
@@ -60,12 +56,8 @@ pub struct FramesArgs {
     /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Renders the video.
@@ -74,7 +66,8 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
     let lenses = windows(&args.scene, &args.reading.read.lookup())?.values().any(|window| !window.is_photo());
-    let size = size_of_all(&views);
+    // A tracker needs frames of one size. Smaller photos lie in the upper left of theirs; the model goes on around them.
+    let size = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
     let wide: Vec<Camera> =
         views.iter().map(|view| Camera { width: size.0, height: size.1, ..view.camera.clone() }).collect();
     let cameras: Vec<&Camera> = wide.iter().collect();
@@ -103,20 +96,9 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let path = args.output.join(frames::FILE);
     // Written last: its presence means that the video is complete.
     Frames::new(written, lenses).write(&path)?;
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "frames_json": path.display().to_string(),
-            "frames": stops.len(),
-            "photos": views.len(),
-        }));
-    }
-    stdout::print(&format!(
-        "{}: {} through {}\n",
-        path.display(),
-        counted(stops.len(), "frame"),
-        counted(views.len(), "photo")
-    ))
+    let (path, frames, photos) = (path.display().to_string(), stops.len(), views.len());
+    let text = format!("{path}: {} through {}\n", counted(frames, "frame"), counted(photos, "photo"));
+    context.show(&json!({ "schema_version": 1, "frames_json": path, "frames": frames, "photos": photos }), &text)
 }
 
 /// Returns the views in the order of the video.
@@ -131,11 +113,4 @@ fn ordered_views<'a>(args: &FramesArgs, dataset: &'a Dataset) -> Result<Vec<&'a 
     }
     let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
     Ok(short_order(&cameras).into_iter().map(|index| views[index]).collect())
-}
-
-/// Returns the size of all frames, because a tracker needs one. Smaller photos lie in the upper left of their frames,
-/// and the model goes on around them.
-fn size_of_all(views: &[&View]) -> (u32, u32) {
-    let largest = |side: fn(&Camera) -> u32| views.iter().map(|view| side(&view.camera)).max().unwrap_or(1);
-    (largest(|camera| camera.width), largest(|camera| camera.height))
 }

@@ -1,38 +1,24 @@
 //! `labelgs kernels`: what the driver's compiler makes of every kernel.
 
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::Context;
 use crate::gpu::{Gpu, GpuOptions};
 use crate::pass::{CompiledKernel, FIGURES, compiled_kernels};
 use crate::{Error, Result};
-use clap::Args;
 use serde_json::{Map, Value, json};
 
-/// `labelgs kernels`.
-#[derive(Args, Clone, Debug)]
-pub struct KernelsArgs {
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
-}
-
 /// Prints the table. Fails if a kernel spills registers.
-pub(crate) fn run(args: &KernelsArgs, context: &Context) -> Result<()> {
+pub(crate) fn run(context: &Context) -> Result<()> {
     let gpu = Gpu::new(&GpuOptions { statistics: true, ..context.gpu_options()? })?;
     context.listen(&gpu);
     let (found, kernels) = (gpu.capabilities(), compiled_kernels(&gpu)?);
-    if context.json || args.json.json {
-        stdout::print_json(&json!({
-            "schema_version": 1,
-            "device": found.name,
-            "driver": { "name": found.driver_name, "version": found.driver_info },
-            "kernels": kernels_json(&kernels),
-        }))?;
-    } else {
-        stdout::print(&format!("{} ({} {})\n", found.name, found.driver_name, found.driver_info))?;
-        stdout::print(&to_text(&kernels))?;
-    }
+    let result = json!({
+        "schema_version": 1,
+        "device": found.name,
+        "driver": { "name": found.driver_name, "version": found.driver_info },
+        "kernels": kernels_json(&kernels),
+    });
+    let title = format!("{} ({} {})\n", found.name, found.driver_name, found.driver_info);
+    context.show(&result, &(title + &to_text(&kernels)))?;
     let spilled = kernels.iter().filter(|kernel| kernel.spills() > 0.0);
     let spilled: Vec<String> = spilled.map(|kernel| format!("{} at {}", kernel.name, kernel.subgroup)).collect();
     if spilled.is_empty() {

@@ -1,14 +1,10 @@
 //! `labelgs label`.
 
 use crate::cli::commands::masks::repair::table;
-use crate::cli::support::args::{JsonFlag, SceneArgs};
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::log::Progress;
-use crate::cli::support::model_fit::warn_of_misfit;
-use crate::cli::support::model_format::WriteArgs;
 use crate::cli::support::parsers::{model_file, near};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
-use crate::cli::support::stdout;
+use crate::cli::support::{
+    Context, Progress, SceneArgs, WriteArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit,
+};
 use crate::edit::select::summarise;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
@@ -45,7 +41,6 @@ pub struct LabelArgs {
     /// File to write.
     #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
-    /// How it is written.
     #[command(flatten)]
     pub write: WriteArgs,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
@@ -64,9 +59,6 @@ pub struct LabelArgs {
     /// How the scene is read. Test views have no votes.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Gives the Gaussians of a trained model their labels.
@@ -104,24 +96,19 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let options = args.write.options(&args.model, &args.output)?;
     export_model(&args.output, &model, names.as_ref(), options)?;
     let rows = summarise(&model);
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "output": args.output.display().to_string(),
-            "views": views.len(),
-            "seconds": seconds,
-            "gaussians": model.len(),
-            "labels": rows,
-        }));
-    }
-    let labelled: u64 = rows.iter().filter(|row| row.label != 0).map(|row| row.count).sum();
-    stdout::print(&format!(
-        "{}: {labelled} of {} belong to {}, by {} in {seconds:.1} s\n",
-        args.output.display(),
-        counted(model.len(), "Gaussian"),
-        counted(rows.iter().filter(|row| row.label != 0).count(), "object"),
-        counted(views.len(), "view")
-    ))
+    let (output, views, gaussians) = (args.output.display().to_string(), views.len(), model.len());
+    let objects = || rows.iter().filter(|row| row.label != 0);
+    let text = format!(
+        "{output}: {} of {} belong to {}, by {} in {seconds:.1} s\n",
+        objects().map(|row| row.count).sum::<u64>(),
+        counted(gaussians, "Gaussian"),
+        counted(objects().count(), "object"),
+        counted(views, "view")
+    );
+    let result = json!({
+        "schema_version": 1, "output": output, "views": views, "seconds": seconds, "gaussians": gaussians, "labels": rows,
+    });
+    context.show(&result, &text)
 }
 
 /// Replaces the masks of the views by those whose ids agree, and returns their names.

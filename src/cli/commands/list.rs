@@ -1,10 +1,8 @@
 //! `labelgs list`.
 
 use crate::Result;
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{Seen, TableArg, look};
-use crate::cli::support::stdout;
+use crate::cli::support::model_edit::look;
+use crate::cli::support::{Context, Seen, TableArg};
 use crate::edit::select::LabelSummary;
 use clap::Args;
 use serde::Serialize;
@@ -17,12 +15,8 @@ pub struct ListArgs {
     /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Names.
     #[command(flatten)]
     pub table: TableArg,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// A label with its name.
@@ -38,20 +32,18 @@ pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
     let Seen { model, tally, known } = look(&args.model, &args.table)?;
     let row = |summary: LabelSummary| Row { name: known.name(summary.label), summary };
     let rows: Vec<Row> = tally.summaries().into_iter().map(row).collect();
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "model": args.model.display().to_string(),
-            "gaussians": known.gaussians.values().sum::<u64>(),
-            "sh_degree": model.view().sh_degree(),
-            "labels": rows,
-        }));
-    }
     let names = if known.table.is_some() { "  name" } else { "" };
     let mut text =
         format!("{:>6} {:>10} {:>12}  {:^26}  {:^26}{names}\n", "label", "Gaussians", "opacity mass", "centre", "size");
     rows.iter().for_each(|row| text += &line(&row.summary, row.name));
-    stdout::print(&text)
+    let result = json!({
+        "schema_version": 1,
+        "model": args.model.display().to_string(),
+        "gaussians": known.gaussians.values().sum::<u64>(),
+        "sh_degree": model.view().sh_degree(),
+        "labels": rows,
+    });
+    context.show(&result, &text)
 }
 
 fn line(row: &LabelSummary, name: Option<&str>) -> String {

@@ -1,18 +1,15 @@
 //! `labelgs merge`.
 
 use crate::Result;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{EditArgs, Edited, open, or_list};
 use crate::cli::support::parsers::{Picks, label, picks};
+use crate::cli::support::{Context, EditArgs, Edited};
 use crate::edit::merge::{Merged, merge};
 use clap::Args;
 use serde_json::json;
-use std::collections::BTreeSet;
 
 /// `labelgs merge`.
 #[derive(Args, Clone, Debug)]
 pub struct MergeArgs {
-    /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
     /// The labels to merge, by id or by name, such as 3,5 or cup,saucer.
@@ -28,10 +25,9 @@ pub struct MergeArgs {
 
 /// Writes the model with several labels merged into one.
 pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.edit.model, &args.edit.table)?;
-    let labels = or_list(known.resolve("--labels", &args.labels.0), &args.edit.model)?;
+    let (model, known) = args.edit.open()?;
+    let labels = args.edit.resolve(&known, "--labels", &args.labels)?;
     let Merged { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
-    let into = BTreeSet::from([into]);
-    let edited = Edited { model: &merged, table, of: model.len(), added: 0, labels: &into };
-    edited.finish(&args.edit.target(context), json!({ "merged": labels }))
+    let edited = Edited::new(&merged, table, model.len(), [into].into());
+    args.edit.finish(context, &edited, json!({ "merged": labels }))
 }

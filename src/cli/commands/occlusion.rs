@@ -1,11 +1,7 @@
 //! `labelgs occlusion`.
 
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::log::Progress;
 use crate::cli::support::parsers::json_file;
-use crate::cli::support::scene::{near_plane, open_gpu};
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, Progress, ReadArgs, near_plane, open_gpu, open_model};
 use crate::engine::Engine;
 use crate::files::image::write_png_rgb8;
 use crate::gpu::Gpu;
@@ -50,12 +46,8 @@ pub struct OcclusionArgs {
     /// Longest side of a picture, px. Default: the size of the photo.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
-    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Finds the occluders of all views with masks.
@@ -83,21 +75,11 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
         views.iter().zip(stems(&views)).try_for_each(|(view, stem)| draw(folder, (view, &stem), &table))?;
     }
     table.write(&args.output)?;
-    let (pairs, output) = (table.pair_count(), args.output.display());
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "output": output.to_string(),
-            "kind": table.kind,
-            "views": table.views.len(),
-            "pairs": pairs,
-        }));
-    }
-    stdout::print(&format!(
-        "{output}: {} of an object and its occluder in {}\n",
-        counted(pairs, "pair"),
-        counted(table.views.len(), "view")
-    ))
+    let (pairs, views, output) = (table.pair_count(), table.views.len(), args.output.display().to_string());
+    let [of, seen] = [counted(pairs, "pair"), counted(views, "view")];
+    let text = format!("{output}: {of} of an object and its occluder in {seen}\n");
+    let kind = table.kind;
+    context.show(&json!({ "schema_version": 1, "output": output, "kind": kind, "views": views, "pairs": pairs }), &text)
 }
 
 /// Returns the occluders in views with masks, by the depth of a model.

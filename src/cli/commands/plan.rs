@@ -1,20 +1,17 @@
 //! `labelgs plan`.
 
-use crate::cli::commands::devices::{shape_json, shape_of, shape_text};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
+use crate::cli::commands::devices::{shape_json, shape_text};
+use crate::cli::support::Context;
 use crate::cli::support::parsers::{Size, bytes, count, size};
-use crate::cli::support::stdout;
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for};
 use crate::gpu;
 use crate::pass::{KernelShape, Supervision, Variant, training_step};
-use crate::scheduler::plan::{
-    Capacity, Grid, Limits, MemoryReport, Page, PassList, Plan, PlanOptions, TABLE, Touch, Work,
-};
+use crate::scheduler::plan::{Capacity, Limits, MemoryReport, PassList, Plan, PlanOptions, TABLE};
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 /// `labelgs plan`.
 #[derive(Args, Clone, Debug)]
@@ -34,9 +31,6 @@ pub struct PlanArgs {
     /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Largest label id of the plan; a larger id costs a few bytes.
@@ -59,11 +53,7 @@ pub(crate) fn run(args: &PlanArgs, context: &Context) -> Result<()> {
         Err(error @ Error::OutOfMemory { .. }) => (planned(&subject, &without_sizes(&subject.limits))?, Some(error)),
         done => (done?, None),
     };
-    if context.json || args.json.json {
-        stdout::print_json(&to_json(&subject, &planned, problem.as_ref()))?;
-    } else {
-        stdout::print(&to_text(&subject, &planned)?)?;
-    }
+    context.show(&to_json(&subject, &planned, problem.as_ref()), &to_text(&subject, &planned)?)?;
     problem.map_or(Ok(()), Err)
 }
 
@@ -95,7 +85,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     match gpu::devices(&options) {
         Ok((devices, Ok(picked))) => {
             let device = &devices[picked];
-            Ok((Some(device.name.clone()), shape_of(device), device.limits.plan))
+            Ok((Some(device.name.clone()), KernelShape::of(device), device.limits.plan))
         }
         Ok((_, Err(error))) | Err(error) if options.device.is_some() => Err(error),
         Ok((_, Err(_))) | Err(Error::NoDevice(_)) => {
@@ -194,12 +184,19 @@ fn most_gaussians(subject: &Subject) -> u64 {
 
 fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Option<&Error>) -> Value {
     let room = &subject.room;
-    let docs = |name| TABLE.iter().find(|decl| decl.name == name).map(|decl| decl.doc);
     let buffers = memory.rows.iter().map(|row| {
         json!({
             "name": row.name, "class": row.class.name(), "elements": row.count, "element_bytes": row.element_bytes,
-            "bytes": row.bytes, "doc": docs(row.name),
+            "bytes": row.bytes,
         })
+    });
+    let passes = plan.items.iter().map(|item| {
+        let names = |writes| -> BTreeSet<&str> {
+            let touches = item.touches.iter().filter(|touch| touch.kind.writes() == writes);
+            touches.map(|touch| TABLE[touch.buf.index()].name).collect()
+        };
+        let barrier = item.barrier.as_ref().map(|barrier| &barrier.reason);
+        json!({ "name": item.label, "reads": names(false), "writes": names(true), "barrier": barrier })
     });
     json!({
         "schema_version": 1,
@@ -219,58 +216,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
             "staging": memory.staging,
             "total": memory.total,
         },
-        "scratch": scratch(plan),
         "barriers": plan.barrier_count(),
-        "passes": passes(plan),
+        "passes": passes.collect::<Vec<_>>(),
     })
-}
-
-fn scratch(plan: &Plan) -> Vec<Value> {
-    let places = TABLE.iter().zip(plan.placements.iter().zip(&plan.lives));
-    let rows = places.filter_map(|(decl, (place, life))| {
-        let (place, life) = ((*place)?, (*life)?);
-        match place.page {
-            Page::Step(page) => Some(json!({
-                "name": decl.name, "page": page, "offset": place.offset, "bytes": place.bytes,
-                "first_pass": life.first, "last_pass": life.last,
-            })),
-            Page::Own(_) => None,
-        }
-    });
-    rows.collect()
-}
-
-fn passes(plan: &Plan) -> Vec<Value> {
-    let names = |touches: &[Touch], writes| {
-        let mut names: Vec<&str> = Vec::new();
-        for touch in touches.iter().filter(|touch| touch.kind.writes() == writes) {
-            let name = TABLE[touch.buf.index()].name;
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        names
-    };
-    let rows = plan.items.iter().zip(&plan.list.work).enumerate().map(|(index, (item, work))| {
-        json!({
-            "index": index,
-            "name": item.label,
-            "groups": groups(work),
-            "reads": names(&item.touches, false),
-            "writes": names(&item.touches, true),
-            "barrier": item.barrier.as_ref().map(|barrier| &barrier.reason),
-        })
-    });
-    rows.collect()
-}
-
-/// Returns the workgroups by axis, `"indirect"` if the device decides, null for copies and fills.
-fn groups(work: &Work) -> Value {
-    match work {
-        Work::Pass(pass) => match pass.grid {
-            Grid::Groups(x, y, z) => json!([x, y, z]),
-            Grid::Indirect(..) => json!("indirect"),
-        },
-        Work::Fill { .. } | Work::Copy { .. } => Value::Null,
-    }
 }

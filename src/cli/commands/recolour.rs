@@ -1,10 +1,8 @@
 //! `labelgs recolour`.
 
 use crate::Result;
-use crate::cli::commands::extract_remove::SelectArgs;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{Edited, open};
 use crate::cli::support::parsers::{colour, share};
+use crate::cli::support::{ChooseArgs, Context, EditArgs, Edited};
 use crate::edit::change::recolour;
 use clap::Args;
 use serde_json::json;
@@ -12,9 +10,10 @@ use serde_json::json;
 /// `labelgs recolour`.
 #[derive(Args, Clone, Debug)]
 pub struct RecolourArgs {
-    /// Model, choice and output.
     #[command(flatten)]
-    pub select: SelectArgs,
+    pub edit: EditArgs,
+    #[command(flatten)]
+    pub choice: ChooseArgs,
     /// Colour of the labels: a name such as red, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, alias = "color", value_name = "COLOUR", value_parser = colour)]
     pub colour: [f32; 3],
@@ -25,12 +24,10 @@ pub struct RecolourArgs {
 
 /// Writes the model with the new colour.
 pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
-    let select = &args.select;
-    let (model, known) = open(&select.model, &select.choice.prompts.table)?;
-    let labels = select.choice.labels(&select.model, &model, &known, context)?;
+    let (model, known) = args.edit.open()?;
+    let labels = args.choice.labels(&args.edit.model, &model, &known, context)?;
     let painted = recolour(&model, &labels, args.colour, args.mix);
-    let table = known.table.clone();
-    let edited = Edited { model: &painted, table, of: model.len(), added: 0, labels: &labels };
     let count: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
-    edited.finish(&select.target(context), json!({ "recoloured": count }))
+    let edited = Edited::new(&painted, known.table, model.len(), labels);
+    args.edit.finish(context, &edited, json!({ "recoloured": count }))
 }

@@ -1,14 +1,10 @@
 //! `labelgs render`.
 
-use crate::cli::support::args::{JsonFlag, SceneArgs};
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::label_choice::{Asked, PromptArgs};
-use crate::cli::support::model_drawer::{Drawer, MemoryArg, largest};
-use crate::cli::support::model_edit::{self, MinConfidenceArg};
-use crate::cli::support::model_fit::warn_of_misfit_with;
 use crate::cli::support::parsers::{Picks, colour, picks};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene, pick_views};
-use crate::cli::support::stdout;
+use crate::cli::support::{
+    Asked, Context, Drawer, MemoryArg, MinConfidenceArg, PromptArgs, SceneArgs, TableArg, largest, model_edit,
+    near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit_with,
+};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{nothing_left, remove};
 use crate::formats::ModelRef;
@@ -58,21 +54,18 @@ pub struct RenderArgs {
     /// Labels by name and by place.
     #[command(flatten)]
     pub prompts: PromptArgs,
+    #[command(flatten)]
+    pub table: TableArg,
     /// File format.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "png", help_heading = "Output")]
     pub format: Format,
     /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, value_name = "COLOUR", value_parser = colour, default_value = "black", help_heading = "Rendering")]
     pub background: [f32; 3],
-    /// Memory.
     #[command(flatten)]
     pub memory: MemoryArg,
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Renders views.
@@ -114,10 +107,8 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     }
     drop(stage);
     let files: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({ "schema_version": 1, "files": files }));
-    }
-    files.iter().try_for_each(|file| stdout::print(&format!("{file}\n")))
+    let text: String = files.iter().map(|file| format!("{file}\n")).collect();
+    context.show(&json!({ "schema_version": 1, "files": files }), &text)
 }
 
 /// Returns true if ids of label maps need 32 bits; fails if a PNG was asked for, which has 16.
@@ -136,7 +127,7 @@ fn wide_labels(args: &RenderArgs, largest: Option<u32>) -> Result<bool> {
 /// Returns the visible part of the model.
 fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
     let Some((flag, picks)) = chosen(args)? else { return open_model(&args.model) };
-    let (model, known) = model_edit::open(&args.model, &args.prompts.table)?;
+    let (model, known) = model_edit::open(&args.model, &args.table)?;
     let labels = args.prompts.labels(flag, picks, &asked(args, (&model).into(), &known), context)?;
     let labels: Vec<u32> = labels.into_iter().collect();
     if args.only.is_some() { args.sure.extract(&model, &labels) } else { remove(&model, &labels) }
@@ -150,7 +141,7 @@ fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<Index>
         models::log_notes(&args.model, &notes);
         return Ok(index);
     };
-    let known = model_edit::look(&args.model, &args.prompts.table)?.known;
+    let known = model_edit::look(&args.model, &args.table)?.known;
     let labels = args.prompts.labels(flag, picks, &asked(args, model, &known), context)?;
     let is_sure = |share: Option<f32>| share.is_none_or(|share| share >= least);
     let keep = |label: u32, share: Option<f32>| match args.only {
@@ -180,8 +171,10 @@ fn chosen(args: &RenderArgs) -> Result<Option<(&'static str, Option<&Picks>)>> {
 }
 
 fn asked<'a>(args: &'a RenderArgs, model: ModelRef<'a>, known: &'a Catalogue) -> Asked<'a> {
-    let (max_resolution, read, memory) = (args.reading.max_resolution, &args.reading.read, args.memory.options());
-    Asked { path: &args.model, model, known, scene: args.scene.as_deref(), max_resolution, read, memory }
+    let (max_resolution, read) = (args.reading.max_resolution, args.reading.read.clone());
+    let reading = SceneArgs { max_resolution, read, ..SceneArgs::default() };
+    let (scene, memory) = (args.scene.as_deref(), args.memory.options());
+    Asked { path: &args.model, model, known, scene, reading, memory }
 }
 
 /// Returns the cameras to draw for, and the scene that has them.

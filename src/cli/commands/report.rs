@@ -1,9 +1,8 @@
 //! `labelgs report`: the pages of trainings, made anew from the files in their folders.
 
 use crate::Result;
-use crate::cli::support::context::Context;
+use crate::cli::support::Context;
 use crate::cli::support::parsers::page_file;
-use crate::cli::support::stdout;
 use crate::run::report::{FILE, write};
 use clap::Args;
 use serde_json::json;
@@ -28,5 +27,5 @@ pub(crate) fn run(args: &ReportArgs, context: &Context) -> Result<()> {
     };
     let path = write(&args.runs, args.output.as_ref().unwrap_or(&usual))?;
     let path = path.display().to_string();
-    if context.json { stdout::print_json(&json!({ "report": path })) } else { stdout::print(&format!("{path}\n")) }
+    context.show(&json!({ "report": path }), &format!("{path}\n"))
 }

@@ -1,12 +1,7 @@
 //! `labelgs simplify`.
 
-use crate::cli::support::args::SceneArgs;
-use crate::cli::support::context::Context;
-use crate::cli::support::log::Progress;
-use crate::cli::support::model_edit::{EditArgs, open, wants_json};
 use crate::cli::support::parsers::{loss, near};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, EditArgs, Edited, Progress, SceneArgs, near_plane, open_gpu, open_scene, stdout};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::edit::simplify::Simplifier;
 use crate::engine::{Engine, EngineSize};
@@ -30,7 +25,6 @@ const HALVINGS: u32 = 5;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("goal").required(true).args(["gaussians", "psnr_loss"])))]
 pub struct SimplifyArgs {
-    /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
     /// Scene whose training views tell what a Gaussian contributes, and whose test views score the result.
@@ -48,7 +42,6 @@ pub struct SimplifyArgs {
     /// Near plane, world units. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
 }
@@ -72,7 +65,7 @@ struct Scorer<'a> {
 
 /// Writes the model with fewer Gaussians, and prints what that costs.
 pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let (model, known) = args.edit.open()?;
     let near = near_plane(&args.edit.model, args.near)?;
     let dataset = open_scene(&args.scene, &args.reading, args.masks.clone(), [0.0; 3], true)?;
     if model.is_empty() || dataset.train.is_empty() {
@@ -111,10 +104,12 @@ pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
         Some(count) => exactly(count, enough, &mut scorer)?,
         None => fewest(args, &rows, enough, &mut scorer)?,
     };
-    if !wants_json(context, &args.edit.json) {
+    if !context.json {
         stdout::print(&table(&rows, &chosen))?;
     }
-    args.edit.finish(context, (&simplifier.model(), known), model.len(), json!({ "table": rows, "chosen": chosen }))
+    let small = simplifier.model();
+    let edited = Edited::with_labels_of(&small, known, model.len());
+    args.edit.finish(context, &edited, json!({ "table": rows, "chosen": chosen }))
 }
 
 /// Merges until `count` are left.

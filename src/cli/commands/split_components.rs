@@ -2,9 +2,8 @@
 
 use crate::Result;
 use crate::cli::commands::extract_remove::GroupingArgs;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{EditArgs, Edited, open, or_list};
 use crate::cli::support::parsers::{Picks, picks};
+use crate::cli::support::{Context, EditArgs, Edited};
 use crate::edit::change::{Specks, split_components};
 use crate::edit::rename::split;
 use crate::words::counted;
@@ -14,7 +13,6 @@ use serde_json::json;
 /// `labelgs split-components`.
 #[derive(Args, Clone, Debug)]
 pub struct SplitArgs {
-    /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
     /// Labels to split, by id or by name. The largest part of a label keeps its id; the other parts get free ids.
@@ -30,19 +28,14 @@ pub struct SplitArgs {
 
 /// Writes the model with a label for each part.
 pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.edit.model, &args.edit.table)?;
-    let labels = or_list(known.resolve("--labels", &args.labels.0), &args.edit.model)?;
+    let (model, known) = args.edit.open()?;
+    let labels = args.edit.resolve(&known, "--labels", &args.labels)?;
     let named = known.table.iter().flat_map(|table| &table.labels).map(|entry| entry.id).collect();
     let found = split_components(&model, &labels, &named, args.grouping.grouping(), args.specks)?;
     for (&label, ids) in &found.ids {
         tracing::info!("{}: {}: {ids:?}", known.title(label), counted(ids.len(), "part"));
     }
-    let edited = Edited {
-        model: &found.model,
-        table: known.table.as_ref().map(|table| split(table, &found.ids)),
-        of: model.len(),
-        added: 0,
-        labels: &found.ids.values().flatten().copied().collect(),
-    };
-    edited.finish(&args.edit.target(context), json!({ "parts": found.ids, "specks": found.specks }))
+    let table = known.table.as_ref().map(|table| split(table, &found.ids));
+    let edited = Edited::new(&found.model, table, model.len(), found.ids.values().flatten().copied().collect());
+    args.edit.finish(context, &edited, json!({ "parts": found.ids, "specks": found.specks }))
 }

@@ -1,12 +1,8 @@
 //! `labelgs synth`.
 
 use crate::Result;
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::log::Progress;
 use crate::cli::support::parsers::{Size, size};
-use crate::cli::support::signals;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, Progress, signals};
 use crate::synth::{Preset, SynthLens, SynthOptions, write};
 use crate::words::counted;
 use clap::Args;
@@ -44,9 +40,6 @@ pub struct SynthArgs {
     /// Photos with gains of 0.7 to 1.4 and colour casts, each its own, as of a camera that chooses its exposure.
     #[arg(long)]
     pub vary_exposure: bool,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes the scene.
@@ -71,15 +64,12 @@ pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
     });
     drop(progress);
     let summary = summary?;
-    if context.json || args.json.json {
-        return stdout::print_json(&summary);
-    }
     let objects: Vec<String> = summary
         .objects
         .iter()
         .map(|object| format!("{} {}", object.id, object.name.as_deref().unwrap_or_default()))
         .collect();
-    stdout::print(&format!(
+    let text = format!(
         "{}: {} of {} x {} px, {}; objects: {}\n",
         summary.scene.display(),
         counted(summary.views, "view"),
@@ -87,5 +77,6 @@ pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
         options.height,
         counted(summary.points, "point"),
         objects.join(", ")
-    ))
+    );
+    context.show(&summary, &text)
 }

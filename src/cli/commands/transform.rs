@@ -1,9 +1,8 @@
 //! `labelgs transform`.
 
 use crate::Result;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{EditArgs, open};
 use crate::cli::support::parsers::{direction, factor, place};
+use crate::cli::support::{Context, EditArgs, Edited};
 use crate::edit::Transform;
 use clap::Args;
 use glam::{DQuat, DVec3};
@@ -13,7 +12,6 @@ use serde_json::json;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("change").required(true).multiple(true).args(["up", "scale", "origin"])))]
 pub struct TransformArgs {
-    /// Model and output.
     #[command(flatten)]
     pub edit: EditArgs,
     /// Direction of the model that points up: x, -x, y, -y, z, -z or X,Y,Z. It is turned to -y, which viewers of 3DGS
@@ -30,11 +28,11 @@ pub struct TransformArgs {
 
 /// Writes the model at another place.
 pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
-    let (model, known) = open(&args.edit.model, &args.edit.table)?;
+    let (model, known) = args.edit.open()?;
     let turn = args.up.map_or(Ok(DQuat::IDENTITY), Transform::upright)?;
     let change = Transform { origin: args.origin.unwrap_or_default(), turn, scale: args.scale.unwrap_or(1.0) };
     let moved = change.apply(&model)?;
     let turn = [turn.w, turn.x, turn.y, turn.z];
     let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
-    args.edit.finish(context, (&moved, known), model.len(), more)
+    args.edit.finish(context, &Edited::with_labels_of(&moved, known, model.len()), more)
 }

@@ -1,13 +1,10 @@
 //! `labelgs view`, and the flags of `labelgs train --view`.
 
-use crate::cli::support::args::SceneArgs;
-use crate::cli::support::context::Context;
-use crate::cli::support::model_edit::{TableArg, open};
-use crate::cli::support::model_fit::warn_of_misfit;
+use crate::cli::support::model_edit::open;
 use crate::cli::support::parsers::{near, share};
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
-use crate::cli::support::shell_words::quoted;
-use crate::cli::support::{signals, stdout};
+use crate::cli::support::{
+    Context, SceneArgs, TableArg, near_plane, open_gpu, open_scene, quoted, signals, warn_of_misfit,
+};
 use crate::render::{Parts, RenderOptions};
 use crate::scene::Dataset;
 use crate::scenes::camera_json::views_of_model;
@@ -34,16 +31,13 @@ pub struct ViewArgs {
     /// Folder of id masks, to score the label maps with.
     #[arg(long, value_name = "DIR", requires = "scene")]
     pub masks: Option<PathBuf>,
-    /// Names.
     #[command(flatten)]
     pub table: TableArg,
     /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// The server.
     #[command(flatten)]
     pub server: ServerArgs,
 }
@@ -77,7 +71,6 @@ pub struct WatchArgs {
     /// Largest share of the time that viewing may take, 0 to 1, while a page is open.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.2)]
     pub view_share: f32,
-    /// The server.
     #[command(flatten)]
     pub server: ServerArgs,
 }
@@ -119,11 +112,8 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
     let gpu = open_gpu(context)?;
     let viewer = args.server.start(1.0)?;
-    if context.json {
-        stdout::print_json(&json!({ "schema_version": 1, "address": viewer.address() }))?;
-    } else {
-        stdout::print(&format!("{}\n", viewer.address()))?;
-    }
+    let address = viewer.address();
+    context.show(&json!({ "schema_version": 1, "address": address }), &format!("{address}\n"))?;
     let words = Typed { scene: args.scene.clone(), masks: args.masks.clone() };
     let finished = Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words };
     signals::note_only();

@@ -23,14 +23,6 @@ pub struct GlobalArgs {
     pub device: Option<String>,
 }
 
-/// `--json` of a command that prints its result.
-#[derive(Args, Clone, Debug, Default)]
-pub struct JsonFlag {
-    /// Print the result as JSON.
-    #[arg(id = "json_here", long = "json", help_heading = "Output")]
-    pub json: bool,
-}
-
 /// Where the files of a scene are, and how much of it may be damaged.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Scene")]
@@ -49,7 +41,6 @@ pub struct FileArgs {
 /// How a scene is read.
 #[derive(Args, Clone, Debug, Default)]
 pub struct ReadArgs {
-    /// Its files.
     #[command(flatten)]
     pub files: FileArgs,
     /// What the scene's file means by its poses, where it is not the convention of its format: words of c2w or w2c, opencv
@@ -89,7 +80,6 @@ pub struct SceneArgs {
     /// Folder of pictures named as masks: pixels above 0 are left out of votes and scores.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
-    /// Tolerance.
     #[command(flatten)]
     pub read: ReadArgs,
 }

@@ -1,11 +1,13 @@
 //! The context of every command, and how a command opens a model.
 
 use crate::cli::support::args::GlobalArgs;
+use crate::cli::support::stdout;
 use crate::gpu::{Gpu, GpuOptions, MessageLog};
 use crate::records::PipelineFolder;
 use crate::run::models;
 use crate::scene::Gaussians;
 use crate::{Error, Result};
+use serde::Serialize;
 use std::cell::RefCell;
 use std::path::Path;
 
@@ -14,7 +16,7 @@ use std::path::Path;
 pub(crate) struct Context {
     /// `-q`, `-v` and `--device`.
     pub(crate) global: GlobalArgs,
-    /// `--json` before the command.
+    /// `--json` before or after the name of the command.
     pub(crate) json: bool,
     /// Messages of the validation layer about every opened device, also after the device is closed.
     messages: RefCell<Vec<MessageLog>>,
@@ -31,6 +33,11 @@ impl Context {
         let options = GpuOptions::from_env()?;
         let device = self.global.device.clone().or(options.device);
         Ok(GpuOptions { device, locks: Some(PipelineFolder::of_locks()), ..options })
+    }
+
+    /// Prints the result of a command.
+    pub(crate) fn show(&self, json: &impl Serialize, text: &str) -> Result<()> {
+        if self.json { stdout::print_json(json) } else { stdout::print(text) }
     }
 
     /// Collects the messages of the validation layer about a device.

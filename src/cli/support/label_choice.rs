@@ -3,7 +3,7 @@
 use crate::cli::support::args::{ReadArgs, SceneArgs};
 use crate::cli::support::context::Context;
 use crate::cli::support::model_drawer::Drawer;
-use crate::cli::support::model_edit::{TableArg, or_list};
+use crate::cli::support::model_edit::{or_list, require_labels};
 use crate::cli::support::parsers::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::cli::support::scene::{find_view, near_plane, open_gpu, open_scene};
 use crate::edit::catalogue::{Catalogue, Pick};
@@ -42,9 +42,6 @@ pub struct PromptArgs {
     /// Name of the view of --mask.
     #[arg(long, value_name = "NAME", requires = "mask")]
     pub view: Option<String>,
-    /// Names.
-    #[command(flatten)]
-    pub table: TableArg,
     /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
@@ -68,7 +65,6 @@ pub struct ChooseArgs {
     /// Longest side of a view, px. Default: the size of the photo.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
-    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
 }
@@ -83,10 +79,8 @@ pub(crate) struct Asked<'a> {
     pub known: &'a Catalogue,
     /// Scene of the views.
     pub scene: Option<&'a Path>,
-    /// Longest side of a view, px.
-    pub max_resolution: Option<u32>,
-    /// Tolerance for the scene.
-    pub read: &'a ReadArgs,
+    /// How the scene is read.
+    pub reading: SceneArgs,
     /// Memory for label maps.
     pub memory: SchedulerOptions,
 }
@@ -100,15 +94,18 @@ impl ChooseArgs {
         known: &'a Catalogue,
         to: &Context,
     ) -> Result<BTreeSet<u32>> {
-        let (scene, max_resolution, model) = (self.scene.as_deref(), self.max_resolution, model.into());
-        let memory = SchedulerOptions::default();
-        let asked = Asked { path, model, known, scene, max_resolution, read: &self.read, memory };
+        let (scene, model, memory) = (self.scene.as_deref(), model.into(), SchedulerOptions::default());
+        let asked = Asked { path, model, known, scene, reading: self.read_as_typed(), memory };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
 
     /// Returns how the scene of a model is read: as its run did.
     pub(crate) fn reading(&self, model: &Path) -> Result<SceneArgs> {
-        SceneArgs { max_resolution: self.max_resolution, read: self.read.clone(), ..SceneArgs::default() }.of_run(model)
+        self.read_as_typed().of_run(model)
+    }
+
+    fn read_as_typed(&self) -> SceneArgs {
+        SceneArgs { max_resolution: self.max_resolution, read: self.read.clone(), ..SceneArgs::default() }
     }
 }
 
@@ -182,16 +179,8 @@ impl PromptArgs {
                 format!("needs the scene of the view: {}", Setting("scene").to("SCENE")),
             ));
         };
-        if !asked.model.has_labels() {
-            return Err(Error::data(
-                asked.path,
-                "",
-                "the model has no labels; train it with masks, or give it some with labelgs label",
-            ));
-        }
-        let reading =
-            SceneArgs { max_resolution: asked.max_resolution, read: asked.read.clone(), ..SceneArgs::default() };
-        let dataset = open_scene(scene, &reading, None, [0.0; 3], false)?;
+        require_labels(asked.path, asked.model.has_labels())?;
+        let dataset = open_scene(scene, &asked.reading, None, [0.0; 3], false)?;
         let mut cameras: BTreeMap<Key, Camera> = BTreeMap::new();
         for prompt in prompts {
             let camera = &find_view(&dataset, &prompt.view)?.camera;

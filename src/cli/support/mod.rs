@@ -3,6 +3,7 @@
 pub(crate) mod args;
 pub(crate) mod context;
 pub mod exit_status;
+pub(crate) mod json_file;
 pub(crate) mod label_choice;
 pub(crate) mod log;
 pub(crate) mod model_drawer;
@@ -19,3 +20,17 @@ pub(crate) mod shell_words;
 pub(crate) mod signals;
 pub(crate) mod stage_progress;
 pub(crate) mod stdout;
+pub(crate) mod table;
+
+pub(crate) use args::{FileArgs, GlobalArgs, ReadArgs, SceneArgs};
+pub(crate) use context::{Context, open_model};
+pub(crate) use json_file::JsonFileArg;
+pub(crate) use label_choice::{Asked, ChooseArgs, PromptArgs};
+pub(crate) use log::Progress;
+pub(crate) use model_drawer::{Drawer, MemoryArg, largest};
+pub(crate) use model_edit::{EditArgs, Edited, MinConfidenceArg, Seen, TableArg, or_list, require_labels};
+pub(crate) use model_fit::{warn_of_misfit, warn_of_misfit_with};
+pub(crate) use model_format::WriteArgs;
+pub(crate) use scene::{near_plane, open_gpu, open_scene, pick_views};
+pub(crate) use scoring::{ScoreArgs, Watcher};
+pub(crate) use shell_words::quoted;

@@ -1,11 +1,9 @@
 //! Reads a model with the names of its labels, and writes it after an edit.
 
-use crate::cli::support::args::JsonFlag;
 use crate::cli::support::context::Context;
 use crate::cli::support::model_format::WriteArgs;
-use crate::cli::support::parsers::{model_file, share};
+use crate::cli::support::parsers::{Picks, model_file, share};
 use crate::cli::support::shell_words::quoted;
-use crate::cli::support::stdout;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
 use crate::files::label_table::LabelTable;
@@ -17,7 +15,7 @@ use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use glam::DVec3;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -33,8 +31,12 @@ pub struct TableArg {
 impl TableArg {
     /// Reads the table of a model, if there is one; `own` are the names in its file.
     pub fn open(&self, model: &Path, own: Option<LabelTable>) -> Result<Option<LabelTable>> {
-        let path = self.label_table.clone().or_else(|| LabelTable::find_for_model(model));
-        path.map_or(Ok(own), |path| LabelTable::read(&path).map(Some))
+        self.file(model).map_or(Ok(own), |path| LabelTable::read(&path).map(Some))
+    }
+
+    /// Returns the file of the table, if there is one.
+    pub(crate) fn file(&self, model: &Path) -> Option<PathBuf> {
+        self.label_table.clone().or_else(|| LabelTable::find_for_model(model))
     }
 }
 
@@ -47,52 +49,76 @@ pub struct EditArgs {
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
-    /// How it is written.
     #[command(flatten)]
     pub write: WriteArgs,
-    /// Names.
     #[command(flatten)]
     pub table: TableArg,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 impl EditArgs {
-    /// Returns where the result goes.
-    pub(crate) fn target(&self, context: &Context) -> Target<'_> {
-        Target::new((&self.model, &self.output), self.write, wants_json(context, &self.json))
+    /// Opens the model and counts its labels.
+    pub(crate) fn open(&self) -> Result<(Gaussians, Catalogue)> {
+        open(&self.model, &self.table)
     }
 
-    /// Writes and prints the result of an edit that leaves the labels alone. `of` is the number of Gaussians before.
-    pub(crate) fn finish(
-        &self,
-        context: &Context,
-        (model, known): (&Gaussians, Catalogue),
-        of: usize,
-        more: serde_json::Value,
-    ) -> Result<()> {
-        let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
-        Edited { model, table: known.table, of, added: 0, labels: &labels }.finish(&self.target(context), more)
+    /// Finds labels of the model; a message about unknown ones says how to list them.
+    pub(crate) fn resolve(&self, known: &Catalogue, argument: &str, picks: &Picks) -> Result<BTreeSet<u32>> {
+        or_list(known.resolve(argument, &picks.0), &self.model)
+    }
+
+    /// Writes model and table of an edit and prints a summary. `more` holds further fields of the JSON.
+    pub(crate) fn finish(&self, context: &Context, edited: &Edited, more: Value) -> Result<()> {
+        let Edited { model, table, of, added, labels } = edited;
+        let options = self.write.options(&self.model, &self.output)?;
+        let left_out = export_model(&self.output, model, table.as_ref(), options)?;
+        let written = model.len() as u64 - left_out;
+        let beside = LabelTable::beside(&self.output);
+        let output = self.output.display();
+        let mut result = json!({
+            "schema_version": 1,
+            "output": output.to_string(),
+            "label_table": table.as_ref().filter(|_| beside.is_file()).map(|_| beside.display().to_string()),
+            "labels": labels,
+            "gaussians": written,
+            "of": of,
+        });
+        if let (Some(result), Value::Object(more)) = (result.as_object_mut(), more) {
+            result.extend(more);
+        }
+        let text = match (*of as u64 + added).checked_sub(written).filter(|_| *added > 0) {
+            Some(removed) => {
+                let count = counted(written, "Gaussian");
+                format!("{output}: {count}: of {of} before, {removed} removed; {added} added\n")
+            }
+            None => format!("{output}: {written} of {}\n", counted(of, "Gaussian")),
+        };
+        context.show(&result, &text)
     }
 }
 
-/// Where the result of an edit goes.
-#[derive(Clone, Copy)]
-pub(crate) struct Target<'a> {
-    /// The model that it is made of.
-    pub model: &'a Path,
-    /// File to write.
-    pub output: &'a Path,
-    /// How it is written.
-    pub write: WriteArgs,
-    /// The summary is printed as JSON.
-    pub print_json: bool,
+/// The result of an edit.
+pub(crate) struct Edited<'a> {
+    /// The model.
+    pub model: &'a Gaussians,
+    /// The names of its labels, if the source has names.
+    pub table: Option<LabelTable>,
+    /// Number of Gaussians of the source.
+    pub of: usize,
+    /// Number of Gaussians that the source has not.
+    pub added: u64,
+    /// Labels that were chosen or made.
+    pub labels: BTreeSet<u32>,
 }
 
-impl<'a> Target<'a> {
-    pub(crate) fn new((model, output): (&'a Path, &'a Path), write: WriteArgs, print_json: bool) -> Self {
-        Self { model, output, write, print_json }
+impl<'a> Edited<'a> {
+    /// The result of an edit that adds no Gaussians to the `of` before.
+    pub(crate) fn new(model: &'a Gaussians, table: Option<LabelTable>, of: usize, labels: BTreeSet<u32>) -> Self {
+        Self { model, table, of, added: 0, labels }
+    }
+
+    /// The result of an edit that leaves the labels alone.
+    pub(crate) fn with_labels_of(model: &'a Gaussians, known: Catalogue, of: usize) -> Self {
+        Self::new(model, known.table, of, model.labels.iter().flatten().copied().collect())
     }
 }
 
@@ -148,6 +174,12 @@ pub(crate) fn or_list<T>(found: Result<T>, model: &Path) -> Result<T> {
     })
 }
 
+/// Refuses a model without labels.
+pub(crate) fn require_labels(model: &Path, has_labels: bool) -> Result<()> {
+    const PROBLEM: &str = "the model has no labels; train it with masks, or give it some with labelgs label";
+    if has_labels { Ok(()) } else { Err(Error::data(model, "", PROBLEM)) }
+}
+
 /// Opens a model and counts its labels.
 pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalogue)> {
     let read = models::open(model)?;
@@ -175,55 +207,4 @@ pub(crate) fn look(path: &Path, table: &TableArg) -> Result<Seen> {
     })?;
     let known = Catalogue { gaussians: tally.counts(), table: table.open(path, model.names().cloned())? };
     Ok(Seen { model, tally, known })
-}
-
-/// The result of an edit.
-pub(crate) struct Edited<'a> {
-    /// The model.
-    pub model: &'a Gaussians,
-    /// The names of its labels, if the source has names.
-    pub table: Option<LabelTable>,
-    /// Number of Gaussians of the source.
-    pub of: usize,
-    /// Number of Gaussians that the source has not.
-    pub added: u64,
-    /// Labels that were chosen or made.
-    pub labels: &'a BTreeSet<u32>,
-}
-
-impl Edited<'_> {
-    /// Writes model and table and prints a summary. `more` holds further fields of the JSON.
-    pub(crate) fn finish(&self, to: &Target, more: serde_json::Value) -> Result<()> {
-        let left_out =
-            export_model(to.output, self.model, self.table.as_ref(), to.write.options(to.model, to.output)?)?;
-        let beside = LabelTable::beside(to.output);
-        let written = self.model.len() as u64 - left_out;
-        if to.print_json {
-            let mut result = json!({
-                "schema_version": 1,
-                "output": to.output.display().to_string(),
-                "label_table": self.table.as_ref().filter(|_| beside.is_file()).map(|_| beside.display().to_string()),
-                "labels": self.labels,
-                "gaussians": written,
-                "of": self.of,
-            });
-            if let (Some(result), serde_json::Value::Object(more)) = (result.as_object_mut(), more) {
-                result.extend(more);
-            }
-            return stdout::print_json(&result);
-        }
-        let (output, of, added) = (to.output.display(), self.of, self.added);
-        match (of as u64 + added).checked_sub(written).filter(|_| added > 0) {
-            Some(removed) => stdout::print(&format!(
-                "{output}: {}: of {of} before, {removed} removed; {added} added\n",
-                counted(written, "Gaussian")
-            )),
-            None => stdout::print(&format!("{output}: {written} of {}\n", counted(of as u64, "Gaussian"))),
-        }
-    }
-}
-
-/// Returns true if `--json` was typed before or after the command.
-pub(crate) fn wants_json(context: &Context, here: &JsonFlag) -> bool {
-    context.json || here.json
 }

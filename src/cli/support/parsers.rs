@@ -9,6 +9,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 pub(crate) use crate::options::parse::{bytes, colour, count};
 
@@ -137,31 +138,34 @@ fn in_view<const N: usize>(text: &str, expected: &str) -> Result<(String, [u32; 
     Ok((view.to_owned(), numbers))
 }
 
+/// Parses a number that is what was `expected`.
+fn number<T: FromStr + Copy>(text: &str, is_valid: impl Fn(T) -> bool, expected: &str) -> Result<T, String> {
+    text.parse().ok().filter(|&value| is_valid(value)).ok_or_else(|| format!("`{text}` is not {expected}"))
+}
+
 /// Parses a share, 0 to 1.
 pub(crate) fn share(text: &str) -> Result<f32, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
-    value.ok_or_else(|| format!("`{text}` is not a share; expected 0 to 1"))
+    number(text, |value| (0.0..=1.0).contains(&value), "a share; expected 0 to 1")
 }
 
 /// Parses a distance, world units, 0 or more.
 pub(crate) fn distance(text: &str) -> Result<f64, String> {
-    zero_or_more(text, "a distance", "in world units")
+    number(text, |value: f64| value.is_finite() && value >= 0.0, "a distance; expected 0 or more, in world units")
 }
 
 /// Parses a loss of PSNR, dB, 0 or more.
 pub(crate) fn loss(text: &str) -> Result<f64, String> {
-    zero_or_more(text, "a loss of PSNR", "in dB")
-}
-
-fn zero_or_more(text: &str, what: &str, unit: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
-    value.ok_or_else(|| format!("`{text}` is not {what}; expected 0 or more, {unit}"))
+    number(text, |value: f64| value.is_finite() && value >= 0.0, "a loss of PSNR; expected 0 or more, in dB")
 }
 
 /// Parses a factor, more than 0.
 pub(crate) fn factor(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0);
-    value.ok_or_else(|| format!("`{text}` is not a factor; expected more than 0"))
+    number(text, |value: f64| value.is_finite() && value > 0.0, "a factor; expected more than 0")
+}
+
+/// Parses a near plane, world units, more than 0.
+pub(crate) fn near(text: &str) -> Result<f32, String> {
+    number(text, |value: f32| value.is_finite() && value > 0.0, "a near plane; expected more than 0, in world units")
 }
 
 /// Parses a place such as `1.5,0,-2`.
@@ -195,12 +199,6 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let all: Option<Vec<f64>> =
         text.split(',').map(|number| number.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
     all?.try_into().ok()
-}
-
-/// Parses a near plane, world units, more than 0.
-pub(crate) fn near(text: &str) -> Result<f32, String> {
-    let value = text.parse().ok().filter(|value: &f32| value.is_finite() && *value > 0.0);
-    value.ok_or_else(|| format!("`{text}` is not a near plane; expected more than 0, in world units"))
 }
 
 /// Parses a size such as `320x240`.

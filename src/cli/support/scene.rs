@@ -2,14 +2,12 @@
 
 use crate::cli::support::args::SceneArgs;
 use crate::cli::support::context::Context;
-use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
 use crate::records::pipeline_file::PipelineFolder;
 use crate::run::Settings;
-use crate::scene::{Dataset, Gaussians, View};
+use crate::scene::{Dataset, View};
 use crate::scenes::{self, LoadOptions};
-use crate::scheduler::SchedulerOptions;
 use crate::train::setup::near_plane::NEAR;
 use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
@@ -90,14 +88,4 @@ pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View
 
 fn without_extension(name: &str) -> String {
     Path::new(name).with_extension("").to_string_lossy().into_owned()
-}
-
-/// Returns an engine with memory for `model` and the largest of `sizes`; the model is not uploaded.
-pub(crate) fn render_engine(
-    gpu: Arc<Gpu>,
-    model: &Gaussians,
-    sizes: impl Iterator<Item = (u32, u32)>,
-    options: SchedulerOptions,
-) -> Result<Engine> {
-    Engine::new(gpu, EngineSize::of_model(model, sizes), options)
 }

@@ -1,16 +1,14 @@
-//! What commands with scores share: how much is scored, progress, the page of `--page`, JSON, least scores.
+//! What commands with scores share: how much is scored, progress, the page of `--page`, least scores.
 
 use crate::Result;
 use crate::cli::support::context::Context;
+use crate::cli::support::json_file::JsonFileArg;
 use crate::cli::support::log::Progress;
 use crate::cli::support::model_drawer::MemoryArg;
 use crate::cli::support::model_edit::MinConfidenceArg;
 use crate::cli::support::parsers::near;
-use crate::cli::support::stdout;
-use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::page::Page;
-use crate::files::atomic::write_json;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -37,44 +35,10 @@ pub struct ScoreArgs {
     /// Least mean IoU. Exit status 1 if it is lower.
     #[arg(long, value_name = "IOU", help_heading = "Checks")]
     pub min_iou: Option<f64>,
-    /// Memory.
     #[command(flatten)]
     pub memory: MemoryArg,
-    /// Write all scores as JSON to FILE, or to standard output without FILE.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
-    pub json: Option<Option<PathBuf>>,
-}
-
-impl Default for ScoreArgs {
-    fn default() -> Self {
-        Self {
-            near: None,
-            sure: MinConfidenceArg { min_confidence: MIN_LABEL_CONFIDENCE },
-            lpips: None,
-            page: None,
-            min_psnr: None,
-            min_iou: None,
-            memory: MemoryArg::default(),
-            json: None,
-        }
-    }
-}
-
-impl ScoreArgs {
-    /// Writes or prints the scores as JSON if asked to. Prints the table unless JSON is printed.
-    pub(crate) fn put_out(&self, scores: &impl serde::Serialize, table: &str, context: &Context) -> Result<()> {
-        match &self.json {
-            Some(Some(file)) => write_json(file, scores)?,
-            Some(None) => return stdout::print_json(scores),
-            None => {}
-        }
-        if context.json { stdout::print_json(scores) } else { stdout::print(table) }
-    }
-}
-
-/// Returns a score as text.
-pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
-    value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+    #[command(flatten)]
+    pub json: JsonFileArg,
 }
 
 /// Counts pictures and adds them to the page.

@@ -80,8 +80,8 @@ pub(crate) fn by_key(sets: &[Assignment], is_typed: impl Fn(&str) -> bool) -> Re
     Ok(values)
 }
 
-/// Returns the arguments of all settings with their defaults in the help.
-fn documented() -> Vec<(&'static Key, Arg)> {
+/// Returns the default of each setting that has one, by key.
+fn defaults() -> BTreeMap<String, String> {
     let mut defaults = Settings::default().texts();
     // Defaults whose values need words.
     for (key, text) in [
@@ -94,6 +94,12 @@ fn documented() -> Vec<(&'static Key, Arg)> {
     ] {
         defaults.insert(key.into(), text.into());
     }
+    defaults
+}
+
+/// Returns the arguments of all settings with their defaults in the help.
+fn documented() -> Vec<(&'static Key, Arg)> {
+    let defaults = defaults();
     let commands = [all::<ReadOptions>(), all::<TrainConfig>(), all::<RunOptions>()];
     let args: BTreeMap<String, &Arg> =
         commands.iter().flat_map(clap::Command::get_arguments).map(|arg| (arg.get_id().to_string(), arg)).collect();
@@ -114,17 +120,15 @@ const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
 
 /// Returns the command `train` with defaults in its help.
 pub(crate) fn in_help(train: clap::Command) -> clap::Command {
-    let documented: BTreeMap<&str, Arg> = documented().into_iter().map(|(key, arg)| (key.name, arg)).collect();
+    let defaults = defaults();
     train.mut_args(|arg| {
         let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
         if arg.get_id() == "preset" {
             let help = arg.get_long_help().map(ToString::to_string).unwrap_or_default();
             return arg.long_help(format!("{help} {}", paper()));
         }
-        let Some(known) = documented.get(arg.get_id().as_str()) else { return arg };
-        let (short, long) = (known.get_help().cloned(), known.get_long_help().cloned());
-        let arg = if let Some(help) = short { arg.help(help) } else { arg };
-        if let Some(help) = long { arg.long_help(help) } else { arg }
+        let default = defaults.get(arg.get_id().as_str());
+        with_default(arg, default)
     })
 }
 

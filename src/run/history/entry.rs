@@ -34,7 +34,7 @@ pub(crate) enum Entry {
 }
 
 /// Means over the steps after the line before, up to this one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Steps {
     /// Last step.
     pub step: u32,
@@ -88,6 +88,16 @@ impl Entry {
         matches!(self, Self::Preview(_) | Self::Scores(_))
     }
 
+    /// Returns the scores of a preview.
+    pub(crate) fn preview(&self) -> Option<&Scored> {
+        if let Self::Preview(scored) = self { Some(scored) } else { None }
+    }
+
+    /// Returns the scores of the end.
+    pub(crate) fn scores(&self) -> Option<&Scored> {
+        if let Self::Scores(scored) = self { Some(scored) } else { None }
+    }
+
     /// Returns the numbers of a line about steps.
     pub(crate) fn steps(&self) -> Option<&Steps> {
         if let Self::Steps(steps) = self { Some(steps) } else { None }
@@ -116,18 +126,10 @@ impl Sums {
         self.label_loss += report.label_loss;
     }
 
-    pub(super) fn line(self, step: u32, gaussians: u32, ms: f64, seconds: f64) -> Steps {
-        let mean = |sum: f64| sum / f64::from(self.steps.max(1));
-        Steps {
-            step,
-            loss: mean(self.loss),
-            loss_max: self.loss_max,
-            l1: mean(self.l1),
-            ssim: mean(self.ssim),
-            label_loss: mean(self.label_loss),
-            gaussians,
-            ms,
-            seconds,
-        }
+    /// Puts the means into a line that has the rest.
+    pub(super) fn into_line(self, rest: Steps) -> Steps {
+        let [loss, l1, ssim, label_loss] =
+            [self.loss, self.l1, self.ssim, self.label_loss].map(|sum| sum / f64::from(self.steps.max(1)));
+        Steps { loss, loss_max: self.loss_max, l1, ssim, label_loss, ..rest }
     }
 }

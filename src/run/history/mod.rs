@@ -30,21 +30,13 @@ pub(super) struct Recorder {
     lines: Option<Lines>,
     sums: Sums,
     /// Lines whose reports are not known yet.
-    due: VecDeque<Due>,
+    due: VecDeque<Steps>,
     /// Time in steps since the last line, and their number.
     spent: (Duration, u32),
     /// Seconds of the run before `start`.
     before: f64,
     start: Instant,
     has_warned: bool,
-}
-
-/// What a line holds besides the reports of its steps.
-struct Due {
-    step: u32,
-    gaussians: u32,
-    ms: f64,
-    seconds: f64,
 }
 
 impl Recorder {
@@ -88,7 +80,8 @@ impl Recorder {
         if step.is_multiple_of(EVERY) || is_last {
             let ms = 1000.0 * self.spent.0.as_secs_f64() / f64::from(self.spent.1);
             self.spent = (Duration::ZERO, 0);
-            self.due.push_back(Due { step, gaussians, ms, seconds: self.seconds() });
+            let seconds = self.seconds();
+            self.due.push_back(Steps { step, gaussians, ms, seconds, ..Steps::default() });
         }
     }
 
@@ -100,8 +93,8 @@ impl Recorder {
                 continue;
             }
             let Some(due) = self.due.pop_front() else { continue };
-            let steps = std::mem::take(&mut self.sums).line(due.step, due.gaussians, due.ms, due.seconds);
-            self.put(&Entry::Steps(steps));
+            let line = std::mem::take(&mut self.sums).into_line(due);
+            self.put(&Entry::Steps(line));
         }
     }
 

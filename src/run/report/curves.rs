@@ -76,25 +76,16 @@ fn views_of(runs: &[Ran], value: impl Fn(&Scored) -> Option<f64>) -> Vec<Series>
     let mut series = Vec::new();
     for (index, run) in runs.iter().enumerate() {
         let point = |scored: &Scored| Some((f64::from(scored.step), value(scored)?));
-        let previews = run.history.iter().filter_map(|entry| match entry {
-            Entry::Preview(scored) => point(scored),
-            _ => None,
-        });
-        let ends = run.history.iter().filter_map(|entry| match entry {
-            Entry::Scores(scored) => point(scored),
-            _ => None,
-        });
-        let view = run.history.iter().find_map(|entry| match entry {
-            Entry::Preview(scored) => scored.view.as_deref(),
-            _ => None,
-        });
+        let previews = || run.history.iter().filter_map(Entry::preview);
+        let ends = run.history.iter().filter_map(Entry::scores).filter_map(point);
+        let view = previews().find_map(|scored| scored.view.as_deref());
         let one = runs.len() == 1;
         let (name, all) = if one {
             (format!("view {}", view.unwrap_or_default()), "all held-out views".to_owned())
         } else {
             (run.name.clone(), format!("{}, all held-out views", run.name))
         };
-        series.push(Series::new(name, index, previews));
+        series.push(Series::new(name, index, previews().filter_map(point)));
         series.push(Series::new(all, if one { 1 } else { index }, ends));
     }
     series

@@ -31,8 +31,6 @@ pub(super) struct Ran {
 pub(super) struct Metrics {
     pub steps: u32,
     pub gaussians: u32,
-    pub loss: Option<f64>,
-    pub label_loss: Option<f64>,
     pub objects: Vec<ObjectSummary>,
     pub test: Option<Test>,
 }
@@ -45,8 +43,6 @@ pub(super) struct Test {
     pub ssim: Option<f64>,
     pub iou_map: Option<f64>,
     pub iou_object: Option<f64>,
-    pub boundary_iou: Option<f64>,
-    pub object_psnr: Option<f64>,
 }
 
 /// Times of the stages of a step.
@@ -60,14 +56,8 @@ pub(super) struct Profile {
 
 /// Reads a file of JSON; none if there is none.
 pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let text = read::text(path)?;
-    serde_json::from_str(&text).map(Some).map_err(|error| {
-        let place = format!("line {}", error.line());
-        Error::data(path, place, format!("is not a valid record of a training ({error}); correct or delete it"))
-    })
+    const EXPECTED: &str = "this is not a valid record of a training; correct or delete it";
+    if path.is_file() { read::json(path, EXPECTED).map(Some) } else { Ok(None) }
 }
 
 impl Ran {

@@ -7,9 +7,7 @@ mod table;
 use crate::cli::commands::eval::{self, EvalArgs};
 use crate::cli::commands::train;
 use crate::cli::commands::train::args::TrainFlags;
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::{signals, stdout};
+use crate::cli::support::{Context, signals};
 use crate::eval::scores::{MeanScores, Scores};
 use crate::files::atomic;
 use crate::run::{Settings, report};
@@ -18,6 +16,7 @@ use clap::{Args, FromArgMatches};
 use rows::{Masks, Row, rows};
 use serde::Serialize;
 use serde_json::json;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// `labelgs ablate`.
@@ -48,9 +47,6 @@ pub struct AblateArgs {
     /// Number of runs of each variant; their seeds are 0, 1, ...
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     pub seeds: u64,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
     /// Flags of `labelgs train` for all variants, after `--`.
     #[arg(last = true, value_name = "FLAGS")]
     pub common: Vec<String>,
@@ -97,10 +93,7 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
         outcomes.iter().flat_map(|(row, runs)| runs.iter().map(|run| folder(args, row, run.seed))).collect();
     let page = report::write_with(&folders, &args.output.join(report::FILE), &text)?;
     tracing::info!("report: {}", page.display());
-    if context.json || args.json.json {
-        return stdout::print_json(&record);
-    }
-    stdout::print(&text)
+    context.show(&record, &text)
 }
 
 /// Returns the folder of a run.
@@ -144,8 +137,15 @@ fn one(row: &Row, seed: u64, args: &AblateArgs, context: &Context) -> Result<Out
 
 /// Scores the model of a variant on its test views.
 fn score(out: &Path, settings: &Settings, args: &AblateArgs, context: &Context) -> Result<Scores> {
-    let mut eval = EvalArgs::new(out, &args.scene);
-    eval.masks = Some(args.truth.as_ref().unwrap_or(&args.masks).clone());
-    eval.background = settings.train.background;
-    eval::score(&eval, context)
+    let flag = |name: &str, path: &Path| {
+        let mut typed = OsString::from(name);
+        typed.push(path);
+        typed
+    };
+    let masks = flag("--masks=", args.truth.as_ref().unwrap_or(&args.masks));
+    let typed = ["eval".into(), flag("--scene=", &args.scene), masks, "--".into(), out.into()];
+    let parsed = EvalArgs::augment_args(clap::Command::new("labelgs")).try_get_matches_from(typed);
+    let eval = parsed.and_then(|words| EvalArgs::from_arg_matches(&words));
+    let eval = eval.map_err(|error| Error::Bug(format!("flags of eval: {error}")))?;
+    eval::score(&EvalArgs { background: settings.train.background, ..eval }, context)
 }

@@ -2,11 +2,10 @@
 
 mod table;
 
-use crate::cli::support::args::SceneArgs;
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::model_edit::TableArg;
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene, render_engine};
-use crate::cli::support::scoring::{ScoreArgs, Watcher};
+use crate::cli::support::{
+    Context, SceneArgs, ScoreArgs, TableArg, Watcher, near_plane, open_gpu, open_model, open_scene, require_labels,
+};
+use crate::engine::{Engine, EngineSize};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::bench::Bench;
 use crate::eval::protocol::paint::EnginePainter;
@@ -48,13 +47,10 @@ pub struct BenchmarkArgs {
     /// Follow the published scorer, mistakes included; only for labelgs and lerf-mask.
     #[arg(long)]
     pub compat: bool,
-    /// Names.
     #[command(flatten)]
     pub table: TableArg,
-    /// How it is scored.
     #[command(flatten)]
     pub scoring: ScoreArgs,
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
 }
@@ -73,13 +69,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let names = read_names(args, &layout)?;
     let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
     let model = open_model(&args.model)?;
-    if model.labels.is_none() {
-        return Err(Error::data(
-            &args.model,
-            "",
-            "the model has no labels; train it with masks, or give it some with labelgs label",
-        ));
-    }
+    require_labels(&args.model, model.labels.is_some())?;
     let dataset = open_scene(&args.scene, &args.reading, None, [0.0; 3], true)?;
     let (views, test) = (dataset.all(), test_views(protocol, &dataset, &args.scene));
     let labels: BTreeSet<u32> = model.labels.iter().flatten().copied().filter(|&label| label != UNLABELLED).collect();
@@ -98,7 +88,8 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     bench.check(&layout, &root)?;
     let mut watcher = Watcher::new(picture_count(&layout), args.scoring.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = render_engine(open_gpu(context)?, &model, sizes, args.scoring.memory.options())?;
+    let size = EngineSize::of_model(&model, sizes);
+    let mut engine = Engine::new(open_gpu(context)?, size, args.scoring.memory.options())?;
     let mut painter = EnginePainter::new(
         &mut engine,
         &model,
@@ -109,7 +100,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
     let table = table(&report);
     watcher.finish(&table)?;
-    args.scoring.put_out(&report, &table, context)?;
+    args.scoring.json.put_out(&report, &table, context)?;
     report.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 
@@ -141,7 +132,7 @@ fn keep_objects(layout: &mut Layout, wanted: &[String]) -> Result<()> {
 
 /// Reads the names of the labels. Fails if objects are chosen by name and no name is known.
 fn read_names(args: &BenchmarkArgs, layout: &Layout) -> Result<Option<LabelTable>> {
-    let found = args.table.label_table.clone().or_else(|| LabelTable::find_for_model(&args.model));
+    let found = args.table.file(&args.model);
     let names = found.as_deref().map(LabelTable::read).transpose()?;
     let named: Vec<&str> =
         layout.tasks.iter().filter(|task| task.prompt == Prompt::Name).map(|task| task.object.as_str()).collect();

@@ -2,10 +2,8 @@
 
 use crate::Result;
 use crate::blocks::{Estimate, Sketch, estimate};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
+use crate::cli::support::Context;
 use crate::cli::support::parsers::{Size, bytes, count, size};
-use crate::cli::support::stdout;
 use crate::words::counted;
 use clap::Args;
 use serde_json::json;
@@ -42,9 +40,6 @@ pub struct EstimateArgs {
     /// Gaussians with which it was measured.
     #[arg(long, value_name = "N", value_parser = count, requires = "step_ms")]
     pub step_gaussians: Option<u64>,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Shows the blocks of a scene on paper.
@@ -59,10 +54,7 @@ pub(super) fn run(args: &EstimateArgs, context: &Context) -> Result<()> {
         steps: args.iterations,
         pace: args.step_ms.map(|ms| ms / 1000.0).zip(args.step_gaussians),
     })?;
-    if context.json || args.json.json {
-        return stdout::print_json(&to_json(&found));
-    }
-    stdout::print(&to_text(&found))
+    context.show(&to_json(&found), &to_text(&found))
 }
 
 fn hours(found: &Estimate) -> Option<f64> {

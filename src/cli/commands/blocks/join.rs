@@ -2,10 +2,7 @@
 
 use crate::Result;
 use crate::blocks::{BlockMasks, MergeOptions, Merged, merge};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::scene::open_gpu;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, open_gpu};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,9 +28,6 @@ pub struct JoinArgs {
     /// Scene of the photos, for --block-masks.
     #[arg(long, value_name = "SCENE", requires = "block_masks")]
     pub scene: Option<PathBuf>,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Joins the blocks.
@@ -43,10 +37,7 @@ pub(super) fn run(args: &JoinArgs, context: &Context) -> Result<()> {
     let masks = masks.map(|(scene, masks)| BlockMasks { scene, masks, open: &open });
     let options = MergeOptions { allow_missing: args.allow_missing, masks };
     let merged = merge(&args.blocks, &args.models, &args.output, &options)?;
-    if context.json || args.json.json {
-        return stdout::print_json(&merged.to_json());
-    }
-    stdout::print(&sentence(&merged))
+    context.show(&merged.to_json(), &sentence(&merged))
 }
 
 fn sentence(merged: &Merged) -> String {

@@ -5,16 +5,8 @@ mod join;
 mod split;
 
 use crate::Result;
-use crate::cli::support::context::Context;
-use clap::{Args, Subcommand};
-
-/// `labelgs blocks`.
-#[derive(Args, Clone, Debug)]
-pub struct BlocksArgs {
-    /// The command.
-    #[command(subcommand)]
-    pub verb: BlocksVerb,
-}
+use crate::cli::support::Context;
+use clap::Subcommand;
 
 /// The commands for blocks.
 #[derive(Clone, Debug, Subcommand)]
@@ -33,11 +25,13 @@ pub enum BlocksVerb {
     Join(join::JoinArgs),
 }
 
-/// Runs a command for blocks.
-pub(crate) fn run(args: &BlocksArgs, context: &Context) -> Result<()> {
-    match &args.verb {
-        BlocksVerb::Estimate(args) => estimate::run(args, context),
-        BlocksVerb::Split(args) => split::run(args, context),
-        BlocksVerb::Join(args) => join::run(args, context),
+impl BlocksVerb {
+    /// Runs the command.
+    pub(crate) fn run(&self, context: &Context) -> Result<()> {
+        match self {
+            Self::Estimate(args) => estimate::run(args, context),
+            Self::Split(args) => split::run(args, context),
+            Self::Join(args) => join::run(args, context),
+        }
     }
 }

@@ -1,18 +1,15 @@
 //! `labelgs blocks split`.
 
 use crate::Result;
-use crate::blocks::{self, Plan, PlanOptions};
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::Context;
+use crate::blocks::{self, BlockRow, Plan, PlanOptions};
 use crate::cli::support::parsers::{bytes, count, direction};
-use crate::cli::support::scene::open_gpu;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, ReadArgs, open_gpu};
 use crate::files::atomic;
 use crate::scenes::LoadOptions;
 use crate::words::counted;
 use clap::Args;
 use glam::DVec3;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// `labelgs blocks split`.
@@ -51,12 +48,8 @@ pub struct SplitArgs {
     /// Direction of the scene that points up: x, -x, y, -y, z, -z or X,Y,Z. Default: that of the cameras.
     #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
-    /// Tolerance.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes the blocks and shows them.
@@ -64,7 +57,9 @@ pub(super) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
     args.output.as_ref().map_or(Ok(()), |folder| atomic::require_empty("--output", folder))?;
     let plan = planned(args, context)?;
     args.output.as_ref().map_or(Ok(()), |folder| blocks::split(&plan, folder))?;
-    show(args, context, &plan)
+    let rows = plan.rows();
+    let result = json!({ "schema_version": 1, "card": args.card, "far": plan.far, "blocks": rows });
+    context.show(&result, &to_text(&plan, &rows))
 }
 
 fn planned(args: &SplitArgs, context: &Context) -> Result<Plan> {
@@ -81,20 +76,12 @@ fn planned(args: &SplitArgs, context: &Context) -> Result<Plan> {
     blocks::plan(&args.scene, &args.model, &options, &|| open_gpu(context))
 }
 
-fn show(args: &SplitArgs, context: &Context, plan: &Plan) -> Result<()> {
-    if context.json || args.json.json {
-        return stdout::print_json(&to_json(args, plan));
-    }
-    stdout::print(&to_text(plan))
-}
-
-fn to_text(plan: &Plan) -> String {
+fn to_text(plan: &Plan, rows: &[BlockRow]) -> String {
     let mut text = format!(
         "{:<6} {:>6} {:>10} {:>10} {:>10} {:>8} {:>8} {:>7} {:>8}\n",
         "block", "views", "start", "Gaussians", "frozen", "MiB", "host MiB", "steps", "minutes"
     );
-    let rows = plan.rows();
-    for block in &rows {
+    for block in rows {
         let minutes = block.minutes.map_or("unknown".to_owned(), |minutes| format!("{minutes:.1}"));
         let note = if block.trained { "" } else { "  too few views: stays coarse" };
         text += &format!(
@@ -117,8 +104,4 @@ fn to_text(plan: &Plan) -> String {
         counted(trained().count(), "block"),
         if plan.far == 1 { "1 far Gaussian stays".to_owned() } else { format!("{} far Gaussians stay", plan.far) }
     )
-}
-
-fn to_json(args: &SplitArgs, plan: &Plan) -> Value {
-    json!({ "schema_version": 1, "card": args.card, "far": plan.far, "blocks": plan.rows() })
 }

@@ -1,10 +1,9 @@
 //! Arguments of `labelgs eval`.
 
-use crate::cli::support::args::SceneArgs;
 use crate::cli::support::parsers::colour;
-use crate::cli::support::scoring::ScoreArgs;
+use crate::cli::support::{SceneArgs, ScoreArgs};
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// `labelgs eval`.
 #[derive(Args, Clone, Debug)]
@@ -40,29 +39,8 @@ pub struct EvalArgs {
     /// label with the largest sum of weights.
     #[arg(long, help_heading = "Labels")]
     pub compat: bool,
-    /// How it is scored.
     #[command(flatten)]
     pub scoring: ScoreArgs,
-    /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-}
-
-impl EvalArgs {
-    /// Returns the arguments of a command with a model, a scene and no flags.
-    pub fn new(model: &Path, scene: &Path) -> Self {
-        Self {
-            model: model.to_owned(),
-            scene: scene.to_owned(),
-            views: "test".to_owned(),
-            masks: None,
-            amodal: None,
-            removal: false,
-            refine_poses: false,
-            background: [0.0; 3],
-            compat: false,
-            scoring: ScoreArgs::default(),
-            reading: SceneArgs::default(),
-        }
-    }
 }

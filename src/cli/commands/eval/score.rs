@@ -3,11 +3,10 @@
 use super::EvalArgs;
 use super::table::table;
 use crate::blocks::Seams;
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::model_drawer::largest;
-use crate::cli::support::model_fit::warn_of_misfit;
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene, pick_views, render_engine};
-use crate::cli::support::scoring::Watcher;
+use crate::cli::support::{
+    Context, Watcher, largest, near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit,
+};
+use crate::engine::{Engine, EngineSize};
 use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
 use crate::eval::lpips::Weights;
@@ -23,7 +22,7 @@ use crate::masks::mask::read_mask;
 use crate::render::RenderOptions;
 use crate::render::large::{Index, Painter, fits};
 use crate::run::models;
-use crate::scene::{Camera, Dataset, Gaussians, Photo, View};
+use crate::scene::{Camera, Dataset, Photo, View};
 use crate::scheduler::SchedulerOptions;
 use crate::train::aligned;
 use crate::{Error, Result};
@@ -33,7 +32,7 @@ use std::sync::Arc;
 /// Scores a model and prints the scores.
 pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     let scores = score(args, context)?;
-    args.scoring.put_out(&scores, &table(&scores), context)?;
+    args.scoring.json.put_out(&scores, &table(&scores), context)?;
     scores.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 
@@ -82,8 +81,12 @@ impl Job<'_> {
         let (args, how) = (self.args, self.how);
         let model = open_model(&args.model)?;
         warn_of_misfit(&args.model, &model, self.dataset)?;
-        let removing = if args.removal { Some(Removing::new(args, &model, self.dataset)?) } else { None };
-        let pictures = picture_count(&views) + removing.as_ref().map_or(0, |_| removal::picture_count(&views));
+        if args.removal && model.labels.is_none() {
+            let problem = "has no labels to remove objects by; train it with masks, or give it some with labelgs label";
+            return Err(Error::data(&args.model, "", problem));
+        }
+        let train = if args.removal { train_with_masks(args, self.dataset)? } else { Vec::new() };
+        let pictures = picture_count(&views) + if args.removal { removal::picture_count(&views) } else { 0 };
         let mut watcher = Watcher::new(pictures, args.scoring.page.as_deref(), self.context)?;
         let refined = match args.refine_poses {
             true => aligned(gpu, &model, &views, (how.options.near, args.background), memory)?,
@@ -91,15 +94,15 @@ impl Job<'_> {
         };
         let views = if args.refine_poses { refined.iter().collect() } else { views };
         let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-        let mut engine = render_engine(gpu.clone(), &model, sizes, memory)?;
+        let mut engine = Engine::new(gpu.clone(), EngineSize::of_model(&model, sizes), memory)?;
         let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: how.min_confidence };
         let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
-        if let Some(removing) = removing {
+        if args.removal {
             drop(engine);
-            let all: Vec<&View> = views.iter().copied().chain(removing.train.iter().copied()).collect();
+            let all: Vec<&View> = views.iter().chain(&train).copied().collect();
             let mut engine = limited_vote_engine(gpu.clone(), &model, &all, columns_of(&all), memory)?;
-            let (train, truth) = (&removing.train, &removing.truth);
-            scores.removal = Some(removals(&mut engine, &model, &views, train, how.options, truth, &mut watcher)?);
+            let (options, truth) = (how.options, &self.wholes);
+            scores.removal = Some(removals(&mut engine, &model, &views, &train, options, truth, &mut watcher)?);
         }
         watcher.finish(&table(&scores))?;
         Ok(scores)
@@ -134,65 +137,35 @@ impl Job<'_> {
     }
 }
 
-/// What scores of removals need besides the views.
-struct Removing<'a> {
-    /// Training views with masks.
-    train: Vec<&'a View>,
-    truth: Without,
+/// Returns the training views with masks, which scores of removals need.
+fn train_with_masks<'a>(args: &EvalArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
+    let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
+    if train.is_empty() {
+        let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
+        return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
+    }
+    Ok(train)
 }
 
-impl<'a> Removing<'a> {
-    fn new(args: &EvalArgs, model: &Gaussians, dataset: &'a Dataset) -> Result<Self> {
-        if model.labels.is_none() {
-            return Err(Error::data(
-                &args.model,
-                "",
-                "has no labels to remove objects by; train it with masks, or give it some with labelgs label",
-            ));
-        }
-        let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
-        if train.is_empty() {
-            let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
-            return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
-        }
-        Ok(Self { train, truth: Without { scene: args.scene.clone() } })
+/// Reads a photo without an object, `ID/NAME.png` in a folder that need not exist.
+fn without(folder: &Path, id: u32, view: &View) -> Result<Option<Photo>> {
+    let Some(file) = file_of(folder, id, view) else { return Ok(None) };
+    let picture = read_rgba(&file)?;
+    let (width, height) = (view.camera.width, view.camera.height);
+    if (picture.width, picture.height) != (width, height) {
+        let problem = format!(
+            "has {} x {} px, and view {} has {width} x {height} px; a photo without an object has the pixels of the \
+             view, so score without --max-resolution",
+            picture.width, picture.height, view.name
+        );
+        return Err(Error::data(file, "", problem));
     }
-}
-
-/// Photos without an object, `ID/NAME.png` in folders of a scene that need not exist.
-struct Without {
-    scene: PathBuf,
-}
-
-impl RemovalTruth for Without {
-    fn without(&self, id: u32, view: &View) -> Result<Option<Photo>> {
-        self.read("without", id, view)
-    }
-
-    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>> {
-        self.read("shadowed", id, view)
-    }
-}
-
-impl Without {
-    fn read(&self, kind: &str, id: u32, view: &View) -> Result<Option<Photo>> {
-        let Some(file) = file_of(&self.scene.join(kind), id, view) else { return Ok(None) };
-        let picture = read_rgba(&file)?;
-        let (width, height) = (view.camera.width, view.camera.height);
-        if (picture.width, picture.height) != (width, height) {
-            let problem = format!(
-                "has {} x {} px, and view {} has {width} x {height} px; a photo without an object has the pixels of the \
-                 view, so score without --max-resolution",
-                picture.width, picture.height, view.name
-            );
-            return Err(Error::data(file, "", problem));
-        }
-        Ok(Some(picture))
-    }
+    Ok(Some(picture))
 }
 
 /// Folders of ground truth about whole objects, `ID/NAME.png` in each.
 struct Folders {
+    scene: PathBuf,
     /// Outlines.
     amodal: Option<PathBuf>,
     /// Pictures without occluders.
@@ -205,7 +178,8 @@ impl Folders {
             return Err(Error::data(folder, "", "is not a folder; --amodal needs a folder with ID/NAME.png"));
         }
         let inside = |name: &str| Some(args.scene.join(name)).filter(|folder| folder.is_dir());
-        Ok(Self { amodal: args.amodal.clone().or_else(|| inside("amodal")), objects: inside("objects") })
+        let amodal = args.amodal.clone().or_else(|| inside("amodal"));
+        Ok(Self { amodal, objects: inside("objects"), scene: args.scene.clone() })
     }
 
     /// Logs what objects are compared with: hidden parts cost a score that counts them.
@@ -226,6 +200,16 @@ impl AmodalTruth for Folders {
         let Some(file) = self.objects.as_deref().and_then(|folder| file_of(folder, id, view)) else { return Ok(None) };
         let picture = read_rgba(&file)?;
         Ok(Some(at_view(view, (picture.width, picture.height), |index| picture.rgba[index])))
+    }
+}
+
+impl RemovalTruth for Folders {
+    fn without(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        without(&self.scene.join("without"), id, view)
+    }
+
+    fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>> {
+        without(&self.scene.join("shadowed"), id, view)
     }
 }
 

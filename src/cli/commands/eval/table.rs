@@ -1,140 +1,114 @@
 //! Scores as text.
 
-use crate::cli::support::scoring::number;
-use crate::eval::scores::Scores;
+use crate::cli::support::table::{self, Column, number};
+use crate::eval::PlaceScore;
+use crate::eval::removal::ObjectRemoval;
+use crate::eval::scores::{MeanScores, ObjectScores, Scores, ViewScores};
+
+const VIEWS: [Column<MeanScores>; 4] = [
+    ("PSNR", 8, 2, |row| row.psnr),
+    ("corrected", 9, 2, |row| row.psnr_corrected),
+    ("SSIM", 8, 4, |row| row.ssim),
+    ("LPIPS", 8, 4, |row| row.lpips),
+];
+const OBJECTS: [Column<ObjectScores>; 8] = [
+    ("iou_map", 8, 4, |row| row.iou_map),
+    ("boundary_iou", 12, 4, |row| row.boundary_iou),
+    ("iou_object", 10, 4, |row| row.iou_object),
+    ("paper_iou", 9, 4, |row| row.paper_iou),
+    ("object_psnr", 11, 2, |row| row.object_psnr),
+    ("object_ssim", 11, 4, |row| row.object_ssim),
+    ("iou_hidden", 10, 4, |row| row.iou_hidden),
+    ("psnr_hidden", 11, 2, |row| row.psnr_hidden),
+];
+const PLACES: [Column<PlaceScore>; 2] =
+    [("PSNR", 8, 2, |row| Some(row.psnr)), ("pixels", 10, 0, |row| Some(row.pixels as f64))];
+const REMOVED: [Column<ObjectRemoval>; 8] = [
+    ("removed", 11, 2, |row| row.votes.psnr),
+    ("filled", 11, 2, |row| row.filled.psnr),
+    ("mean colour", 11, 2, |row| row.mean_colour.psnr),
+    ("paper's", 11, 2, |row| row.main.psnr),
+    ("removed", 11, 2, |row| row.votes.psnr_shadowed),
+    ("filled", 11, 2, |row| row.filled.psnr_shadowed),
+    ("mean colour", 11, 2, |row| row.mean_colour.psnr_shadowed),
+    ("paper's", 11, 2, |row| row.main.psnr_shadowed),
+];
+const LEFT: [Column<ObjectRemoval>; 10] = [
+    ("leftover", 10, 4, |row| row.votes.leftover),
+    ("paper's", 10, 4, |row| row.main.leftover),
+    ("weight left", 13, 4, |row| row.votes.leftover_weight),
+    ("paper's", 13, 4, |row| row.main.leftover_weight),
+    ("hole", 8, 4, |row| row.hole),
+    ("filled", 8, 4, |row| row.hole_filled),
+    ("added", 8, 0, |row| Some(row.added as f64)),
+    ("in holes", 9, 2, |row| row.holes.filled),
+    ("shadowed", 9, 2, |row| row.holes.filled_shadowed),
+    ("ring mean", 9, 2, |row| row.holes.mean_colour),
+];
 
 /// Returns the table of views, then of objects.
 pub(super) fn table(scores: &Scores) -> String {
     let mut text = if scores.refined_poses { "poses refined by the model\n".to_owned() } else { String::new() };
     let mean = &scores.mean;
     // A column for LPIPS only where it was asked for.
-    let lpips = |cell: String| mean.lpips.map_or(String::new(), |_| format!(" {cell:>8}"));
-    text += &format!("{:>10} {:>8} {:>9} {:>8}{}\n", "view", "PSNR", "corrected", "SSIM", lpips("LPIPS".to_owned()));
-    for (name, view) in &scores.views {
-        let (psnr, corrected, ssim) = (view.psnr, view.psnr_corrected, view.ssim);
-        text += &format!("{name:>10} {psnr:>8.2} {corrected:>9.2} {ssim:>8.4}{}\n", lpips(number(view.lpips, 4)));
-    }
-    let cells = (number(mean.psnr, 2), number(mean.psnr_corrected, 2), number(mean.ssim, 4));
-    let last = lpips(number(mean.lpips, 4));
-    text += &format!("{:>10} {:>8} {:>9} {:>8}{last}\n", "mean", cells.0, cells.1, cells.2);
+    let columns = if mean.lpips.is_some() { &VIEWS[..] } else { &VIEWS[..3] };
+    let views: Vec<(String, MeanScores)> =
+        scores.views.iter().map(|(name, view)| (name.clone(), of_view(view))).collect();
+    let rows = views.iter().map(|(name, view)| (name.clone(), view));
+    text += &table::table(("view", 10), columns, rows.chain([("mean".to_owned(), mean)]));
     text += &regions(scores);
-    text += &places(scores);
+    if !scores.places.is_empty() {
+        let rows = scores.places.iter().map(|(name, score)| (name.clone(), score));
+        text += &format!("\n{}", table::table(("place", 14), &PLACES, rows));
+    }
     if scores.objects.is_empty() {
         return text;
     }
-    text += &format!(
-        "\n{:>10} {:>8} {:>12} {:>10} {:>9} {:>11} {:>11} {:>10} {:>11}\n",
-        "object",
-        "iou_map",
-        "boundary_iou",
-        "iou_object",
-        "paper_iou",
-        "object_psnr",
-        "object_ssim",
-        "iou_hidden",
-        "psnr_hidden"
-    );
     let rows = scores.objects.iter().map(|(id, scores)| (id.to_string(), scores));
-    for (name, row) in rows.chain([("mean".to_owned(), &scores.mean.objects)]) {
-        text += &format!(
-            "{name:>10} {:>8} {:>12} {:>10} {:>9} {:>11} {:>11} {:>10} {:>11}\n",
-            number(row.iou_map, 4),
-            number(row.boundary_iou, 4),
-            number(row.iou_object, 4),
-            number(row.paper_iou, 4),
-            number(row.object_psnr, 2),
-            number(row.object_ssim, 4),
-            number(row.iou_hidden, 4),
-            number(row.psnr_hidden, 2)
-        );
-    }
+    let rows = rows.chain([("mean".to_owned(), &mean.objects)]);
+    text += &format!("\n{}", table::table(("object", 10), &OBJECTS, rows));
     if mean.specks.is_some() {
         text += &format!("specks of the label map that masks do not have: {} in a view\n", number(mean.specks, 1));
     }
     text + &removals(scores)
 }
 
-/// Returns the table of places.
-fn places(scores: &Scores) -> String {
-    if scores.places.is_empty() {
-        return String::new();
+fn of_view(view: &ViewScores) -> MeanScores {
+    let ViewScores { psnr, psnr_corrected, ssim, lpips, .. } = *view;
+    MeanScores {
+        psnr: Some(psnr),
+        psnr_corrected: Some(psnr_corrected),
+        ssim: Some(ssim),
+        lpips,
+        ..MeanScores::default()
     }
-    let mut text = format!("\n{:>14} {:>8} {:>10}\n", "place", "PSNR", "pixels");
-    for (name, score) in &scores.places {
-        text += &format!("{name:>14} {:>8} {:>10}\n", number(Some(score.psnr), 2), score.pixels);
-    }
-    text
 }
 
-/// Returns the table of removals.
+/// Returns the tables of removals.
 fn removals(scores: &Scores) -> String {
     let Some(removal) = &scores.removal else { return String::new() };
-    let head = ["removed", "filled", "mean colour", "paper's"];
-    let mut text =
-        "\nPSNR at the place of a removed object, against photos without it, and with its shadow\n".to_owned();
-    text += &format!("{:>10}", "object");
-    head.iter().chain(&head).for_each(|name| text += &format!(" {name:>11}"));
-    text += "\n";
     let rows = || removal.objects.iter().map(|(id, row)| (id.to_string(), row)).chain([("mean".into(), &removal.mean)]);
-    for (name, row) in rows() {
-        let ways = [row.votes, row.filled, row.mean_colour, row.main];
-        text += &format!("{name:>10}");
-        ways.iter().for_each(|way| text += &format!(" {:>11}", number(way.psnr, 2)));
-        ways.iter().for_each(|way| text += &format!(" {:>11}", number(way.psnr_shadowed, 2)));
-        text += "\n";
-    }
-    text += &format!(
-        "\n{:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8} {:>9} {:>9} {:>9}\n",
-        "object",
-        "leftover",
-        "paper's",
-        "weight left",
-        "paper's",
-        "hole",
-        "filled",
-        "added",
-        "in holes",
-        "shadowed",
-        "ring mean"
-    );
-    for (name, row) in rows() {
-        text += &format!(
-            "{name:>10} {:>10} {:>10} {:>13} {:>13} {:>8} {:>8} {:>8} {:>9} {:>9} {:>9}\n",
-            number(row.votes.leftover, 4),
-            number(row.main.leftover, 4),
-            number(row.votes.leftover_weight, 4),
-            number(row.main.leftover_weight, 4),
-            number(row.hole, 4),
-            number(row.hole_filled, 4),
-            row.added,
-            number(row.holes.filled, 2),
-            number(row.holes.filled_shadowed, 2),
-            number(row.holes.mean_colour, 2)
-        );
-    }
-    text
+    format!(
+        "\nPSNR at the place of a removed object, against photos without it, and with its shadow\n{}\n{}",
+        table::table(("object", 10), &REMOVED, rows()),
+        table::table(("object", 10), &LEFT, rows())
+    )
 }
 
 /// Returns the PSNR by region.
 fn regions(scores: &Scores) -> String {
-    let mut text = String::new();
-    if let Some(mean) = &scores.mean.regions {
-        text += &format!(
-            "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
-            number(mean.psnr_seen, 2),
-            number(mean.psnr_seen_corrected, 2),
-            100.0 * mean.seen_share,
-            number(mean.psnr_unseen, 2)
-        );
-        if mean.psnr_objects.is_some() {
-            text += &format!(
-                "; objects {}, contours {}, rest {}",
-                number(mean.psnr_objects, 2),
-                number(mean.psnr_contours, 2),
-                number(mean.psnr_rest, 2)
-            );
-        }
-        text += "\n";
+    let Some(mean) = &scores.mean.regions else { return String::new() };
+    let psnr = |value| number(value, 2);
+    let mut text = format!(
+        "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
+        psnr(mean.psnr_seen),
+        psnr(mean.psnr_seen_corrected),
+        100.0 * mean.seen_share,
+        psnr(mean.psnr_unseen)
+    );
+    if mean.psnr_objects.is_some() {
+        let [objects, contours, rest] = [mean.psnr_objects, mean.psnr_contours, mean.psnr_rest].map(psnr);
+        text += &format!("; objects {objects}, contours {contours}, rest {rest}");
     }
-    text
+    text + "\n"
 }

@@ -1,9 +1,7 @@
 //! `labelgs masks check`.
 
 use super::open_photos;
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, ReadArgs};
 use crate::masks::check::{Finding, Problem};
 use crate::masks::{Report, inspect};
 use crate::{Error, Result};
@@ -21,12 +19,8 @@ pub struct CheckArgs {
     /// Scene whose photos the masks belong to.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Prints the findings. Fails if there are any.
@@ -35,22 +29,14 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let report = inspect(&dataset, &args.masks)?;
     let mut counts: BTreeMap<Problem, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.problem).or_default() += 1);
-    if context.json || args.json.json {
-        stdout::print_json(&json!({
-            "schema_version": 1,
-            "masks": args.masks.display().to_string(),
-            "scene": args.scene.display().to_string(),
-            "counts": counts,
-            "report": report,
-        }))?;
-    } else {
-        stdout::print(&table(args, &report))?;
-    }
+    let [masks, scene] = [&args.masks, &args.scene].map(|path| path.display().to_string());
+    let found = json!({ "schema_version": 1, "masks": masks, "scene": scene, "counts": counts, "report": report });
+    context.show(&found, &table(args, &report))?;
     if report.findings.is_empty() {
         return Ok(());
     }
     let counts: Vec<String> = counts.iter().map(|(problem, count)| format!("{count} {}", problem.text())).collect();
-    Err(Error::Check(format!("{}: {}", args.masks.display(), counts.join(", "))))
+    Err(Error::Check(format!("{masks}: {}", counts.join(", "))))
 }
 
 fn table(args: &CheckArgs, report: &Report) -> String {

@@ -1,9 +1,7 @@
 //! `labelgs masks collect`: from the masks of all frames to those of the photos (E in the paper).
 
 use super::{files_of_photos, write_mask};
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, ReadArgs};
 use crate::masks::mask::{mask_size_fits, read_mask};
 use crate::scene::LabelMap;
 use crate::scenes::frames::{Frame, Frames};
@@ -30,12 +28,8 @@ pub struct CollectArgs {
     /// Scene of the photos; needed if they were taken through lenses: masks are bent like their photos.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// How the scene is read.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes a mask per photo of the video, with the ids of its frame.
@@ -71,11 +65,9 @@ pub(crate) fn run(args: &CollectArgs, context: &Context) -> Result<()> {
         })
         .collect();
     written.into_iter().collect::<Result<()>>()?;
-    if context.json || args.json.json {
-        let masks: Vec<String> = photos.keys().map(|file| args.output.join(file).display().to_string()).collect();
-        return stdout::print_json(&json!({ "schema_version": 1, "masks": masks }));
-    }
-    stdout::print(&format!("{}: {} masks\n", args.output.display(), photos.len()))
+    let masks: Vec<String> = photos.keys().map(|file| args.output.join(file).display().to_string()).collect();
+    let text = format!("{}: {} masks\n", args.output.display(), masks.len());
+    context.show(&json!({ "schema_version": 1, "masks": masks }), &text)
 }
 
 fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {

@@ -2,10 +2,7 @@
 
 use super::open_photos;
 use crate::Result;
-use crate::cli::support::args::{JsonFlag, ReadArgs};
-use crate::cli::support::context::Context;
-use crate::cli::support::shell_words::quoted;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, ReadArgs, quoted};
 use crate::files::label_table::LabelEntry;
 use crate::masks::{Format, ImportOptions, Imported, ObjectPer, Objects, Overlap, import};
 use clap::Args;
@@ -36,12 +33,8 @@ pub struct ImportArgs {
     /// What makes two masks one object, where masks show one object each.
     #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
     pub object_per: ObjectPer,
-    /// Tolerance for the scene.
     #[command(flatten)]
     pub read: ReadArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Imports the masks.
@@ -56,27 +49,15 @@ pub(crate) fn run(args: &ImportArgs, context: &Context) -> Result<()> {
     };
     let done = import(&dataset, &options, &args.output)?;
     warn(&done);
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "output": args.output.display().to_string(),
-            "import": done,
-        }));
-    }
     let pred = done.pred.as_ref().map_or(String::new(), |pred| format!(", {}", pred.display()));
     let mut text = format!("{}{pred}: {} ({})\n", done.source.display(), done.format.name(), done.why);
-    text += &format!(
-        "{}: {} masks for {} photos, {} labels, {} bits\n",
-        args.output.display(),
-        done.masks,
-        done.photos,
-        done.labels.len(),
-        done.bits
-    );
+    let (output, labels) = (args.output.display().to_string(), done.labels.len());
+    let (masks, photos, bits) = (done.masks, done.photos, done.bits);
+    text += &format!("{output}: {masks} masks for {photos} photos, {labels} labels, {bits} bits\n");
     text += &format!("{:>6} {:>12} {:>6}  {:<24} source\n", "label", "pixels", "views", "name");
     done.labels.iter().for_each(|entry| text += &line(entry));
     text += &done.objects.as_ref().map_or(String::new(), |objects| meaning(objects, args));
-    stdout::print(&text)
+    context.show(&json!({ "schema_version": 1, "output": output, "import": done }), &text)
 }
 
 fn line(entry: &LabelEntry) -> String {

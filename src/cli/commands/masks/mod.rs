@@ -7,8 +7,7 @@ pub(crate) mod repair;
 pub(crate) mod spoil;
 pub(crate) mod track;
 
-use crate::cli::support::args::ReadArgs;
-use crate::cli::support::context::Context;
+use crate::cli::support::{Context, ReadArgs};
 use crate::files::image::{write_png_grey8, write_png_grey16};
 use crate::files::read;
 use crate::masks::mask_folder::png_key;
@@ -16,17 +15,9 @@ use crate::scene::{Dataset, LabelMap};
 use crate::scenes::window::Window;
 use crate::scenes::{self, LoadOptions};
 use crate::{Error, Result};
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
-
-/// `labelgs masks`.
-#[derive(Args, Clone, Debug)]
-pub struct MasksArgs {
-    /// The command.
-    #[command(subcommand)]
-    pub verb: MasksVerb,
-}
 
 /// The commands for masks.
 #[derive(Clone, Debug, Subcommand)]
@@ -58,15 +49,17 @@ pub enum MasksVerb {
     Spoil(spoil::SpoilArgs),
 }
 
-/// Runs a command for masks.
-pub(crate) fn run(args: &MasksArgs, context: &Context) -> Result<()> {
-    match &args.verb {
-        MasksVerb::Import(args) => import::run(args, context),
-        MasksVerb::Check(args) => check::run(args, context),
-        MasksVerb::Collect(args) => collect::run(args, context),
-        MasksVerb::Track(args) => track::run(args, context),
-        MasksVerb::Repair(args) => repair::run(args, context),
-        MasksVerb::Spoil(args) => spoil::run(args, context),
+impl MasksVerb {
+    /// Runs the command.
+    pub(crate) fn run(&self, context: &Context) -> Result<()> {
+        match self {
+            Self::Check(args) => check::run(args, context),
+            Self::Import(args) => import::run(args, context),
+            Self::Repair(args) => repair::run(args, context),
+            Self::Track(args) => track::run(args, context),
+            Self::Collect(args) => collect::run(args, context),
+            Self::Spoil(args) => spoil::run(args, context),
+        }
     }
 }
 

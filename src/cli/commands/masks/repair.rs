@@ -1,13 +1,8 @@
 //! `labelgs masks repair`.
 
 use super::{files_of_photos, write_mask};
-use crate::cli::support::args::{JsonFlag, SceneArgs};
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::log::Progress;
-use crate::cli::support::model_fit::warn_of_misfit;
 use crate::cli::support::parsers::near;
-use crate::cli::support::scene::{near_plane, open_gpu, open_scene};
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, Progress, SceneArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::files::atomic;
 use crate::files::label_table::{FILE, LabelEntry, LabelTable};
 use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
@@ -18,7 +13,7 @@ use crate::scene::{LabelMap, View};
 use crate::scenes::window::{ids_of_photo, windows};
 use crate::{Error, Result};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -52,9 +47,6 @@ pub struct RepairArgs {
     /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their outlines.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes masks whose ids agree in all views.
@@ -145,37 +137,37 @@ fn report(
     context: &Context,
 ) -> Result<()> {
     let name = |view: usize| views[view].name.as_str();
+    let masks_with_id = |found: &[(usize, u16)]| -> Vec<Value> {
+        found.iter().map(|&(view, id)| json!({ "view": name(view), "id": id })).collect()
+    };
+    let Repairs { renamed, divided, left_out, filled, made } = repairs;
     let objects: BTreeSet<u16> = masks.iter().flatten().flat_map(LabelMap::objects).collect();
-    if context.json || args.json.json {
-        let renamed =
-            repairs.renamed.iter().map(|&((view, id), new)| json!({"view": name(view), "id": id, "new": new}));
-        let divided =
-            repairs.divided.iter().map(|((view, id), parts)| json!({"view": name(*view), "id": id, "parts": parts}));
-        let filled = repairs.filled.iter().map(|&(view, id)| json!({"view": name(view), "id": id}));
-        return stdout::print_json(&json!({
-            "schema_version": 1,
-            "output": args.output.display().to_string(),
-            "objects": objects,
-            "renamed": renamed.collect::<Vec<_>>(),
-            "divided": divided.collect::<Vec<_>>(),
-            "left_out": repairs.left_out.iter().map(|&(view, id)| json!({"view": name(view), "id": id})).collect::<Vec<_>>(),
-            "filled": filled.collect::<Vec<_>>(),
-            "made": repairs.made.iter().map(|&view| name(view)).collect::<Vec<_>>(),
-        }));
-    }
+    let renamed_json = renamed.iter().map(|&((view, id), new)| json!({ "view": name(view), "id": id, "new": new }));
+    let divided_json =
+        divided.iter().map(|((view, id), parts)| json!({ "view": name(*view), "id": id, "parts": parts }));
+    let result = json!({
+        "schema_version": 1,
+        "output": args.output.display().to_string(),
+        "objects": objects,
+        "renamed": renamed_json.collect::<Vec<_>>(),
+        "divided": divided_json.collect::<Vec<_>>(),
+        "left_out": masks_with_id(left_out),
+        "filled": masks_with_id(filled),
+        "made": made.iter().map(|&view| name(view)).collect::<Vec<_>>(),
+    });
     let mut text = String::new();
     // Ids of single views mean nothing, so that nearly all of them change.
-    for &((view, id), new) in repairs.renamed.iter().filter(|_| !args.per_view) {
+    for &((view, id), new) in renamed.iter().filter(|_| !args.per_view) {
         text += &format!("{}: {id} is {new}\n", name(view));
     }
-    for ((view, id), parts) in &repairs.divided {
+    for ((view, id), parts) in divided {
         let parts: Vec<String> = parts.iter().map(u16::to_string).collect();
         text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
     }
-    for &(view, id) in repairs.left_out.iter().filter(|_| !args.per_view) {
+    for &(view, id) in left_out.iter().filter(|_| !args.per_view) {
         text += &format!("{}: {id} is left out, fewer than {} views show the object\n", name(view), args.min_views);
     }
-    for &(view, id) in &repairs.filled {
+    for &(view, id) in filled {
         text += &format!("{}: {id} was missing\n", name(view));
     }
     text += &format!(
@@ -183,11 +175,11 @@ fn report(
         args.output.display(),
         objects.len(),
         masks.iter().flatten().count(),
-        repairs.renamed.len(),
-        repairs.divided.len(),
-        repairs.left_out.len(),
-        repairs.filled.len(),
-        repairs.made.len()
+        renamed.len(),
+        divided.len(),
+        left_out.len(),
+        filled.len(),
+        made.len()
     );
-    stdout::print(&text)
+    context.show(&result, &text)
 }

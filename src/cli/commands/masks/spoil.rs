@@ -1,9 +1,7 @@
 //! `labelgs masks spoil`.
 
 use super::{pngs, write_mask};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::stdout;
+use crate::cli::support::Context;
 use crate::files::atomic;
 use crate::masks::mask::read_mask;
 use crate::scene::LabelMap;
@@ -31,9 +29,6 @@ pub struct SpoilArgs {
     /// Seed that draws the views.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes masks with deliberate faults.
@@ -52,8 +47,6 @@ pub(crate) fn run(args: &SpoilArgs, context: &Context) -> Result<()> {
             write_mask(&args.output.join(name), mask)?;
         }
     }
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({ "schema_version": 1, "masks": names.len(), "changed": changed }));
-    }
-    stdout::print(&format!("{}: {changed} of {} masks changed\n", args.output.display(), names.len()))
+    let text = format!("{}: {changed} of {} masks changed\n", args.output.display(), names.len());
+    context.show(&json!({ "schema_version": 1, "masks": names.len(), "changed": changed }), &text)
 }

@@ -1,10 +1,8 @@
 //! `labelgs masks track`: ids that follow objects from frame to frame by overlap.
 
 use super::{pngs, write_mask};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
+use crate::cli::support::Context;
 use crate::cli::support::parsers::share;
-use crate::cli::support::stdout;
 use crate::files::atomic;
 use crate::label::masks::track::{Overlap, track};
 use crate::masks::mask::read_mask;
@@ -30,9 +28,6 @@ pub struct TrackArgs {
     /// Most frames in a row without the object before its id is dropped.
     #[arg(long, value_name = "FRAMES", default_value_t = 5)]
     pub memory: usize,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
 }
 
 /// Writes the frames with ids that agree.
@@ -51,8 +46,7 @@ pub(crate) fn run(args: &TrackArgs, context: &Context) -> Result<()> {
         write_mask(&args.output.join(name), frame)?;
     }
     let objects: BTreeSet<u16> = tracked.iter().flat_map(LabelMap::objects).collect();
-    if context.json || args.json.json {
-        return stdout::print_json(&json!({ "schema_version": 1, "frames": names.len(), "objects": objects.len() }));
-    }
-    stdout::print(&format!("{}: {} objects in {} frames\n", args.output.display(), objects.len(), names.len()))
+    let (frames, objects) = (names.len(), objects.len());
+    let text = format!("{}: {objects} objects in {frames} frames\n", args.output.display());
+    context.show(&json!({ "schema_version": 1, "frames": frames, "objects": objects }), &text)
 }

@@ -3,26 +3,54 @@
 use crate::cli::support::stdout;
 use crate::files::read;
 use crate::{Error, Result};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// What is compared of the JSON.
+#[derive(Deserialize)]
+struct File {
+    steps: Vec<Step>,
+    #[serde(default)]
+    counters: BTreeMap<String, Counter>,
+    #[serde(flatten)]
+    about: BTreeMap<String, Value>,
+}
+
+#[derive(Deserialize)]
+struct Step {
+    first_run: Option<bool>,
+    stages_ms: BTreeMap<String, f64>,
+}
+
+#[derive(Deserialize)]
+struct Counter {
+    median: Option<f64>,
+}
+
 /// A file of `labelgs profile --json`.
-#[derive(Clone, Debug)]
 pub struct Profile {
-    json: Value,
     /// Times of each stage in every counted step, ms; `all` is their sum.
     pub samples: BTreeMap<String, Vec<f64>>,
+    counters: BTreeMap<String, Counter>,
+    about: BTreeMap<String, Value>,
 }
 
 impl Profile {
     /// Reads a profile.
     pub fn read(path: &Path) -> Result<Self> {
-        let json = serde_json::from_str(&read::text(path)?).map_err(|error| {
-            Error::data(path, format!("line {}", error.line()), format!("is not the JSON of labelgs profile: {error}"))
-        })?;
-        let samples = samples(&json, path)?;
-        Ok(Self { json, samples })
+        const EXPECTED: &str = "expected the steps with stages_ms that labelgs profile --json writes";
+        let File { steps, counters, about } = read::json(path, EXPECTED)?;
+        let mut samples: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        for step in steps.into_iter().filter(|step| step.first_run == Some(false)) {
+            samples.entry("all".to_owned()).or_default().push(step.stages_ms.values().sum());
+            step.stages_ms.into_iter().for_each(|(name, time)| samples.entry(name).or_default().push(time));
+        }
+        if samples.is_empty() {
+            return Err(Error::data(path, "steps", EXPECTED));
+        }
+        Ok(Self { samples, counters, about })
     }
 }
 
@@ -42,13 +70,13 @@ pub struct Row {
 pub(crate) fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()> {
     let [old, new] = [Profile::read(files[0])?, Profile::read(files[1])?];
     for what in ["device", "kernels", "labels", "size", "views", "worker_threads", "barrier_before_each_pass"] {
-        let [old, new] = [&old.json[what], &new.json[what]];
+        let [old, new] = [&old, &new].map(|profile| profile.about.get(what).unwrap_or(&Value::Null));
         if old != new {
             tracing::warn!("the profiles differ in {what}: {old} and {new}");
         }
     }
     let rows = compare(&old.samples, &new.samples, tolerance);
-    let counters = counters(&old.json, &new.json);
+    let counters = counters(&old, &new);
     if as_json {
         let row = |row: &Row| json!({ "stage": row.stage, "before_ms": row.median[0], "after_ms": row.median[1], "regressed": row.regressed });
         stdout::print_json(&json!({
@@ -62,19 +90,6 @@ pub(crate) fn run(files: [&Path; 2], tolerance: f64, as_json: bool) -> Result<()
     }
     let slower: Vec<&str> = rows.iter().filter(|row| row.regressed).map(|row| row.stage.as_str()).collect();
     if slower.is_empty() { Ok(()) } else { Err(Error::Check(format!("slower beyond noise: {}", slower.join(", ")))) }
-}
-
-fn samples(profile: &Value, path: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
-    let wrong = || Error::data(path, "steps", "expected the steps with stages_ms that labelgs profile --json writes");
-    let mut samples: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for step in profile["steps"].as_array().ok_or_else(wrong)?.iter().filter(|step| step["first_run"] == json!(false)) {
-        let stages = step["stages_ms"].as_object().ok_or_else(wrong)?;
-        let times: Vec<(&String, f64)> =
-            stages.iter().map(|(name, time)| Some((name, time.as_f64()?))).collect::<Option<_>>().ok_or_else(wrong)?;
-        samples.entry("all".to_owned()).or_default().push(times.iter().map(|(_, time)| time).sum());
-        times.into_iter().for_each(|(name, time)| samples.entry(name.clone()).or_default().push(time));
-    }
-    if samples.is_empty() { Err(wrong()) } else { Ok(samples) }
 }
 
 /// Returns the stages that both profiles have.
@@ -95,10 +110,9 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Returns the medians of the counters that both profiles have.
-fn counters(old: &Value, new: &Value) -> Vec<(String, [f64; 2])> {
-    let Some(names) = old["counters"].as_object() else { return Vec::new() };
-    let median = |profile: &Value, name: &str| profile["counters"][name]["median"].as_f64();
-    names.keys().filter_map(|name| Some((name.clone(), [median(old, name)?, median(new, name)?]))).collect()
+fn counters(old: &Profile, new: &Profile) -> Vec<(String, [f64; 2])> {
+    let both = old.counters.iter().filter_map(|(name, old)| Some((name, old.median?, new.counters.get(name)?.median?)));
+    both.map(|(name, old, new)| (name.clone(), [old, new])).collect()
 }
 
 fn text(rows: &[Row], counters: &[(String, [f64; 2])]) -> String {

@@ -4,20 +4,16 @@ pub mod compare;
 pub(crate) mod report;
 pub(crate) mod timed;
 
-use crate::cli::commands::profile::report::{Clocks, Profile, Window, Workers};
-use crate::cli::support::args::SceneArgs;
-use crate::cli::support::context::{Context, open_model};
-use crate::cli::support::log::Progress;
+use crate::cli::commands::profile::report::{Clocks, Measured, Profile, Window, Workers};
 use crate::cli::support::parsers::share;
-use crate::cli::support::scene::{open_gpu, open_scene};
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, JsonFileArg, Progress, SceneArgs, open_gpu, open_model, open_scene};
 use crate::gpu::Gpu;
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
 use crate::synth::{self, SynthOptions};
-use crate::train::{StepReport, TrainConfig, Trainer, first_model};
+use crate::train::{TrainConfig, Trainer, first_model};
 use crate::{Error, Result, Setting};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -40,16 +36,9 @@ pub struct ProfileArgs {
     /// Use --synthetic without masks.
     #[arg(long, requires = "synthetic")]
     pub no_masks: bool,
-    /// Steps to time.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
-    pub steps: u32,
-    /// Steps before the clock starts.
-    #[arg(long, value_name = "N", default_value_t = 20)]
-    pub warm_up: u32,
-    /// Train this many steps first, to measure a trained scene. The steps after them, which are timed, have photos of full
-    /// size, all bands of colour and, with masks, labels, as at the end of a run.
-    #[arg(long, value_name = "S", default_value_t = 0)]
-    pub from_step: u32,
+    /// Which steps, and how.
+    #[command(flatten)]
+    pub window: Window,
     /// Start from this model, a PLY or the folder of a `labelgs train` run, instead of the scene's points.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
@@ -60,10 +49,6 @@ pub struct ProfileArgs {
     /// Settings in TOML, such as config.toml of an earlier run.
     #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
     pub config: Option<PathBuf>,
-    /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
-    /// adds.
-    #[arg(long)]
-    pub overlap: bool,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
@@ -79,9 +64,9 @@ pub struct ProfileArgs {
         help_heading = "Comparison"
     )]
     pub tolerance: f32,
-    /// Write the numbers as JSON to FILE, or to standard output without FILE.
-    #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
-    pub json: Option<Option<PathBuf>>,
+    /// JSON.
+    #[command(flatten)]
+    pub json: JsonFileArg,
 }
 
 /// Steps after the timed ones; they count pairs.
@@ -90,7 +75,7 @@ const COUNTED: u32 = 10;
 /// Times steps of a real training.
 pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     if let Some([old, new]) = args.compare.as_deref() {
-        return compare::run([old, new], args.tolerance.into(), context.json || args.json.is_some());
+        return compare::run([old, new], args.tolerance.into(), context.json || args.json.file.is_some());
     }
     let config = decide(args)?;
     let gpu = open_gpu(context)?;
@@ -99,15 +84,8 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         Some(path) => open_model(path)?,
         None => first_model(&dataset, &config)?,
     };
-    let window = Window { overlap: args.overlap, from_step: args.from_step, warm_up: args.warm_up, steps: args.steps };
-    let profile = profile(&gpu, (&dataset, &model, config), window, context)?;
-    match &args.json {
-        Some(Some(file)) => crate::files::atomic::write_json(file, &profile.to_json())?,
-        Some(None) => stdout::print_json(&profile.to_json())?,
-        None if context.json => stdout::print_json(&profile.to_json())?,
-        None => {}
-    }
-    if context.json || matches!(args.json, Some(None)) { Ok(()) } else { stdout::print(&profile.to_text()) }
+    let profile = profile(&gpu, (&dataset, &model, config), args.window, context)?;
+    args.json.put_out(&profile, &profile.to_text(), context)
 }
 
 /// Returns the settings of a run whose steps after `from_step` are those of its end: photos of full size, all bands of
@@ -128,11 +106,12 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         Some(path) => Settings::read(path)?.train,
         None => TrainConfig::default(),
     };
-    let steps = u64::from(args.from_step) + u64::from(args.warm_up) + u64::from(args.steps.saturating_add(COUNTED)) + 1;
+    let Window { steps, warm_up, from_step, .. } = args.window;
+    let steps = u64::from(from_step) + u64::from(warm_up) + u64::from(steps.saturating_add(COUNTED)) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
     if !args.as_scheduled {
-        decided = finished_from(args.from_step, decided);
+        decided = finished_from(from_step, decided);
     }
     decided.check()?;
     Ok(decided)
@@ -163,16 +142,15 @@ pub(crate) fn profile(
     if gpu.limits().timestamp_bits == 0 {
         return Err(Error::NoDevice("this device has no timestamps on its compute queue".into()));
     }
-    let mut profile = Profile::new(gpu, workers(gpu)?, window);
-    profile.views = dataset.train.len();
+    let workers = workers(gpu)?;
     let plan = PlanOptions { barrier_everywhere: !window.overlap, ..PlanOptions::default() };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, dataset, model, options)?;
-    measure(&mut trainer, window, context, &mut profile)?;
-    Ok(profile)
+    let measured = measure(&mut trainer, window, context)?;
+    Ok(Profile::new(gpu, workers, window, dataset.train.len(), measured))
 }
 
-fn measure(trainer: &mut Trainer, window: Window, context: &Context, profile: &mut Profile) -> Result<()> {
+fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<Measured> {
     let before = window.from_step + window.warm_up;
     let mut progress = Progress::new(u64::from(before + window.steps), "steps", &context.global);
     for step in 1..=before {
@@ -195,19 +173,16 @@ fn measure(trainer: &mut Trainer, window: Window, context: &Context, profile: &m
     let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
     let clocks = Clocks { wall: wall.elapsed(), steps, cpu };
     reports.extend(trainer.drain()?);
-    let timed = |step: u32| step > before;
-    let reports: Vec<StepReport> = reports.into_iter().filter(|report| timed(report.step)).collect();
-    let times = trainer.take_times().into_iter().filter(|times| timed(times.step)).collect();
-    profile.gaussians = trainer.gaussian_count();
-    profile.fill(clocks, &reports, times);
+    reports.retain(|report| report.step > before);
+    let times = trainer.take_times().into_iter().filter(|times| times.step > before).collect();
+    let gaussians = trainer.gaussian_count();
     trainer.count_pairs(true);
     let mut counted = Vec::new();
     for _ in 0..COUNTED.min(window.steps) {
         counted.extend(trainer.step()?);
     }
     counted.extend(trainer.drain()?);
-    profile.fill_pairs(&counted);
-    Ok(())
+    Ok(Measured { clocks, reports, times, counted, gaussians })
 }
 
 /// Returns the host threads that run the passes; `None` on a graphics card.

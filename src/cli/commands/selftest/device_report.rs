@@ -5,8 +5,7 @@ use crate::cli::commands::kernels::kernels_json;
 use crate::cli::commands::profile::report::Window;
 use crate::cli::commands::profile::{finished_from, profile};
 use crate::cli::commands::selftest;
-use crate::cli::support::context::Context;
-use crate::cli::support::scene::open_gpu;
+use crate::cli::support::{Context, open_gpu};
 use crate::gpu::{self, Gpu, GpuOptions};
 use crate::pass::compiled_kernels;
 use crate::synth::{self, SynthOptions};
@@ -67,5 +66,5 @@ fn steps(context: &Context) -> Result<Value> {
     let config = finished_from(0, TrainConfig::default());
     let model = first_model(&dataset, &config)?;
     let window = Window { overlap: true, from_step: 0, warm_up: 10, steps: 20 };
-    Ok(profile(&gpu, (&dataset, &model, config), window, context)?.to_json())
+    Ok(json!(profile(&gpu, (&dataset, &model, config), window, context)?))
 }

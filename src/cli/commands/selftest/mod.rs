@@ -3,10 +3,7 @@
 pub(crate) mod device_report;
 
 use crate::cli::commands::devices::{needs_json, needs_text, shape_json, shape_text};
-use crate::cli::support::args::JsonFlag;
-use crate::cli::support::context::Context;
-use crate::cli::support::scene::open_gpu;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, open_gpu, stdout};
 use crate::pass::KernelShape;
 use crate::verify::selftest::{self, Check};
 use crate::{Error, Result};
@@ -17,9 +14,6 @@ use std::path::PathBuf;
 /// `labelgs selftest`.
 #[derive(Args, Clone, Debug)]
 pub struct SelftestArgs {
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
     /// Write a report of this device to FILE, to send to the authors: the device and its driver, the checks, what the
     /// driver's compiler makes of every kernel, and the times of training steps. Nothing in it is private.
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
@@ -28,19 +22,19 @@ pub struct SelftestArgs {
 
 /// Runs the checks and prints a row for each, and writes the report. Fails if a check fails.
 pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
-    let Some(file) = &args.report else { return checked(args, context, &mut Vec::new()) };
+    let Some(file) = &args.report else { return checked(context, &mut Vec::new()) };
     let mut checks = Vec::new();
-    let outcome = checked(args, context, &mut checks);
+    let outcome = checked(context, &mut checks);
     crate::files::atomic::write_json(file, &device_report::report(&checks, outcome.as_ref().err(), context)?)?;
     tracing::info!("wrote {}; please send it to the authors of labelgs", file.display());
     outcome
 }
 
 /// Runs the checks, and collects them.
-fn checked(args: &SelftestArgs, context: &Context, checks: &mut Vec<Check>) -> Result<()> {
+fn checked(context: &Context, checks: &mut Vec<Check>) -> Result<()> {
     let gpu = open_gpu(context)?;
     let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
-    let as_json = context.json || args.json.json;
+    let as_json = context.json;
     if !as_json {
         stdout::print(&format!(
             "{} ({} {})\n{}{}\n\n{:<48} {:>8} {:>8}  {}\n",

@@ -2,7 +2,7 @@
 //! [`crate::options`](mod@crate::options).
 
 use crate::cli::commands::view::WatchArgs;
-use crate::cli::support::args::{FileArgs, JsonFlag};
+use crate::cli::support::FileArgs;
 use crate::cli::support::parsers::bytes;
 use crate::cli::support::settings::{Assignment, assignment, by_key};
 use crate::options::typed::Typed;
@@ -28,9 +28,6 @@ pub struct TrainArgs {
     /// Folder of id masks, one per view by name. Without masks the model has no labels.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
-    /// JSON.
-    #[command(flatten)]
-    pub json: JsonFlag,
     /// How it trains.
     #[command(flatten)]
     pub how: TrainFlags,
@@ -77,7 +74,6 @@ pub struct TrainFlags {
     /// Limit of device memory, such as 1500M or 2G. It bounds the number of Gaussians.
     #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
-    /// Files of the scene.
     #[command(flatten)]
     pub files: FileArgs,
     /// Start from settings for a length and a level of detail: draft for a first look, standard, best, or paper for those
@@ -86,7 +82,6 @@ pub struct TrainFlags {
     /// Flags and --set override them. Those of the paper are, where ours differ:
     #[arg(long, value_name = "NAME", conflicts_with = "config", hide_possible_values = true)]
     pub preset: Option<Preset>,
-    /// How the scene is read.
     #[command(flatten)]
     pub read: Typed<ReadOptions>,
     /// The training.

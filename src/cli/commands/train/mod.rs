@@ -5,12 +5,8 @@ pub(crate) mod args;
 use crate::Result;
 use crate::cli::commands::train::args::TrainArgs;
 use crate::cli::commands::view::Typed;
-use crate::cli::support::context::Context;
-use crate::cli::support::log::{self, Progress};
-use crate::cli::support::scene::open_gpu;
 use crate::cli::support::shell_words::typed;
-use crate::cli::support::signals;
-use crate::cli::support::stdout;
+use crate::cli::support::{Context, Progress, log, open_gpu, signals};
 use crate::report::text::duration;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 use crate::viewer::Watched;
@@ -21,10 +17,7 @@ pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
     let summary = if args.watch.view { shown(args, request, context)? } else { train(request, context)? };
-    if context.json || args.json.json {
-        return stdout::print_json(&summary.to_json());
-    }
-    stdout::print(&sentence(&summary))
+    context.show(&summary.to_json(), &sentence(&summary))
 }
 
 /// Trains with progress on the terminal. A signal ends the run after it saved its state.
