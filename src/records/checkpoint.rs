@@ -23,8 +23,9 @@ pub const VERSION: u32 = 2;
 const MAGIC: [u8; 8] = *b"labelgsC";
 /// Number of bytes before the checksummed part.
 const HEADER: usize = 24;
-/// Words are written as the machine has them.
-const _: () = assert!(cfg!(target_endian = "little"));
+
+#[cfg(target_endian = "big")]
+compile_error!("checkpoints have the words of planes as the machine has them, little-endian");
 
 /// A table of words with one name, such as the positions of all Gaussians.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
