@@ -52,11 +52,7 @@ impl Cell {
     }
 
     /// Halves the cell across its longer side along the ground, so that both halves have as many Gaussians. `place` gives
-    /// the place of a row.
-    ///
-    /// # Errors
-    ///
-    /// Gaussians that are all at one place.
+    /// the place of a row. Gaussians that are all at one place cannot be halved.
     pub(super) fn halves(&self, place: impl Fn(usize) -> DVec3) -> Result<[Self; 2]> {
         let size = self.inside[1] - self.inside[0];
         let axes = if size.x >= size.y { [0, 1] } else { [1, 0] };
@@ -87,6 +83,7 @@ impl Cell {
 mod tests {
     use super::*;
     use crate::scene::Zone;
+    use std::collections::BTreeSet;
 
     /// Scattered places, some of them equal and some on the later borders.
     fn places(count: usize) -> Vec<(usize, DVec3)> {
@@ -131,16 +128,8 @@ mod tests {
         let all = places(300);
         let mut mixed = all.clone();
         mixed.sort_by_key(|(row, _)| row * 77 % 300);
-        let sorted = |cells: Vec<Cell>| -> Vec<(Bounds, Vec<usize>)> {
-            cells
-                .into_iter()
-                .map(|mut cell| {
-                    (cell.core, {
-                        cell.rows.sort_unstable();
-                        cell.rows
-                    })
-                })
-                .collect()
+        let sorted = |cells: Vec<Cell>| -> Vec<(Bounds, BTreeSet<usize>)> {
+            cells.into_iter().map(|cell| (cell.core, cell.rows.into_iter().collect())).collect()
         };
         assert_eq!(sorted(leaves(&all, 5)), sorted(leaves(&mixed, 5)));
     }

@@ -128,16 +128,9 @@ mod tests {
 
     #[test]
     fn the_share_of_a_box_in_a_picture() {
-        let camera = Camera {
-            rotation: DMat3::IDENTITY,
-            translation: DVec3::ZERO,
-            fx: 100.0,
-            fy: 100.0,
-            cx: 50.0,
-            cy: 50.0,
-            width: 100,
-            height: 100,
-        };
+        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let camera =
+            Camera { rotation, translation, fx: 100.0, fy: 100.0, cx: 50.0, cy: 50.0, width: 100, height: 100 };
         let share = |corners| seen_share(&camera, &Zone::along_world(corners));
         assert_eq!(share([-9.0, -9.0, 1.0, 9.0, 9.0, 2.0]), 1.0, "before the camera");
         assert_eq!(share([-9.0, -9.0, -2.0, 9.0, 9.0, -1.0]), 0.0, "behind it");

@@ -32,11 +32,7 @@ pub(super) struct Coarse {
 }
 
 impl Coarse {
-    /// Reads the cameras of a scene and its coarse model: the folder of a run.
-    ///
-    /// # Errors
-    ///
-    /// A model that is not in the folder of a finished run, or of another scene.
+    /// Reads the cameras of a scene and its coarse model: the folder of a finished run.
     pub(super) fn open(scene: &Path, model: &Path, options: LoadOptions) -> Result<Self> {
         let path = latest_model(model)?;
         let Some(settings) = Settings::of_model(&path)? else {
@@ -77,7 +73,6 @@ impl Coarse {
         near
     }
 
-    /// Returns the largest label; `None` without labels.
     pub(super) fn max_label(&self) -> Option<u32> {
         self.model.labels.as_ref().map(|labels| labels.iter().copied().max().unwrap_or(0).max(1))
     }

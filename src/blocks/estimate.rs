@@ -2,7 +2,6 @@
 
 use super::need::{Card, Common, Need};
 use super::plan::BLOCKS_MAX;
-use crate::engine::card;
 use crate::error::{Error, Result, Setting};
 
 /// Gaussians in the zone of a block, in those of its core: a margin of a tenth on all four sides.
@@ -42,14 +41,8 @@ pub struct Estimate {
     pub frozen: u64,
     /// Views of a block.
     pub views: u64,
-    /// Memory of the device, bytes.
-    pub device: u64,
-    /// Memory of the host, bytes.
-    pub host: u64,
-    /// Steps of a block.
-    pub steps: u32,
-    /// Minutes of a block, if the pace is known.
-    pub minutes: Option<f64>,
+    /// What a block needs.
+    pub need: Need,
 }
 
 /// Divides a scene on paper into the fewest equal blocks that fit the card. Half of the coarse Gaussians outside of a block
@@ -59,8 +52,7 @@ pub struct Estimate {
 ///
 /// A card too small for any number of blocks.
 pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
-    let (shape, limits) = card(sketch.card);
-    let device = Card { shape, limits, memory: sketch.card };
+    let card = Card::new(sketch.card);
     let pixels = u64::from(sketch.image.0) * u64::from(sketch.image.1);
     let measured = sketch.pace.map_or(sketch.gaussians, |(_, gaussians)| gaussians);
     let common = Common {
@@ -77,10 +69,9 @@ pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
         let frozen = (sketch.coarse as f64 * outside).round() as u64;
         let shared = if blocks == 1 { 1.0 } else { SHARED_VIEWS };
         let views = ((sketch.views as f64 * shared * share).ceil() as u64).min(sketch.views);
-        let need = common.need(&device, (gaussians, frozen), views as usize, sketch.steps)?;
-        if device.fits(&need) {
-            let Need { device, host, steps, minutes } = need;
-            return Ok(Estimate { blocks, gaussians, frozen, views, device, host, steps, minutes });
+        let need = common.need(&card, (gaussians, frozen), views as usize, sketch.steps)?;
+        if card.fits(&need) {
+            return Ok(Estimate { blocks, gaussians, frozen, views, need });
         }
     }
     Err(Error::usage(
@@ -111,10 +102,10 @@ mod tests {
         assert!(small.blocks > usual.blocks && usual.blocks > large.blocks, "{small:?} {usual:?} {large:?}");
         for found in [small, usual, large] {
             assert!(found.gaussians * found.blocks as u64 >= CITY.gaussians, "{found:?}");
-            assert!(found.views * found.blocks as u64 >= CITY.views && found.minutes.is_some(), "{found:?}");
+            assert!(found.views * found.blocks as u64 >= CITY.views && found.need.minutes.is_some(), "{found:?}");
         }
         // One fewer would not fit.
-        assert!(usual.device as f64 <= 0.8 * f64::from(24 << 20) * 1024.0, "{usual:?}");
+        assert!(usual.need.device as f64 <= 0.8 * f64::from(24 << 20) * 1024.0, "{usual:?}");
     }
 
     #[test]

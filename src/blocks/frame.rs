@@ -36,7 +36,6 @@ impl Frame {
         self.zone(&Bounds::ALL).place(world)
     }
 
-    /// Returns a box.
     pub(super) fn zone(&self, bounds: &Bounds) -> Zone {
         bounds.zone(self.axes.map(|axis| axis.to_array()))
     }

@@ -50,24 +50,11 @@ pub(super) struct Joined {
 
 /// Finds which ids of blocks are one object, in the photos that two blocks share: where the nearest Gaussian is in both
 /// zones, the masks of both show it.
-///
-/// # Errors
-///
-/// Blocks that share photos without masks; what cannot be read or drawn.
 pub(super) fn join(blocks: &Path, trained: &[&Trained], how: &BlockMasks) -> Result<Joined> {
+    let gpu = (how.open)()?;
     let mut found = Vec::new();
-    let mut gpu = None;
-    for (first, block) in trained.iter().enumerate() {
-        let others: Vec<usize> =
-            (first + 1..trained.len()).filter(|&at| !common(block, trained[at]).is_empty()).collect();
-        if others.is_empty() {
-            continue;
-        }
-        let gpu = match &gpu {
-            Some(gpu) => Arc::clone(gpu),
-            None => Arc::clone(gpu.insert((how.open)()?)),
-        };
-        found.extend(of_block(gpu, blocks, (first, &others), trained, how)?);
+    for first in 0..trained.len() {
+        found.extend(of_block(&gpu, blocks, first, trained, how)?);
     }
     let ids = ids_of(trained)?;
     Ok(numbered(&ids, &unions(found), trained))
@@ -80,35 +67,34 @@ fn common(a: &Trained, b: &Trained) -> BTreeSet<String> {
 }
 
 fn views(trained: &Trained, only: BTreeSet<String>, how: &BlockMasks) -> Result<Vec<View>> {
-    let folder = how.masks.join(&trained.block.id);
-    let read = &trained.settings.read;
     let options = LoadOptions {
-        masks: Some(folder),
         only: Some(Arc::new(only)),
-        max_resolution: (read.max_resolution > 0).then_some(read.max_resolution),
-        test_every: (read.test_every > 0).then_some(read.test_every),
         photos: false,
-        lookup: Lookup { poses: read.poses, ..Lookup::default() },
-        ..LoadOptions::default()
+        lookup: Lookup { poses: trained.settings.read.poses, ..Lookup::default() },
+        ..trained.settings.load_options(Some(how.masks.join(&trained.block.id)))
     };
     Ok(open_logged(how.scene, &options)?.train)
 }
 
-/// Compares a block with others that share photos with it.
+/// Compares a block with the later ones that share photos with it.
 fn of_block(
-    gpu: Arc<Gpu>,
+    gpu: &Arc<Gpu>,
     blocks: &Path,
-    (first, others): (usize, &[usize]),
+    first: usize,
     trained: &[&Trained],
     how: &BlockMasks,
 ) -> Result<Vec<Shared>> {
+    let shared = (first + 1..trained.len()).map(|other| (other, common(trained[first], trained[other])));
+    let shared: Vec<(usize, BTreeSet<String>)> = shared.filter(|(_, names)| !names.is_empty()).collect();
+    if shared.is_empty() {
+        return Ok(Vec::new());
+    }
     let block = &trained[first].block;
     let model = models::open(&BlockFile::init(&blocks.join(&block.id)))?.gaussians;
+    let mut engine = Engine::of_model(Arc::clone(gpu), &model, [(1, 1)])?;
     let zone = |of: &BlockFile| -> Zone { of.zone.zone(of.axes) };
-    let mut engine = None;
     let mut found = Vec::new();
-    for &other in others {
-        let names = common(trained[first], trained[other]);
+    for (other, names) in shared {
         let (own, theirs) = (views(trained[first], names.clone(), how)?, views(trained[other], names, how)?);
         let zones = [zone(block), zone(&trained[other].block)];
         let is_common: Vec<bool> =
@@ -116,14 +102,8 @@ fn of_block(
         let mut counts = BTreeMap::new();
         for (own, theirs) in own.iter().zip(&theirs) {
             let (Some(a), Some(b)) = (own.mask()?, theirs.mask()?) else { continue };
-            let engine = match &mut engine {
-                Some(engine) => engine,
-                None => {
-                    engine.insert(Engine::of_model(Arc::clone(&gpu), &model, [(own.camera.width, own.camera.height)])?)
-                }
-            };
             engine.grow_image(own.camera.width, own.camera.height)?;
-            let drawn = render(engine, &own.camera, &RenderOptions::of_main(block.near as f32))?;
+            let drawn = render(&mut engine, &own.camera, &RenderOptions::of_main(block.near as f32))?;
             count(&mut counts, &drawn.top_id, &is_common, [&a, &b]);
         }
         found.extend(best(&counts, [first, other]));

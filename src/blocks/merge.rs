@@ -1,6 +1,6 @@
 //! Joins the models of the blocks into one.
 
-use super::join::{BlockMasks, Joined, join};
+use super::join::{BlockMasks, join};
 use super::trained::{Trained, compare, core};
 use crate::error::{Error, Result};
 use crate::files::atomic;
@@ -9,7 +9,7 @@ use crate::files::run_folder::{self, Lock};
 use crate::formats::write_joined;
 use crate::records::block_file::{self, BlockFile, BlocksFile, REST};
 use crate::run::models::{self, Models, model_path};
-use crate::scene::{Gaussians, UNLABELLED};
+use crate::scene::Gaussians;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -50,12 +50,10 @@ impl Merged {
 
 /// Rows of the merged model from one file.
 enum Part {
-    /// All rows of a file: what is coarse everywhere.
-    Rest(PathBuf),
-    /// The rows of a training whose means are in the core, and the new ids of its labels.
-    Trained(Box<Trained>, Option<BTreeMap<u32, u32>>),
-    /// The coarse rows in the core, from the first model of a block.
-    Coarse(Box<BlockFile>, PathBuf),
+    /// The core of a training.
+    Trained(Box<Trained>),
+    /// The core of the first model of a block, or all of what is coarse everywhere.
+    Coarse(Option<Box<BlockFile>>, PathBuf),
 }
 
 /// Joins the models that were trained in `models`, a folder for each block of the folder `blocks`, into the folder `out`:
@@ -78,12 +76,11 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
             continue;
         }
         match Trained::open(&block, &models.join(&row.id)) {
-            Ok(trained) => parts.push(Part::Trained(Box::new(trained), None)),
+            Ok(trained) => parts.push(Part::Trained(Box::new(trained))),
             Err(problem) if problem.is_missing && options.allow_missing => {
                 tracing::warn!("{}; its core stays coarse", problem.text);
                 merged.missing.push(row.id.clone());
-                let init = BlockFile::init(&folder);
-                parts.push(Part::Coarse(Box::new(block), init));
+                parts.push(Part::Coarse(Some(Box::new(block)), BlockFile::init(&folder)));
             }
             Err(problem) => problems.push(problem.text),
         }
@@ -91,35 +88,24 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
     let trained: Vec<&Trained> = parts.iter().filter_map(Part::trained).collect();
     problems.extend(compare(&trained));
     let names = if options.masks.is_some() { None } else { names(blocks, &trained, &mut problems)? };
-    refuse(models, problems)?;
+    refuse(models, &problems)?;
     merged.devices = devices(&trained);
     let joined = options.masks.map(|masks| join(blocks, &trained, &masks)).transpose()?;
-    let names = joined.as_ref().map(|joined| joined.names.clone()).or(names);
-    give_ids(&mut parts, joined);
-    parts.push(Part::Rest(blocks.join(REST)));
-    let has_ids = options.masks.is_some();
+    let has_ids = joined.is_some();
+    let (ids, names) = joined.map_or((Vec::new(), names), |joined| (joined.of, Some(joined.names)));
+    parts.iter_mut().filter_map(Part::trained_mut).zip(ids).for_each(|(trained, ids)| trained.ids = Some(ids));
+    parts.push(Part::Coarse(None, blocks.join(REST)));
     write(&file, &parts, (names.as_ref(), has_ids), out, merged)
 }
 
-/// Gives their new ids to the trainings.
-fn give_ids(parts: &mut [Part], joined: Option<Joined>) {
-    let trained = parts.iter_mut().filter_map(|part| match part {
-        Part::Trained(_, ids) => Some(ids),
-        Part::Rest(_) | Part::Coarse(..) => None,
-    });
-    trained.zip(joined.into_iter().flat_map(|joined| joined.of)).for_each(|(ids, of)| *ids = Some(of));
-}
-
 /// Returns one error for all problems.
-fn refuse(models: &Path, problems: Vec<String>) -> Result<()> {
-    match problems.len() {
-        0 => Ok(()),
-        1 => Err(Error::data(models, "", problems[0].clone())),
-        count => {
-            let problem = format!("{count} problems:\n  {}", problems.join("\n  "));
-            Err(Error::data(models, "", problem))
-        }
-    }
+fn refuse(models: &Path, problems: &[String]) -> Result<()> {
+    let problem = match problems {
+        [] => return Ok(()),
+        [problem] => problem.clone(),
+        many => format!("{} problems:\n  {}", many.len(), many.join("\n  ")),
+    };
+    Err(Error::data(models, "", problem))
 }
 
 fn devices(trained: &[&Trained]) -> Vec<String> {
@@ -156,27 +142,24 @@ fn names(blocks: &Path, trained: &[&Trained], problems: &mut Vec<String>) -> Res
 
 impl Part {
     fn trained(&self) -> Option<&Trained> {
-        match self {
-            Self::Trained(trained, _) => Some(trained),
-            Self::Rest(_) | Self::Coarse(..) => None,
-        }
+        if let Self::Trained(trained) = self { Some(trained) } else { None }
+    }
+
+    fn trained_mut(&mut self) -> Option<&mut Trained> {
+        if let Self::Trained(trained) = self { Some(trained) } else { None }
     }
 
     /// Reads the rows. Where trainings have new ids, the labels of coarse Gaussians mean nothing.
     fn read(&self, has_ids: bool) -> Result<Gaussians> {
-        let unlabelled = |model: Gaussians| Gaussians { labels: None, label_confidence: None, ..model };
-        let coarse = |model| if has_ids { unlabelled(model) } else { model };
-        match self {
-            Self::Rest(path) => Ok(coarse(models::open(path)?.gaussians)),
-            Self::Trained(trained, ids) => {
-                let mut model = trained.core()?;
-                if let (Some(ids), Some(labels)) = (ids, &mut model.labels) {
-                    labels.iter_mut().for_each(|label| *label = ids.get(label).copied().unwrap_or(UNLABELLED));
-                }
-                Ok(model)
-            }
-            Self::Coarse(block, init) => core(block, init).map(coarse),
-        }
+        let (block, path) = match self {
+            Self::Trained(trained) => return trained.core(),
+            Self::Coarse(block, path) => (block.as_deref(), path),
+        };
+        let model = match block {
+            Some(block) => core(block, path)?,
+            None => models::open(path)?.gaussians,
+        };
+        Ok(if has_ids { Gaussians { labels: None, label_confidence: None, ..model } } else { model })
     }
 }
 
@@ -200,20 +183,18 @@ fn write(
         let rows = part.read(has_ids)?;
         let count = rows.len() as u64;
         match part {
-            Part::Trained(trained, _) => merged.blocks.push((trained.block.id.clone(), count)),
-            Part::Rest(_) | Part::Coarse(..) => merged.coarse += count,
+            Part::Trained(trained) => merged.blocks.push((trained.block.id.clone(), count)),
+            Part::Coarse(..) => merged.coarse += count,
         }
         like = Some(joint(like, &rows));
     }
     let like = like.unwrap_or_default();
-    let expected = file.rest;
-    let count = merged.gaussians();
     merged.model = model_path(out, steps);
     let mut to = Models::new(out, 0)?;
-    write_joined(&merged.model, &like, count as usize, parts.iter().map(|part| part.read(has_ids)))?;
+    write_joined(&merged.model, &like, merged.gaussians() as usize, parts.iter().map(|part| part.read(has_ids)))?;
     to.note_saved(steps);
-    if merged.missing.is_empty() && merged.coarse != expected {
-        let problem = format!("has {} coarse Gaussians, {expected} were split off", merged.coarse);
+    if merged.missing.is_empty() && merged.coarse != file.rest {
+        let problem = format!("has {} coarse Gaussians, {} were split off", merged.coarse, file.rest);
         return Err(Error::data(&merged.model, "", problem));
     }
     write_records(file, parts, names, out)?;

@@ -26,6 +26,7 @@ pub use crate::records::block_file::{BlockRow, Bounds};
 pub use estimate::{Estimate, Sketch, estimate};
 pub use join::BlockMasks;
 pub use merge::{MergeOptions, Merged, merge};
+pub use need::Need;
 pub use plan::{Plan, PlanOptions, plan};
 pub use seams::Seams;
 pub use split::split;

@@ -1,6 +1,6 @@
 //! Memory and time that a block needs.
 
-use crate::engine::{EngineSize, LabelSize, predict_for};
+use crate::engine::{EngineSize, LabelSize, card, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::limits::PlanLimits;
 use crate::pass::KernelShape;
@@ -17,10 +17,10 @@ const LAYERS: u32 = 10;
 /// The card that trains the blocks.
 #[derive(Clone, Debug)]
 pub(super) struct Card {
-    pub shape: KernelShape,
-    pub limits: PlanLimits,
+    shape: KernelShape,
+    limits: PlanLimits,
     /// Memory, bytes.
-    pub memory: u64,
+    memory: u64,
 }
 
 /// What all blocks have in common.
@@ -38,18 +38,24 @@ pub(super) struct Common {
 
 /// What a block needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Need {
-    /// Bytes on the device.
+pub struct Need {
+    /// Memory of the device, bytes.
     pub device: u64,
-    /// Bytes on the host.
+    /// Memory of the host, bytes.
     pub host: u64,
+    /// Number of steps.
     pub steps: u32,
     /// Minutes, if the pace is known.
     pub minutes: Option<f64>,
 }
 
 impl Card {
-    /// Returns true if the need fits.
+    /// Takes a typical card.
+    pub(super) fn new(memory: u64) -> Self {
+        let (shape, limits) = card(memory);
+        Self { shape, limits, memory }
+    }
+
     pub(super) fn fits(&self, need: &Need) -> bool {
         need.device as f64 <= SHARE * self.memory as f64
     }

@@ -5,9 +5,10 @@ use super::choose::{Chosen, choose};
 use super::coarse::Coarse;
 use super::frame::Frame;
 use super::need::{Card, Common, Need};
-use crate::engine::{Engine, EngineSize, card};
+use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
+use crate::scene::Dataset;
 use crate::scenes::LoadOptions;
 use crate::scheduler::SchedulerOptions;
 use glam::DVec3;
@@ -109,8 +110,7 @@ pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -
         let problem = format!("has no Gaussian within {:.3} of the cameras, in world units", frame.far);
         return Err(Error::data(model, "", problem));
     }
-    let (shape, limits) = card(options.card);
-    let card = Card { shape, limits, memory: options.card };
+    let card = Card::new(options.card);
     let planner = Planner { common: common(&coarse, options)?, card, options, coarse: &coarse, frame: &frame };
     let mut engine = engine(open()?, &coarse)?;
     let blocks = planner.blocks(&mut engine, &places)?;
@@ -118,8 +118,12 @@ pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -
     Ok(Plan { blocks, far, coarse, frame, extent })
 }
 
+fn sizes(dataset: &Dataset) -> Vec<(u32, u32)> {
+    dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect()
+}
+
 fn engine(gpu: Arc<Gpu>, coarse: &Coarse) -> Result<Engine> {
-    let sizes = coarse.dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height));
+    let sizes = sizes(&coarse.dataset).into_iter();
     let size = EngineSize::of_model(&coarse.model, sizes).with_labels(None).for_training();
     let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
     engine.upload_model(&coarse.model)?;
@@ -127,24 +131,20 @@ fn engine(gpu: Arc<Gpu>, coarse: &Coarse) -> Result<Engine> {
 }
 
 fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
-    let area = |views: &[(u32, u32)]| views.iter().map(|&(w, h)| u64::from(w) * u64::from(h)).max().unwrap_or(1);
-    let sizes: Vec<(u32, u32)> =
-        coarse.dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect();
-    let coarse_side = coarse.settings.read.max_resolution;
-    let image = if options.max_resolution == coarse_side {
-        sizes.clone()
+    let own = sizes(&coarse.dataset);
+    let area = own.iter().map(|&(width, height)| u64::from(width) * u64::from(height)).max().unwrap_or(1);
+    let trained = if options.max_resolution == coarse.settings.read.max_resolution {
+        own
     } else {
         let max_resolution = (options.max_resolution > 0).then_some(options.max_resolution);
         let load = LoadOptions { max_resolution, photos: false, masks: None, ..options.load.clone() };
-        let full = crate::scenes::open(&coarse.dataset.root, &load)?;
-        full.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect()
+        sizes(&crate::scenes::open(&coarse.dataset.root, &load)?)
     };
-    let largest = image.iter().fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     Ok(Common {
-        image: largest,
+        image: trained.iter().fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1))),
         max_label: coarse.max_label(),
         pace: coarse.pace,
-        coarse: (area(&sizes), coarse.model.len() as u64),
+        coarse: (area, coarse.model.len() as u64),
     })
 }
 

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::files::atomic;
 use crate::files::label_table::LabelTable;
 use crate::formats::write_model;
-use crate::records::block_file::{BlockFile, BlockRow, BlocksFile, REST, poses_crc};
+use crate::records::block_file::{BLOCKS, BlockFile, BlockRow, BlocksFile, REST, SCHEMA_VERSION, poses_crc};
 use crate::scene::View;
 use std::path::Path;
 
@@ -24,6 +24,8 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
     let (frame, is_rest) = (&plan.frame, plan.is_rest());
     let rest = plan.coarse.model.filtered(|row| is_rest[row]);
     let file = BlocksFile {
+        schema_version: SCHEMA_VERSION,
+        labelgs: env!("CARGO_PKG_VERSION").to_owned(),
         model: plan.coarse.crc,
         poses: poses_crc(train.iter().map(|view| &view.camera)),
         axes: frame.axes.map(|axis| axis.to_array()),
@@ -34,7 +36,6 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
         test_every: plan.coarse.settings.read.test_every,
         rest: rest.len() as u64,
         blocks: plan.rows(),
-        ..BlocksFile::new()
     };
     let text = file.text()?;
     let crc = crc32fast::hash(&text);
@@ -47,10 +48,9 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
     }
     write_model(out.join(REST), &rest)?;
     LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::files::label_table::FILE))?;
-    atomic::write(out.join(crate::records::block_file::BLOCKS), |to| to.write_all(&text))
+    atomic::write(out.join(BLOCKS), |to| to.write_all(&text))
 }
 
-/// Returns the name of a block.
 fn name(index: usize) -> String {
     format!("b{index:03}")
 }
@@ -94,7 +94,7 @@ impl Plan {
         let names = |views: &[View]| views.iter().map(|view| view.name.clone()).collect::<Vec<_>>();
         let exposure = |view: &View| Some((view.name.clone(), *self.coarse.exposures.get(&view.name)?));
         BlockFile {
-            schema_version: BlockFile::VERSION,
+            schema_version: SCHEMA_VERSION,
             id: name(index),
             blocks,
             axes: self.frame.axes.map(|axis| axis.to_array()),

@@ -7,7 +7,7 @@ use crate::records::block_file::{self, BlockFile};
 use crate::run::info::{self, Info};
 use crate::run::models::{self, model_path};
 use crate::run::{Settings, summary};
-use crate::scene::Gaussians;
+use crate::scene::{Gaussians, UNLABELLED};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,8 @@ pub(super) struct Trained {
     pub device: String,
     pub names: Option<LabelTable>,
     pub settings: Settings,
+    /// New ids of its labels, where those of the trainings do not agree.
+    pub ids: Option<BTreeMap<u32, u32>>,
     labelgs: String,
 }
 
@@ -45,9 +47,13 @@ pub(super) struct Problem {
 }
 
 impl Trained {
-    /// Reads the Gaussians of its core.
+    /// Reads the Gaussians of its core, with the new ids.
     pub(super) fn core(&self) -> crate::Result<Gaussians> {
-        core(&self.block, &self.model)
+        let mut model = core(&self.block, &self.model)?;
+        if let (Some(ids), Some(labels)) = (&self.ids, &mut model.labels) {
+            labels.iter_mut().for_each(|label| *label = ids.get(label).copied().unwrap_or(UNLABELLED));
+        }
+        Ok(model)
     }
 
     /// Looks at the folder of a training.
@@ -89,6 +95,7 @@ impl Trained {
             // The version alone: any commit of it may have written a part.
             labelgs: last.labelgs.split(' ').next().unwrap_or_default().to_owned(),
             settings,
+            ids: None,
         })
     }
 }

@@ -59,7 +59,6 @@ impl Frame {
         Self { colours: (0..rgb.len()).map(at).collect(), camera, depth }
     }
 
-    /// Returns the longer side, px.
     pub(super) fn side(&self) -> u32 {
         self.camera.width.max(self.camera.height)
     }

@@ -12,11 +12,10 @@ use std::path::{Path, PathBuf};
 pub(crate) const BLOCKS: &str = "blocks.json";
 /// Name of the file of a block, in its folder and in that of its training.
 pub(crate) const BLOCK: &str = "block.json";
-/// Name of the first model of a block.
-pub(crate) const INIT: &str = "init.ply";
 /// Name of the model of what no block trains.
 pub(crate) const REST: &str = "rest.ply";
-const SCHEMA_VERSION: u32 = 1;
+/// Version of both layouts.
+pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 /// Sides of a box along the axes of all blocks; none is open.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,24 +153,6 @@ impl BlocksFile {
         Ok((file, crc32fast::hash(&text)))
     }
 
-    /// Returns an empty list of this version.
-    pub fn new() -> Self {
-        Self {
-            schema_version: SCHEMA_VERSION,
-            labelgs: env!("CARGO_PKG_VERSION").to_owned(),
-            model: 0,
-            poses: 0,
-            axes: [[0.0; 3]; 3],
-            centre: [0.0; 3],
-            far: 0.0,
-            extent: 1.0,
-            near: 0.0,
-            test_every: 0,
-            rest: 0,
-            blocks: Vec::new(),
-        }
-    }
-
     /// Returns the content of the file.
     pub fn text(&self) -> Result<Vec<u8>> {
         serde_json::to_vec_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))
@@ -183,16 +164,7 @@ impl BlocksFile {
     }
 }
 
-impl Default for BlocksFile {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl BlockFile {
-    /// Version of the layout that is written.
-    pub const VERSION: u32 = SCHEMA_VERSION;
-
     /// Reads the file in the folder of a block.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(BLOCK);
@@ -217,7 +189,7 @@ impl BlockFile {
 
     /// Returns the path of the first model.
     pub fn init(folder: &Path) -> PathBuf {
-        folder.join(INIT)
+        folder.join("init.ply")
     }
 }
 

@@ -14,7 +14,7 @@ use crate::files::{atomic, read};
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::io::{self, BufRead, Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Version of the format.
@@ -23,8 +23,9 @@ pub const VERSION: u32 = 2;
 const MAGIC: [u8; 8] = *b"labelgsC";
 /// Number of bytes before the checksummed part.
 const HEADER: usize = 24;
-/// Number of bytes per conversion between words and little-endian bytes.
-const CHUNK: usize = 1 << 16;
+
+#[cfg(target_endian = "big")]
+compile_error!("checkpoints have the words of planes as the machine has them, little-endian");
 
 /// A table of words with one name, such as the positions of all Gaussians.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -85,13 +86,7 @@ impl Checkpoint {
     fn put(&self, json: &[u8], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&(json.len() as u64).to_le_bytes())?;
         out.write_all(json)?;
-        let mut bytes = Vec::with_capacity(CHUNK);
-        for chunk in self.planes.iter().flat_map(|plane| plane.data.chunks(CHUNK / 4)) {
-            bytes.clear();
-            bytes.extend(chunk.iter().flat_map(|word| word.to_le_bytes()));
-            out.write_all(&bytes)?;
-        }
-        Ok(())
+        self.planes.iter().try_for_each(|plane| out.write_all(bytemuck::cast_slice(&plane.data)))
     }
 
     /// Reads a file. A truncated, extended or changed file, or another version, is an error that says so. Memory use is
@@ -118,7 +113,8 @@ impl Checkpoint {
         for Shape { name, rows, words } in contents.planes {
             let bytes = rows.checked_mul(u64::from(words)).and_then(|words| words.checked_mul(4));
             let bytes = take(bytes.ok_or_else(|| odd(format!("{name} has {rows} rows of {words} words")))?)?;
-            let data = words_of(&mut file, bytes).map_err(Error::read(path))?;
+            let mut data = vec![0_u32; bytes / 4];
+            file.read_exact(bytemuck::cast_slice_mut(&mut data)).map_err(Error::read(path))?;
             planes.push(Plane { name, words, data });
         }
         if rest > 0 {
@@ -148,7 +144,7 @@ impl Write for Body {
 }
 
 /// Checks the header, the checksum and the length (`length` bytes) of a file.
-fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
+fn check(file: &mut impl Read, path: &Path, length: u64) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, "", problem));
     let mut header = Vec::with_capacity(HEADER);
     file.take(HEADER as u64).read_to_end(&mut header).map_err(Error::read(path))?;
@@ -173,32 +169,11 @@ fn check(file: &mut impl BufRead, path: &Path, length: u64) -> Result<()> {
         let what = if length < whole { "was cut short" } else { "grew" };
         return refuse(format!("{what}: {length} bytes, {whole} were written"));
     }
-    let mut sum = Hasher::new();
-    loop {
-        let bytes = file.fill_buf().map_err(Error::read(path))?;
-        if bytes.is_empty() {
-            break;
-        }
-        sum.update(bytes);
-        let count = bytes.len();
-        file.consume(count);
-    }
-    let (found, written) = (sum.finalize(), u32_at(12));
+    let mut body = Body::default();
+    io::copy(file, &mut body).map_err(Error::read(path))?;
+    let (found, written) = (body.sum.finalize(), u32_at(12));
     if found != written {
         return refuse(format!("was damaged after it was written: its checksum is {found:08x}, it was {written:08x}"));
     }
     Ok(())
-}
-
-fn words_of(file: &mut impl Read, bytes: usize) -> io::Result<Vec<u32>> {
-    let mut data = Vec::with_capacity(bytes / 4);
-    let mut chunk = vec![0; CHUNK];
-    let mut left = bytes;
-    while left > 0 {
-        let part = &mut chunk[..left.min(CHUNK)];
-        file.read_exact(part)?;
-        data.extend(part.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])));
-        left -= part.len();
-    }
-    Ok(data)
 }

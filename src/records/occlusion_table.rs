@@ -54,8 +54,7 @@ impl OcclusionTable {
 
     /// Writes the table, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-        atomic::write(path, |out| out.write_all(text.as_bytes()))
+        atomic::write_json(path, self)
     }
 
     /// Returns the number of (object, occluder) pairs over all views.

@@ -8,7 +8,8 @@ use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Point, View};
 use crate::scheduler::SchedulerOptions;
 use crate::stage::Stage;
-use crate::train::{ExposureMode, Objective, TrainConfig, Trainer, TrainerOptions};
+use crate::train::setup::near_plane::sample;
+use crate::train::{Objective, TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
 /// Steps of each view.
@@ -30,19 +31,11 @@ pub fn aligned(
     }
     let config = TrainConfig {
         iterations: (STEPS * found.len()) as u32,
-        near,
         background,
-        sh_degree: model.sh_degree,
-        sh_degree_interval: Some(1),
-        antialias: model.antialiased,
-        exposure: ExposureMode::Off,
         refine_poses: true,
-        free_space: false,
-        ..TrainConfig::default()
+        ..TrainConfig::of_finished(model, near)
     };
-    let every = model.len().div_ceil(POINTS);
-    let points =
-        (0..model.len()).step_by(every).map(|row| Point { position: model.world(row), colour: [0; 3] }).collect();
+    let points = sample(model, POINTS).into_iter().map(|position| Point { position, colour: [0; 3] }).collect();
     let train = found.iter().map(|view| View { mask: None, ..view.clone() }).collect();
     let dataset = Dataset { train, points, ..Dataset::default() };
     let model = Gaussians { labels: None, label_confidence: None, ..model.clone() };

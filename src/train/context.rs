@@ -11,7 +11,6 @@ use crate::train::extension::Joined;
 use crate::train::input::step_input::{self, SceneScale, StepInput};
 use crate::train::input::views::Views;
 use crate::train::objective::Objective;
-use crate::train::setup::region::Region;
 use crate::train::setup::{self, TrainerOptions};
 use crate::train::shared::Shared;
 use crate::train::shared::poses;
@@ -48,7 +47,9 @@ impl Context {
         size: EngineSize,
         TrainerOptions { shape, scheduler, objective, strategy, shared, region, depths }: TrainerOptions,
     ) -> Result<Self> {
-        let (scale, region) = (Region::scale(region.as_ref(), dataset), region.as_ref());
+        let region = region.as_ref();
+        let scale = SceneScale { extent: region.map_or_else(|| dataset.extent(), |region| region.extent) };
+        let grow_zone = region.map(|region| region.zone).or(config.grow_box.map(Zone::along_world));
         let shared = shared.or_of(&config, dataset, region);
         let strategy = strategy.unwrap_or_else(|| objective.strategy(config.strategy));
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
@@ -63,7 +64,6 @@ impl Context {
         let always_passes = u32::from(!always.is_empty());
         let passes = strategy.passes(At { step: 1, config: &config, extent: scale.extent }) + always_passes;
         engine.set_extension(Joined::of(strategy.extension(), always), passes);
-        let grow_zone = Region::grow_zone(region, &config);
         Ok(Self {
             engine,
             config,
@@ -95,7 +95,6 @@ impl Context {
         self.engine.size().labels.is_some()
     }
 
-    /// Returns the uniforms of a step.
     pub(super) fn uniforms(&self, input: &StepInput) -> Result<StepUniforms> {
         let view = self.views.of(input)?;
         let mut uniforms = step_input::uniforms(input, view, &self.config, self.scale, &self.engine);
@@ -110,7 +109,6 @@ impl Context {
         Ok(uniforms)
     }
 
-    /// Submits a step.
     pub(super) fn submit(&mut self, input: &StepInput) -> Result<InFlight> {
         let (key, view, uniforms) = (self.key(input), self.views.of(input)?, self.uniforms(input)?);
         let shared = self.shared.of_step(self.at(input.step), self.views.index(input))?;

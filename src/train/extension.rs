@@ -11,7 +11,6 @@ pub(super) struct Joined {
 }
 
 impl Joined {
-    /// Returns the passes of all.
     pub(super) fn of(strategy: Arc<dyn Extension>, always: Vec<Arc<dyn Extension>>) -> Arc<dyn Extension> {
         if always.is_empty() { strategy } else { Arc::new(Self { strategy, always }) }
     }

@@ -49,6 +49,12 @@ pub struct Objective {
     pub losses: &'static [Loss],
 }
 
+impl Default for Objective {
+    fn default() -> Self {
+        Self::SCENE
+    }
+}
+
 impl Objective {
     /// A scene: all of its Gaussians, by all losses.
     pub const SCENE: Self = {

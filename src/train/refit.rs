@@ -8,7 +8,7 @@ use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::scene::{Dataset, Gaussians, Occluders, View};
 use crate::scheduler::SchedulerOptions;
-use crate::train::{ExposureMode, Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
+use crate::train::{Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -42,18 +42,12 @@ pub fn refitted(
     }
     let config = TrainConfig {
         iterations: REFIT_STEPS,
-        near,
-        sh_degree: objects.sh_degree,
-        sh_degree_interval: Some(1),
-        antialias: objects.antialiased,
         start_size: Some(1.0),
-        exposure: ExposureMode::Off,
-        free_space: false,
         label_from: Some(0),
         layer_every: Some(1),
         label_alpha: ALPHA_WEIGHT,
         occlusion: Occlusion::None,
-        ..TrainConfig::default()
+        ..TrainConfig::of_finished(objects, near)
     };
     let dataset = Dataset { train, ..Dataset::default() };
     let options = TrainerOptions { objective: Objective::OBJECT_OPACITIES, ..scheduler.into() };

@@ -38,6 +38,8 @@ pub struct TrainState {
     pub labelled_once: bool,
     /// Memory has limited the number of Gaussians.
     pub memory_bounds: bool,
+    /// Number of Gaussians before the first change of the strategy.
+    pub first_count: Option<u32>,
     /// Sizes that the buffers had grown to.
     pub sizes: GrownSizes,
     /// The configuration.

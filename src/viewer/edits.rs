@@ -1,4 +1,4 @@
-//! Changes of the labels of a working copy, each with its command and its inverse.
+//! Changes of the labels of a working copy, each with its command. A change is taken back by the others, from the first model on.
 
 use super::Words;
 use super::message::Edit;
@@ -16,9 +16,6 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Most changes that can be taken back.
-const UNDO_MAX: usize = 100;
-
 /// A model, its names, and the changes so far.
 pub(super) struct Work<'a> {
     /// The model as it was typed: the input of the first command.
@@ -26,9 +23,9 @@ pub(super) struct Work<'a> {
     words: &'a dyn Words,
     pub(super) model: Gaussians,
     pub(super) table: Option<LabelTable>,
+    /// Model and names before the first change; none without changes.
+    first: Option<(Gaussians, Option<LabelTable>)>,
     done: Vec<Done>,
-    /// Changes that can no longer be taken back.
-    settled: Vec<(String, PathBuf)>,
     folder: PathBuf,
     /// Number of the next file.
     next: u32,
@@ -36,28 +33,11 @@ pub(super) struct Work<'a> {
     written: Option<PathBuf>,
 }
 
-/// A change that can be taken back.
+/// A change.
 struct Done {
+    edit: Edit,
     command: String,
     output: PathBuf,
-    table: Option<LabelTable>,
-    before: Before,
-}
-
-/// What a change replaced.
-enum Before {
-    Labels(Option<Vec<u32>>),
-    /// Colours of some rows.
-    Colours {
-        rows: Vec<usize>,
-        sh0: Vec<[f32; 3]>,
-        sh_rest: Vec<[f32; 3]>,
-    },
-    /// Rows that are gone, with their places.
-    Rows {
-        rows: Vec<usize>,
-        removed: Gaussians,
-    },
 }
 
 impl<'a> Work<'a> {
@@ -73,23 +53,17 @@ impl<'a> Work<'a> {
         let names = if folder.is_dir() { read::folder(&folder).unwrap_or_default() } else { Vec::new() };
         let last = names.iter().filter_map(|path| path.file_name()?.to_str()?.split('.').next()?.parse::<u32>().ok());
         let next = last.max().map_or(1, |last| last.saturating_add(1));
-        let (done, settled) = (Vec::new(), Vec::new());
-        Self { typed, words, model, table, done, settled, folder, next, written: None }
+        Self { typed, words, model, table, first: None, done: Vec::new(), folder, next, written: None }
     }
 
     /// Returns true if the model differs from the file.
     pub(super) fn is_changed(&self) -> bool {
-        !self.done.is_empty() || !self.settled.is_empty()
+        !self.done.is_empty()
     }
 
     /// The file that the model as it is now has or would have.
     fn present(&self) -> &Path {
-        let settled = || self.settled.last().map(|(_, output)| output.as_path());
-        self.done.last().map(|done| done.output.as_path()).or_else(settled).unwrap_or(self.typed)
-    }
-
-    fn known(&self) -> Catalogue {
-        Catalogue::new(&self.model, self.table.clone())
+        self.done.last().map_or(self.typed, |done| &done.output)
     }
 
     /// Changes the model, or writes a part of it. Returns a sentence for the page.
@@ -99,71 +73,34 @@ impl<'a> Work<'a> {
         }
         let output = self.folder.join(format!("{:03}.ply", self.next));
         let command = self.words.edit(edit, self.present(), &output);
-        let (known, before, table) = (self.known(), self.table.clone(), self.table.as_ref());
-        let labels: BTreeSet<u32> = labels_of(edit).iter().copied().collect();
-        known.check("labels", &labels)?;
-        let listed: Vec<u32> = labels.iter().copied().collect();
-        let before_model = match edit {
-            Edit::Export { .. } => {
-                let part = extract(&self.model, &listed, MIN_LABEL_CONFIDENCE)?;
-                if part.is_empty() {
-                    return Err(Error::usage(
-                        "labels",
-                        format!("have no Gaussian of a confidence of {MIN_LABEL_CONFIDENCE}"),
-                    ));
-                }
-                let names = table.map(|table| keep(table, |id| labels.contains(&id)));
-                export_model(&output, &part, names.as_ref(), WriteOptions::default())?;
-                self.next += 1;
-                return Ok(format!("{} Gaussians are in {}. The command was: {command}", part.len(), output.display()));
+        Catalogue::new(&self.model, self.table.clone()).check("labels", &labels_of(edit))?;
+        let (model, table) = changed(&self.model, self.table.as_ref(), edit)?;
+        if let Edit::Export { .. } = edit {
+            if model.is_empty() {
+                let problem = format!("have no Gaussian of a confidence of {MIN_LABEL_CONFIDENCE}");
+                return Err(Error::usage("labels", problem));
             }
-            Edit::Rename { .. } | Edit::Merge { .. } => {
-                let name = if let Edit::Rename { name, .. } = edit { Some(name.as_str()) } else { None };
-                let Merged { model, table, .. } = merge(&self.model, &known, &labels, None, name)?;
-                self.table = table;
-                let old = std::mem::replace(&mut self.model, model);
-                Before::Labels(old.labels)
-            }
-            Edit::Recolour { colour, mix, .. } => {
-                let model = recolour(&self.model, &labels, *colour, *mix);
-                colours(&std::mem::replace(&mut self.model, model), &labels)
-            }
-            Edit::Remove { .. } => {
-                let rest = remove(&self.model, &listed)?;
-                self.table = table.map(|table| keep(table, |id| !labels.contains(&id)));
-                let old = std::mem::replace(&mut self.model, rest);
-                let rows: Vec<usize> = rows_of(&old, &labels);
-                let gone: BTreeSet<usize> = rows.iter().copied().collect();
-                Before::Rows { removed: old.filtered(|row| gone.contains(&row)), rows }
-            }
-        };
-        self.next += 1;
-        self.done.push(Done { command, output, table: before, before: before_model });
-        if self.done.len() > UNDO_MAX {
-            let Done { command, output, .. } = self.done.remove(0);
-            self.settled.push((command, output));
+            export_model(&output, &model, table.as_ref(), WriteOptions::default())?;
+            self.next += 1;
+            return Ok(format!("{} Gaussians are in {}. The command was: {command}", model.len(), output.display()));
         }
+        let before = (std::mem::replace(&mut self.model, model), std::mem::replace(&mut self.table, table));
+        self.first.get_or_insert(before);
+        self.next += 1;
+        self.done.push(Done { edit: edit.clone(), command, output });
         Ok(String::new())
     }
 
-    /// Takes back the last change.
-    pub(super) fn undo(&mut self) -> Result<String> {
+    pub(super) fn undo(&mut self) -> Result<()> {
         let none = || Error::usage("undo", "there is no change to take back");
-        let Done { table, before, .. } = self.done.pop().ok_or_else(none)?;
-        self.table = table;
-        match before {
-            Before::Labels(labels) => self.model.labels = labels,
-            Before::Colours { rows, sh0, sh_rest } => {
-                let rest = self.model.rest_per_gaussian();
-                for (index, &row) in rows.iter().enumerate() {
-                    self.model.sh0[row] = sh0[index];
-                    let old = &sh_rest[index * rest..(index + 1) * rest];
-                    self.model.sh_rest[row * rest..(row + 1) * rest].copy_from_slice(old);
-                }
-            }
-            Before::Rows { rows, removed } => self.model = interleaved(&self.model, &removed, &rows),
+        self.done.pop().ok_or_else(none)?;
+        let first = if self.done.is_empty() { self.first.take() } else { self.first.clone() };
+        let (mut model, mut table) = first.ok_or_else(none)?;
+        for done in &self.done {
+            (model, table) = changed(&model, table.as_ref(), &done.edit)?;
         }
-        Ok(String::new())
+        (self.model, self.table) = (model, table);
+        Ok(())
     }
 
     /// Writes the model as it is now. Returns a sentence for the page.
@@ -191,76 +128,45 @@ impl<'a> Work<'a> {
         Ok(self.written.clone())
     }
 
-    /// Returns the changes for a page.
     pub(super) fn describe(&self) -> Value {
-        let settled = self.settled.iter().map(|(command, _)| command);
-        let commands: Vec<_> = settled.chain(self.done.iter().map(|done| &done.command)).collect();
         json!({
             "kind": "edits",
-            "commands": commands,
-            "undo": !self.done.is_empty(),
+            "commands": self.done.iter().map(|done| &done.command).collect::<Vec<_>>(),
+            "undo": self.is_changed(),
             "saved": self.is_saved(),
             "file": self.present().display().to_string(),
         })
     }
 }
 
-fn labels_of(edit: &Edit) -> &[u32] {
+fn labels_of(edit: &Edit) -> BTreeSet<u32> {
     match edit {
-        Edit::Rename { label, .. } => std::slice::from_ref(label),
+        Edit::Rename { label, .. } => BTreeSet::from([*label]),
         Edit::Merge { labels } | Edit::Recolour { labels, .. } | Edit::Remove { labels } | Edit::Export { labels } => {
-            labels
+            labels.iter().copied().collect()
         }
     }
 }
 
-fn rows_of(model: &Gaussians, labels: &BTreeSet<u32>) -> Vec<usize> {
-    let has = |row: &usize| labels.contains(&model.label(*row));
-    (0..model.len()).filter(has).collect()
-}
-
-fn colours(model: &Gaussians, labels: &BTreeSet<u32>) -> Before {
-    let (rows, rest) = (rows_of(model, labels), model.rest_per_gaussian());
-    let sh0 = rows.iter().map(|&row| model.sh0[row]).collect();
-    let sh_rest = rows.iter().flat_map(|&row| model.sh_rest[row * rest..(row + 1) * rest].iter().copied()).collect();
-    Before::Colours { rows, sh0, sh_rest }
-}
-
-/// Puts removed rows back in their places.
-fn interleaved(kept: &Gaussians, removed: &Gaussians, rows: &[usize]) -> Gaussians {
-    let total = kept.len() + removed.len();
-    let mut sources = Vec::with_capacity(total);
-    let (mut next, mut left) = (0, 0);
-    for row in 0..total {
-        if rows.get(next) == Some(&row) {
-            sources.push((removed, next));
-            next += 1;
-        } else {
-            sources.push((kept, left));
-            left += 1;
-        }
-    }
-    let rest = kept.rest_per_gaussian();
-    let column = |of: fn(&Gaussians) -> Option<&Vec<u32>>| -> Option<Vec<u32>> {
-        sources.iter().map(|&(from, at)| of(from).map(|values| values[at])).collect()
+/// Returns what an edit makes of a model and its names.
+fn changed(model: &Gaussians, table: Option<&LabelTable>, edit: &Edit) -> Result<(Gaussians, Option<LabelTable>)> {
+    let labels = labels_of(edit);
+    let listed: Vec<u32> = labels.iter().copied().collect();
+    let merged = |name: Option<&str>| {
+        let known = Catalogue::new(model, table.cloned());
+        merge(model, &known, &labels, None, name).map(|Merged { model, table, .. }| (model, table))
     };
-    let shares: Option<Vec<f32>> =
-        sources.iter().map(|&(from, at)| from.label_confidence.as_ref().map(|values| values[at])).collect();
-    Gaussians {
-        origin: kept.origin,
-        means: sources.iter().map(|&(from, at)| from.means[at]).collect(),
-        quats: sources.iter().map(|&(from, at)| from.quats[at]).collect(),
-        scales: sources.iter().map(|&(from, at)| from.scales[at]).collect(),
-        opacities: sources.iter().map(|&(from, at)| from.opacities[at]).collect(),
-        sh0: sources.iter().map(|&(from, at)| from.sh0[at]).collect(),
-        sh_rest: sources
-            .iter()
-            .flat_map(|&(from, at)| from.sh_rest[at * rest..(at + 1) * rest].iter().copied())
-            .collect(),
-        sh_degree: kept.sh_degree,
-        antialiased: kept.antialiased,
-        labels: column(|model| model.labels.as_ref()),
-        label_confidence: shares,
+    match edit {
+        Edit::Rename { name, .. } => merged(Some(name)),
+        Edit::Merge { .. } => merged(None),
+        Edit::Recolour { colour, mix, .. } => Ok((recolour(model, &labels, *colour, *mix), table.cloned())),
+        Edit::Remove { .. } => {
+            Ok((remove(model, &listed)?, table.map(|table| keep(table, |id| !labels.contains(&id)))))
+        }
+        Edit::Export { .. } => {
+            let part = extract(model, &listed, MIN_LABEL_CONFIDENCE)?;
+            Ok((part, table.map(|table| keep(table, |id| labels.contains(&id)))))
+        }
     }
 }
 

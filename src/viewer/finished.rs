@@ -1,7 +1,7 @@
 //! Shows a finished model, and changes its labels.
 
 use super::edits::Work;
-use super::hub::{ClientId, Hub, Task};
+use super::hub::{ClientId, Hub};
 use super::message::Message;
 use super::painter::{Painter, Source};
 use super::views::{Score, Views, describe_scores};
@@ -84,8 +84,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
             }
         }
         match hub.next(TURN) {
-            Some((id, Task::Look(look))) => session.painter.look(hub, id, &look, &mut session.drawing)?,
-            Some((id, Task::Message(message))) => session.hear(id, message)?,
+            Some((id, message)) => session.hear(id, message)?,
             None => session.score_one()?,
         }
     }
@@ -188,6 +187,7 @@ struct Session<'a> {
 impl Session<'_> {
     fn hear(&mut self, id: ClientId, message: Message) -> Result<()> {
         let said = match message {
+            Message::Look(look) => return self.painter.look(self.hub, id, &look, &mut self.drawing),
             Message::Pick { seq, from, pixel } => {
                 return self.painter.pick(self.hub, id, (seq, &from, pixel), &mut self.drawing);
             }
@@ -196,10 +196,10 @@ impl Session<'_> {
                 self.redraw().map(|()| String::new())
             }
             Message::Edit { what } => self.work.apply(&what).and_then(|said| self.redraw().map(|()| said)),
-            Message::Undo => self.work.undo().and_then(|said| self.redraw().map(|()| said)),
+            Message::Undo => self.work.undo().and_then(|()| self.redraw()).map(|()| String::new()),
             Message::Write => self.work.write(),
             Message::Train { .. } | Message::Share { .. } => Ok("No training runs.".to_owned()),
-            Message::Look(_) | Message::Ack { .. } | Message::Alive => return Ok(()),
+            Message::Ack { .. } | Message::Alive => return Ok(()),
         };
         match said {
             Ok(text) if text.is_empty() => {}

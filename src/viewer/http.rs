@@ -33,7 +33,6 @@ impl Head {
         found.next().is_none().then_some(&first.1)
     }
 
-    /// Returns a value of the query.
     pub(super) fn value(&self, name: &str) -> Option<&str> {
         self.query
             .split('&')
@@ -117,7 +116,6 @@ pub(super) fn answer(stream: &mut TcpStream, status: &str, kind: &str, more: &st
     let _ = stream.shutdown(std::net::Shutdown::Write);
 }
 
-/// Answers with a line of text.
 pub(super) fn say(stream: &mut TcpStream, status: &str, text: &str) {
     answer(stream, status, "text/plain; charset=utf-8", "", format!("{text}\n").as_bytes());
 }

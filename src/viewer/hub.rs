@@ -1,6 +1,6 @@
 //! Where pages and the engine meet: for each page one request in work, one frame on the wire, and the newest request.
 //!
-//! One thread owns the engine and takes [`Task`]s; a thread per page reads, another writes. Nothing here grows with the
+//! One thread owns the engine and takes messages; a thread per page reads, another writes. Nothing here grows with the
 //! time that a page is open or with what it sends.
 
 use super::message::{Frame, Look, Message};
@@ -19,15 +19,6 @@ const REPLIES_MAX: usize = 64;
 
 /// Number of a page.
 pub(super) type ClientId = u64;
-
-/// Work for the thread of the engine.
-#[derive(Debug)]
-pub(super) enum Task {
-    /// A frame.
-    Look(Look),
-    /// Anything else.
-    Message(Message),
-}
 
 /// What a writer sends next.
 #[derive(Debug)]
@@ -124,15 +115,15 @@ impl Hub {
     }
 
     /// Waits for work, at most `most`. Pages have turns; everything else comes before pictures.
-    pub(super) fn next(&self, most: Duration) -> Option<(ClientId, Task)> {
+    pub(super) fn next(&self, most: Duration) -> Option<(ClientId, Message)> {
         let end = Instant::now() + most;
         let mut state = self.lock();
         loop {
-            if let Some((id, message)) = state.tasks.pop_front() {
-                return Some((id, Task::Message(message)));
+            if let Some(task) = state.tasks.pop_front() {
+                return Some(task);
             }
             if let Some((id, look)) = state.next_look() {
-                return Some((id, Task::Look(look)));
+                return Some((id, Message::Look(look)));
             }
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() || state.is_closing {
@@ -155,7 +146,6 @@ impl Hub {
         !state.tasks.is_empty() || state.clients.values().any(Client::waits)
     }
 
-    /// Returns true if any page is open.
     pub(super) fn is_watched(&self) -> bool {
         !self.lock().clients.is_empty()
     }
@@ -179,7 +169,6 @@ impl Hub {
         self.wake.notify_all();
     }
 
-    /// Answers a page.
     pub(super) fn reply(&self, id: ClientId, value: &serde_json::Value) {
         if let Some(client) = self.lock().clients.get_mut(&id) {
             client.reply(value.to_string().into());
@@ -205,7 +194,6 @@ impl Hub {
         self.lock().views = views;
     }
 
-    /// Returns the views.
     pub(super) fn views(&self) -> Arc<Views> {
         Arc::clone(&self.lock().views)
     }
@@ -253,7 +241,6 @@ impl Hub {
         }
     }
 
-    /// Returns true after [`Self::close`].
     pub(super) fn is_closing(&self) -> bool {
         self.lock().is_closing
     }
@@ -299,9 +286,9 @@ mod tests {
         Message::Look(Look { seq, from: Viewpoint::View(0), panes: Vec::new(), mark: Vec::new(), moving: true })
     }
 
-    fn seq(task: Option<(ClientId, Task)>) -> Option<(ClientId, u32)> {
+    fn seq(task: Option<(ClientId, Message)>) -> Option<(ClientId, u32)> {
         match task? {
-            (id, Task::Look(look)) => Some((id, look.seq)),
+            (id, Message::Look(look)) => Some((id, look.seq)),
             other => panic!("{other:?}"),
         }
     }

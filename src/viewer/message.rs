@@ -202,7 +202,6 @@ impl Frame {
     /// Bytes of the header.
     pub(super) const HEADER: usize = 28;
 
-    /// Returns the bytes of the message.
     pub(super) fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(Self::HEADER + self.pictures.iter().map(|p| p.len() + 4).sum::<usize>());
         let count = self.pictures.len() as u32;

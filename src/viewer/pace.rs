@@ -23,7 +23,6 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Notes the time of a frame.
     pub(super) fn note(&mut self, pixels: f64, seconds: f64) {
         let x = pixels / 1e6;
         for (sum, value) in self.sums.iter_mut().zip([1.0, x, seconds, x * x, x * seconds]) {
@@ -107,12 +106,10 @@ impl Budget {
         Self { share: f64::from(share), credit: 0.0 }
     }
 
-    /// Changes the share.
     pub(super) fn set_share(&mut self, share: f32) {
         self.share = f64::from(share.clamp(0.0, 1.0));
     }
 
-    /// The share.
     pub(super) fn share(&self) -> f64 {
         self.share
     }

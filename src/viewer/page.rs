@@ -23,7 +23,6 @@ const FILES: &[(&str, &str, &[u8])] = &[
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// Returns type and bytes of a file.
 pub(super) fn file(path: &str) -> Option<(&'static str, &'static [u8])> {
     FILES.iter().find(|(own, ..)| *own == path).map(|&(_, kind, bytes)| (kind, bytes))
 }

@@ -37,7 +37,6 @@ pub(super) struct Painter {
 }
 
 impl Painter {
-    /// Makes a painter for some views.
     pub(super) fn new(views: Arc<Views>, is_cpu: bool) -> Self {
         Self { views, pace: Pace::default(), target: TARGETS[usize::from(is_cpu)] }
     }
@@ -68,7 +67,7 @@ impl Painter {
         let side = |full: u32| ((f64::from(full) * scale).round() as u32).max(1);
         let size = (side(fits.0), side(fits.1));
         let is_full = size == (full.width, full.height);
-        let camera = if is_full { full } else { full.resized(size.0, size.1) };
+        let camera = full.resized(size.0, size.1);
         let is_lossy = look.moving && hub.is_slow(id, pixels(size), self.target);
         let mut parts = pictures::parts(&look.panes);
         parts.labels |= !look.mark.is_empty();
@@ -127,8 +126,7 @@ impl Painter {
         let (width, height) = fitting(&full, source.largest());
         let place = |at: u32, of: u32, now: u32| (u64::from(at) * u64::from(now) / u64::from(of)) as usize;
         let index = place(y, full.height, height) * width as usize + place(x, full.width, width);
-        let camera = if (width, height) == (full.width, full.height) { full } else { full.resized(width, height) };
-        let rendered = source.render(&camera, Parts::ALL)?;
+        let rendered = source.render(&full.resized(width, height), Parts::ALL)?;
         let row = usize::try_from(rendered.top_id[index]).ok();
         let confidence = row.and_then(|row| source.confidence()?.get(row).copied());
         Ok(json!({
@@ -141,7 +139,6 @@ impl Painter {
         }))
     }
 
-    /// Scores a view of the scene.
     pub(super) fn score(&self, index: usize, source: &mut dyn Source) -> Result<Score> {
         let posed: &Posed = self.views.get(index)?;
         let parts = if posed.view.mask.is_some() { Parts::LABELS } else { Parts::COLOUR };

@@ -78,7 +78,6 @@ impl Curve {
         }
     }
 
-    /// Returns the curves for a page.
     pub(super) fn describe(&self) -> Value {
         let of = |index: usize| self.points.iter().map(|point| point.1[index]).collect::<Vec<_>>();
         let steps: Vec<u32> = self.points.iter().map(|point| point.0).collect();

@@ -1,7 +1,7 @@
 //! Shows a training. Viewing reads the model between two steps and changes no bit of it.
 
 use super::finished::scene;
-use super::hub::{ClientId, Task};
+use super::hub::ClientId;
 use super::message::{Command, Message};
 use super::pace::Budget;
 use super::painter::{Painter, Source};
@@ -65,11 +65,9 @@ struct Pace {
 }
 
 /// The model between two steps.
-struct Between<'a, 'b>(&'a mut Live<'b>);
-
-impl Source for Between<'_, '_> {
+impl Source for Live<'_> {
     fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
-        self.0.render(camera, parts)
+        Live::render(self, camera, parts)
     }
 
     fn confidence(&self) -> Option<&[f32]> {
@@ -78,11 +76,11 @@ impl Source for Between<'_, '_> {
 
     fn largest(&mut self) -> Option<(u32, u32)> {
         // A larger picture would need memory, which might bound the number of Gaussians.
-        Some(self.0.image())
+        Some(self.image())
     }
 
     fn step(&self) -> u32 {
-        self.0.step()
+        Live::step(self)
     }
 }
 
@@ -120,27 +118,26 @@ impl<'a> Watched<'a> {
     fn after_step(&mut self, live: &mut Live) -> Result<()> {
         let spent = self.pace.last.elapsed();
         self.budget.trained(spent);
-        let weight = if self.pace.step == 0.0 { 1.0 } else { 0.05 };
         self.hear_all(live)?;
+        let start = Instant::now();
         if self.viewer.hub.is_watched() {
-            let start = Instant::now();
             if self.budget.allows() && self.viewer.hub.has_work() {
                 live.wait()?;
                 self.budget.trained(start.elapsed());
             }
             while self.budget.allows() && self.viewer.hub.has_work() {
-                let Some((id, task)) = self.viewer.hub.next(Duration::ZERO) else { break };
-                self.timed(|watched| watched.serve(id, task, live))?;
+                let Some((id, message)) = self.viewer.hub.next(Duration::ZERO) else { break };
+                self.timed(|watched| watched.serve(id, message, live))?;
             }
             if self.budget.allows() {
                 self.timed(|watched| watched.score_one(live))?;
             }
             self.report(live, false)?;
-            // Viewing is part of what a step takes.
-            self.pace.step += weight * ((spent + start.elapsed()).as_secs_f64() - self.pace.step);
-        } else {
-            self.pace.step += weight * (spent.as_secs_f64() - self.pace.step);
         }
+        // Viewing is part of what a step takes.
+        let seconds = (spent + start.elapsed()).as_secs_f64();
+        let weight = if self.pace.step == 0.0 { 1.0 } else { 0.05 };
+        self.pace.step += weight * (seconds - self.pace.step);
         Ok(())
     }
 
@@ -148,7 +145,7 @@ impl<'a> Watched<'a> {
     fn in_pause(&mut self, live: &mut Live) -> Result<()> {
         self.report(live, true)?;
         match self.viewer.hub.next(PAUSED_TURN) {
-            Some((id, task)) => self.serve(id, task, live),
+            Some((id, message)) => self.serve(id, message, live),
             None => self.score_one(live),
         }
     }
@@ -163,26 +160,26 @@ impl<'a> Watched<'a> {
 
     fn hear_all(&mut self, live: &mut Live) -> Result<()> {
         while let Some((id, message)) = self.viewer.hub.next_message(self.budget.allows()) {
-            self.timed(|watched| watched.serve(id, Task::Message(message), live))?;
+            self.timed(|watched| watched.serve(id, message, live))?;
         }
         Ok(())
     }
 
-    fn serve(&mut self, id: ClientId, task: Task, live: &mut Live) -> Result<()> {
+    fn serve(&mut self, id: ClientId, message: Message, live: &mut Live) -> Result<()> {
         let hub = &self.viewer.hub;
-        match task {
-            Task::Look(look) => return self.painter.look(hub, id, &look, &mut Between(live)),
-            Task::Message(Message::Pick { seq, from, pixel }) => {
-                return self.painter.pick(hub, id, (seq, &from, pixel), &mut Between(live));
+        match message {
+            Message::Look(look) => return self.painter.look(hub, id, &look, live),
+            Message::Pick { seq, from, pixel } => {
+                return self.painter.pick(hub, id, (seq, &from, pixel), live);
             }
-            Task::Message(Message::Share { share }) if (0.0..=1.0).contains(&share) => self.budget.set_share(share),
-            Task::Message(Message::Train { what }) => match what {
+            Message::Share { share } if (0.0..=1.0).contains(&share) => self.budget.set_share(share),
+            Message::Train { what } => match what {
                 Command::Pause => self.wish.pause = true,
                 Command::Resume => self.wish.pause = false,
                 Command::Save => self.wish.save = true,
                 Command::Stop => self.wish.stop = true,
             },
-            Task::Message(_) => {
+            _ => {
                 let text = "Labels cannot be changed while a training runs or is paused.";
                 hub.reply(id, &json!({ "kind": "problem", "text": text }));
             }
@@ -206,7 +203,7 @@ impl<'a> Watched<'a> {
         let next = rest.clone().find(|&index| views.list[index].is_test && views.list[index].view.photo.is_some());
         self.scored_to = next.map_or(rest.end, |index| index + 1);
         if let Some(index) = next {
-            self.scores[index] = self.painter.score(index, &mut Between(live))?;
+            self.scores[index] = self.painter.score(index, live)?;
             self.viewer.hub.publish("scores", &describe_scores(&self.scores, step));
         }
         Ok(())

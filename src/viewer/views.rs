@@ -43,13 +43,11 @@ impl Views {
         Self { list }
     }
 
-    /// Returns a view by its number.
     pub(super) fn get(&self, index: usize) -> Result<&Posed> {
         let missing = || Error::usage("view", format!("there is no view {index}; the scene has {}", self.list.len()));
         self.list.get(index).ok_or_else(missing)
     }
 
-    /// Returns the views for a page.
     pub(super) fn describe(&self) -> Value {
         let row = |posed: &Posed| {
             json!({
@@ -95,7 +93,6 @@ impl Score {
     }
 }
 
-/// Returns the scores for a page.
 pub(super) fn describe_scores(scores: &[Score], step: u32) -> Value {
     let rows: Vec<_> = scores.iter().map(|score| json!([score.psnr, score.iou])).collect();
     json!({ "kind": "scores", "step": step, "rows": rows })

@@ -57,7 +57,11 @@ fn pixels(browser: &mut Browser, tab: &Tab) -> Picture {
     browser.until(tab, SETTLED);
     let found = browser.js(
         tab,
-        "(() => { const p = labelgs.stage.pixels(0); return [p.width, p.height, [...p.data].filter((_, i) => i % 4 < 3)]; })()",
+        "(() => { const [image] = labelgs.stage.images, { width, height } = image; \
+         const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true }); \
+         context.drawImage(image, 0, 0); \
+         const { data } = context.getImageData(0, 0, width, height); \
+         return [width, height, [...data].filter((_, i) => i % 4 < 3)]; })()",
     );
     let number = |value: &Value| u32::try_from(value.as_u64().expect("a number")).expect("a small one");
     let values = found[2].as_array().expect("bytes").iter().map(|value| number(value) as u16).collect();

@@ -13,12 +13,14 @@ pub(in crate::train) struct Growth {
     pub(in crate::train) bound: Bound,
     /// Counts of the latest densification, cleared when the caller takes them.
     pub(in crate::train) densified: Option<Densified>,
+    /// Number of Gaussians before the first change.
+    pub(in crate::train) first_count: Option<u32>,
 }
 
 impl Growth {
     pub(in crate::train) fn new(config: &TrainConfig) -> Self {
         let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::from(u32::MAX) };
-        Self { bound: Bound { most, by_memory: false }, densified: None }
+        Self { bound: Bound { most, by_memory: false }, densified: None, first_count: None }
     }
 }
 
@@ -33,9 +35,11 @@ impl Between<Context> for Growth {
         let uniforms = context.uniforms(context.newest.as_ref().ok_or_else(missing)?)?;
         let extent = context.at(step).extent;
         let Context { engine, config, strategy, views, .. } = context;
-        let mut population = Population::new(engine, &mut self.bound, views, uniforms, step);
+        let first_count = *self.first_count.get_or_insert(engine.gaussian_count());
+        let bound = &mut self.bound;
+        let mut population = Population { engine, bound, views, uniforms, step, first_count, densified: None };
         strategy.act(At { step, config, extent }, &mut population)?;
-        self.densified = population.densified().or(self.densified);
+        self.densified = population.densified.or(self.densified);
         Ok(())
     }
 }

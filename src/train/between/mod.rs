@@ -8,7 +8,7 @@ mod pose_adjustment;
 mod votes;
 
 pub(super) use growth::Growth;
-pub(super) use occluders::{Occluders, occluders_of, set_occluders};
+pub(super) use occluders::Occluders;
 pub(super) use pose_adjustment::PoseAdjustment;
 pub(super) use votes::Votes;
 

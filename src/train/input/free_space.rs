@@ -6,6 +6,7 @@
 use super::sampler::stream;
 use crate::scene::{Camera, Dataset, Gaussians};
 use crate::scenes::init;
+use crate::train::setup::near_plane::{sample, seen_depths};
 use glam::DVec3;
 use rand::Rng;
 
@@ -24,15 +25,9 @@ const NEIGHBOURS: usize = 5;
 pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
     let cameras = dataset.train.iter().map(|view| &view.camera);
     let quantile = if init::has_points(dataset) { NEAR_QUANTILE } else { NEAR_QUANTILE_RANDOM };
-    let every = model.len().div_ceil(SAMPLE).max(1);
-    let rows: Vec<DVec3> = (0..model.len()).step_by(every).map(|row| model.world(row)).collect();
+    let rows = sample(model, SAMPLE);
     let nearest = |camera: &Camera| {
-        let inside = |place: &DVec3| {
-            let at = camera.project(*place);
-            at.x >= 0.0 && at.y >= 0.0 && at.x <= f64::from(camera.width) && at.y <= f64::from(camera.height)
-        };
-        let places = rows.iter().map(|&world| camera.to_camera(world)).filter(|place| place.z > 0.0);
-        let mut depths: Vec<f64> = places.filter(inside).map(|place| place.z).collect();
+        let mut depths = seen_depths(camera, &rows);
         let at = (quantile * depths.len() as f64) as usize;
         (!depths.is_empty()).then(|| *depths.select_nth_unstable_by(at, f64::total_cmp).1)
     };

@@ -42,7 +42,6 @@ impl KnownDepths {
         Self(Arc::new(places.filter_map(known).collect()))
     }
 
-    /// Returns the number of known depths.
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }

@@ -4,7 +4,7 @@
 //! whether its pixels were made ahead or are made when it begins.
 
 use super::known_depths::KnownDepths;
-use super::part::{Part, labels_of, photo_of};
+use super::part::{labels_of, photo_of};
 use super::step_input::{TrainView, valid_pixels};
 use crate::engine::Band;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use std::thread::{self, JoinHandle};
 /// Most steps ahead: more than the device needs to take the time of one.
 const STEPS_MAX: usize = 8;
 
-/// The pixels of a step.
+/// The pixels of a step, with their camera.
 #[derive(Debug)]
 pub(in crate::train) struct StepPixels {
     pub(in crate::train) photo: Arc<Photo>,
@@ -25,51 +25,45 @@ pub(in crate::train) struct StepPixels {
     pub(in crate::train) view_labels: Arc<Vec<u32>>,
     /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
     pub(in crate::train) depths: Vec<f32>,
-    /// Camera and number of pixels that count, if the photo is smaller than the view.
-    pub(in crate::train) small: Option<(Camera, u64)>,
+    pub(in crate::train) camera: Camera,
+    /// Number of pixels that count.
+    pub(in crate::train) valid_pixels: u64,
 }
 
 /// What a step asks for.
 pub(in crate::train) struct Request {
-    step: u32,
+    pub(in crate::train) step: u32,
     /// Index of the part.
-    index: usize,
-    band: Band,
-    photo: Pixels<Photo>,
-    view_labels: Pixels<Vec<u32>>,
+    pub(in crate::train) index: usize,
+    pub(in crate::train) band: Band,
+    pub(in crate::train) photo: Pixels<Photo>,
+    /// The mask in the layout of the device and the number of pixels that count, at full size.
+    pub(in crate::train) full: Option<(Pixels<Vec<u32>>, u64)>,
     /// Depths that the photo is known to have, in a step that compares them.
-    depths: Option<KnownDepths>,
-    /// Camera of a smaller size.
-    small: Option<Camera>,
+    pub(in crate::train) depths: Option<KnownDepths>,
+    /// Camera of the size of the step.
+    pub(in crate::train) camera: Camera,
 }
 
 impl Request {
-    /// Asks for a part, the one with this index, of a view at a share of its size.
-    pub(in crate::train) fn new(
-        step: u32,
-        (index, part): (usize, &Part),
-        view: &TrainView,
-        (share, depths): (Option<f64>, bool),
-    ) -> Self {
-        let small = share.map(|share| part.camera.shrunk(share));
-        let depths = depths.then(|| view.depths.clone());
-        let (photo, view_labels) = (view.photo.clone(), view.view_labels.clone());
-        Self { step, index, band: part.band, photo, view_labels, depths, small }
-    }
-
     fn make(self) -> Result<StepPixels> {
+        let (band, camera) = (self.band, self.camera);
         let whole = self.photo.get()?;
-        let full = (whole.width, whole.height);
-        let photo = photo_of(self.band, whole);
-        let drawn = |photo: &Photo| self.depths.as_ref().map_or(Vec::new(), |of| of.drawn(full, self.band, photo));
-        let Some(camera) = self.small else {
-            let view_labels = labels_of(self.band, photo.width, self.view_labels.get()?);
-            return Ok(StepPixels { depths: drawn(&photo), photo, view_labels, small: None });
+        let size = (whole.width, whole.height);
+        let part = photo_of(band, whole);
+        let (photo, view_labels, valid_pixels) = match self.full {
+            Some((labels, valid)) => {
+                let labels = labels_of(band, part.width, labels.get()?);
+                (part, labels, valid)
+            }
+            None => {
+                let photo = Arc::new(shrink_photo(&part, camera.width, camera.height));
+                let valid = valid_pixels(&photo.rgba);
+                (photo, Arc::default(), valid)
+            }
         };
-        let photo = Arc::new(shrink_photo(&photo, camera.width, camera.height));
-        let valid = valid_pixels(&photo.rgba);
-        let depths = drawn(&photo);
-        Ok(StepPixels { photo, view_labels: Arc::default(), depths, small: Some((camera, valid)) })
+        let depths = self.depths.map_or(Vec::new(), |known| known.drawn(size, band, &photo));
+        Ok(StepPixels { photo, view_labels, depths, camera, valid_pixels })
     }
 }
 

@@ -68,7 +68,6 @@ pub(crate) fn finest(camera: &Camera) -> f32 {
     (f64::from(FINEST) / camera.fx.max(camera.fy)) as f32
 }
 
-/// Returns the number of pixels of a photo that count.
 pub(crate) fn valid_pixels(photo: &[[u8; 4]]) -> u64 {
     photo.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }

@@ -3,11 +3,11 @@
 use super::free_space;
 use super::part::Part;
 use super::prefetch::{Prefetch, Request, StepPixels};
-use super::step_input::{self, Shown, StepInput, StepView, TrainView};
+use super::step_input::{self, StepInput, StepView, TrainView};
 use crate::error::{Error, Result};
 use crate::label::vote::ballot::Voter;
+use crate::scene::Camera;
 use crate::scene::camera::side_at;
-use crate::scene::{Camera, Occluders};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::train::TrainConfig;
 use crate::train::shared::poses;
@@ -17,10 +17,6 @@ use std::sync::Arc;
 
 /// Number of sizes below the full one.
 const SIZES: u32 = 8;
-
-/// A smaller view has no mask.
-static NOTHING_SHOWN: BTreeMap<u16, Shown> = BTreeMap::new();
-static NO_OCCLUDERS: Occluders = Occluders::new();
 
 /// The training views. As a slice, those at full size.
 #[derive(Debug)]
@@ -46,7 +42,6 @@ pub(in crate::train) struct Views {
 }
 
 impl Views {
-    /// Makes the views of a training.
     pub(in crate::train) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
         let prefetch = Prefetch::new(&whole, config.iterations);
@@ -65,7 +60,6 @@ impl Views {
         }
     }
 
-    /// Sets the near plane of each view.
     pub(in crate::train) fn set_near_planes(&mut self, planes: &[f32]) {
         self.whole.iter_mut().zip(planes).for_each(|(view, &near)| view.near = near);
         if self.free_space {
@@ -109,7 +103,6 @@ impl Views {
         self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
     }
 
-    /// Returns the index of the view of a step.
     pub(in crate::train) fn index(&self, input: &StepInput) -> usize {
         self.parts[input.part].view
     }
@@ -176,10 +169,20 @@ impl Views {
         self.prefetch.steps()
     }
 
+    /// Returns what makes the pixels of a part, the one with this index, at the size of a step.
     fn request(&self, step: u32, index: usize) -> Request {
-        let share = (self.size_at(step) < SIZES).then(|| self.share_at(step));
         let part = &self.parts[index];
-        Request::new(step, (index, part), &self.whole[part.view], (share, step < self.depths_until))
+        let view = &self.whole[part.view];
+        let is_small = self.size_at(step) < SIZES;
+        Request {
+            step,
+            index,
+            band: part.band,
+            photo: view.photo.clone(),
+            full: (!is_small).then(|| (view.view_labels.clone(), part.valid_pixels)),
+            depths: (step < self.depths_until).then(|| view.depths.clone()),
+            camera: if is_small { part.camera.shrunk(self.share_at(step)) } else { part.camera.clone() },
+        }
     }
 
     /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
@@ -187,28 +190,18 @@ impl Views {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
         let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
         let view = &self.whole[part.view];
-        let at_full_size = StepView {
-            camera: &part.camera,
+        Ok(StepView {
+            camera: &ready.camera,
             whole: part.whole.as_ref(),
             near: view.near,
             // Of the whole photo, whatever the size of the step.
             finest: step_input::finest(&view.camera),
             photo: &ready.photo,
-            valid_pixels: part.valid_pixels,
+            valid_pixels: ready.valid_pixels,
             view_labels: &ready.view_labels,
             depths: &ready.depths,
             shown: &part.shown,
             occluders: &view.occluders,
-        };
-        Ok(match &ready.small {
-            Some((camera, valid_pixels)) => StepView {
-                camera,
-                valid_pixels: *valid_pixels,
-                shown: &NOTHING_SHOWN,
-                occluders: &NO_OCCLUDERS,
-                ..at_full_size
-            },
-            None => at_full_size,
         })
     }
 }

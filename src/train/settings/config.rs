@@ -27,13 +27,11 @@ crate::options! {
             ///
             /// The size grows up to `full_size_from`. Early steps are rough anyway, and cost in proportion to the pixels.
             /// 3DGS trains at full size.
-            #[serde(skip_serializing_if = "Option::is_none")]
             start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0), setting;
 
             /// First step at full size [default: 0.6 of the run, later where the run is short for such large photos].
             ///
             /// Steps before it have no labels.
-            #[serde(skip_serializing_if = "Option::is_none")]
             full_size_from <"STEP">: Option<u32> = None, setting;
 
             /// Seed of all random numbers; the same seed, device and driver give the same model.
@@ -53,7 +51,6 @@ crate::options! {
             /// Where the photo shows a point, or --depths has a value, light from Gaussians at another depth costs by its
             /// relative error, at most 1; a mean over these pixels. It falls linearly until the first step with labels, and
             /// moves opacities only.
-            #[serde(skip_serializing_if = "Option::is_none")]
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed, setting;
 
             /// Trains a model without aliasing.
@@ -71,7 +68,6 @@ crate::options! {
             /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
             ///
             /// 1000 in 3DGS.
-            #[serde(skip_serializing_if = "Option::is_none")]
             sh_degree_interval <"STEPS">: Option<u32> = None, at_least(1), setting;
         }
 
@@ -126,21 +122,18 @@ crate::options! {
             ///
             /// Outside of it Gaussians still train and are pruned, but none is added. It saves time where photos show
             /// more than what is wanted; `labelgs clean --inside` then drops the rest.
-            #[serde(skip_serializing_if = "Option::is_none")]
             #[cfg_attr(feature = "cli", arg(value_parser = corners, allow_hyphen_values = true))]
             grow_box <"x0,y0,z0,x1,y1,z1">: Option<[f64; 6]> = None;
 
             /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
             /// Gaussians that no photo supports then fade. The strategy adc has no such term.
-            #[serde(skip_serializing_if = "Option::is_none")]
             opacity_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Weight of the mean standard deviation in the loss, by the scene extent [default: 0.01 with the strategy
             /// mcmc, else 0].
             ///
             /// The strategy adc has no such term.
-            #[serde(skip_serializing_if = "Option::is_none")]
             scale_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
@@ -169,7 +162,6 @@ crate::options! {
             /// Step after which densification starts [default: a twentieth of the run, at most 500].
             ///
             /// 500 in 3DGS.
-            #[serde(skip_serializing_if = "Option::is_none")]
             densify_from <"STEP">: Option<u32> = None, setting;
 
             /// Step at which densification stops [default: half of the run].
@@ -177,13 +169,11 @@ crate::options! {
             /// With the strategy adc, the default is at least 1000 steps after `densify_from`.
             /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
             /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.
-            #[serde(skip_serializing_if = "Option::is_none")]
             densify_until <"STEP">: Option<u32> = None, setting;
 
             /// Steps between two densifications [default: a thirtieth of the run, from 20 to 100].
             ///
             /// 100 in 3DGS.
-            #[serde(skip_serializing_if = "Option::is_none")]
             densify_interval <"STEPS">: Option<u32> = None, at_least(1), setting;
 
             /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
@@ -208,7 +198,6 @@ crate::options! {
             ///
             /// From this step on Gaussians get labels, and labels have a loss. LabelGS has 1000; labels from the end of
             /// densification on cost the picture nothing, and objects are as good.
-            #[serde(skip_serializing_if = "Option::is_none")]
             label_from <"STEP">: Option<u32> = None, setting;
 
             /// Rule that gives a Gaussian its label.
@@ -217,7 +206,6 @@ crate::options! {
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed, setting;
 
             /// Steps between two counts of votes [default: half of the run].
-            #[serde(skip_serializing_if = "Option::is_none")]
             vote_every <"STEPS">: Option<u32> = None, at_least(1), setting;
 
             /// Width of the band along mask contours that is left out, px.
@@ -241,7 +229,6 @@ crate::options! {
             /// Such a step renders each sampled object alone on black, and compares it with its pixels of the photo,
             /// without occluders; its label loss counts this many times. 1 is LabelGS, which takes up to twice the time. The
             /// other steps with labels reduce the weight of wrong labels in the scene's own picture, by opacity only.
-            #[serde(skip_serializing_if = "Option::is_none")]
             layer_every <"STEPS">: Option<u32> = None, fixed, setting;
 
             /// Objects per step.
@@ -275,7 +262,6 @@ crate::options! {
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed, setting;
 
             /// Steps between two updates of the occluders [default: half of the run].
-            #[serde(skip_serializing_if = "Option::is_none")]
             occlusion_every <"STEPS">: Option<u32> = None, at_least(1), setting;
         }
 
@@ -284,7 +270,6 @@ crate::options! {
             /// iterations)^0.3, from 1 to 3].
             ///
             /// The rates are those of 3DGS for 30000 steps; a shorter run has to travel as far in fewer steps.
-            #[serde(skip_serializing_if = "Option::is_none")]
             rate_factor <"FACTOR">: Option<f64> = None, positive, setting;
 
             /// Learning rates at the last step, as a share of those before 0.6 of the run.

@@ -1,5 +1,6 @@
 //! Whole sets of settings: presets for a newcomer, the schedule of 3DGS, the paper.
 
+use crate::scene::Gaussians;
 use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// How long and how fine a training is.
@@ -37,6 +38,19 @@ impl TrainConfig {
             densify_until: Some(40_000),
             opacity_reset_interval: 3000,
             ..Self::adc()
+        }
+    }
+
+    /// Returns the settings for what is trained beside a finished model, which is drawn from `near`.
+    pub(in crate::train) fn of_finished(model: &Gaussians, near: f32) -> Self {
+        Self {
+            near,
+            sh_degree: model.sh_degree,
+            sh_degree_interval: Some(1),
+            antialias: model.antialiased,
+            exposure: ExposureMode::Off,
+            free_space: false,
+            ..Self::default()
         }
     }
 

@@ -64,7 +64,6 @@ impl TrainConfig {
         (share * f64::from(self.iterations)).round() as u32
     }
 
-    /// Returns the factor of the learning rates.
     pub(in crate::train) fn rate_factor(&self) -> f64 {
         let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MAX);
         self.rate_factor.unwrap_or(derived)
@@ -110,7 +109,6 @@ impl TrainConfig {
         (step / self.sh_interval()).min(self.sh_degree)
     }
 
-    /// Returns the steps between two degrees.
     pub(crate) fn sh_interval(&self) -> u32 {
         self.sh_degree_interval.unwrap_or(self.share(0.1).min(1000)).max(1)
     }
@@ -165,12 +163,10 @@ impl TrainConfig {
         self.labels_at(step) && (step - self.labels_from()).is_multiple_of(every.max(1))
     }
 
-    /// Returns true if known depths have a weight.
     pub(in crate::train) fn has_depths(&self) -> bool {
         self.depth_weight.is_some_and(|weight| weight > 0.0)
     }
 
-    /// Returns the first step without known depths.
     pub(in crate::train) fn depths_until(&self) -> u32 {
         if self.has_depths() { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
     }
@@ -242,12 +238,10 @@ impl TrainConfig {
         self.densify_until.unwrap_or(self.share(0.5).max(least))
     }
 
-    /// Returns the weight of the mean opacity in the loss.
     pub(in crate::train) fn opacity_weight(&self) -> f64 {
         self.opacity_weight.unwrap_or(self.regular())
     }
 
-    /// Returns the weight of the mean standard deviation in the loss.
     pub(in crate::train) fn scale_weight(&self) -> f64 {
         self.scale_weight.unwrap_or(self.regular())
     }

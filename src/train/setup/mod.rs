@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Options of a trainer besides its configuration.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct TrainerOptions {
     /// Shape of the kernels; none takes the default of the device.
     pub shape: Option<KernelShape>,
@@ -41,23 +41,9 @@ pub struct TrainerOptions {
     pub depths: Vec<KnownDepths>,
 }
 
-impl Default for TrainerOptions {
-    fn default() -> Self {
-        SchedulerOptions::default().into()
-    }
-}
-
 impl From<SchedulerOptions> for TrainerOptions {
     fn from(scheduler: SchedulerOptions) -> Self {
-        Self {
-            shape: None,
-            scheduler,
-            objective: Objective::SCENE,
-            strategy: None,
-            shared: Shared::default(),
-            region: None,
-            depths: Vec::new(),
-        }
+        Self { scheduler, ..Self::default() }
     }
 }
 

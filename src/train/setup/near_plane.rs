@@ -11,21 +11,26 @@ const SHARE: f64 = 0.05;
 const CAMERAS: usize = 64;
 const GAUSSIANS: usize = 4096;
 
+/// Returns the places of at most `most` Gaussians, evenly chosen.
+pub(in crate::train) fn sample(model: &Gaussians, most: usize) -> Vec<DVec3> {
+    (0..model.len()).step_by(model.len().div_ceil(most).max(1)).map(|row| model.world(row)).collect()
+}
+
+/// Returns the depths of the places that are in the picture of a camera.
+pub(in crate::train) fn seen_depths(camera: &Camera, places: &[DVec3]) -> Vec<f64> {
+    let is_seen = |place: &DVec3| {
+        let at = camera.project(*place);
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        place.z > 0.0 && (0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y)
+    };
+    places.iter().map(|&world| camera.to_camera(world)).filter(is_seen).map(|place| place.z).collect()
+}
+
 /// Returns [`NEAR`], or [`SHARE`] times the median depth of the first Gaussians in the training cameras if that is
 /// less.
 pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
-    let rows: Vec<DVec3> =
-        (0..model.len()).step_by(model.len().div_ceil(GAUSSIANS).max(1)).map(|row| model.world(row)).collect();
-    let every = cameras.len().div_ceil(CAMERAS).max(1);
-    let mut depths = Vec::new();
-    for camera in cameras.step_by(every) {
-        for place in rows.iter().map(|&world| camera.to_camera(world)).filter(|place| place.z > 0.0) {
-            let at = camera.project(place);
-            if at.x >= 0.0 && at.y >= 0.0 && at.x <= f64::from(camera.width) && at.y <= f64::from(camera.height) {
-                depths.push(place.z);
-            }
-        }
-    }
+    let (rows, every) = (sample(model, GAUSSIANS), cameras.len().div_ceil(CAMERAS).max(1));
+    let mut depths: Vec<f64> = cameras.step_by(every).flat_map(|camera| seen_depths(camera, &rows)).collect();
     if depths.is_empty() {
         return NEAR;
     }
@@ -42,16 +47,8 @@ mod tests {
 
     #[test]
     fn small_scenes_come_nearer() {
-        let camera = Camera {
-            rotation: DMat3::IDENTITY,
-            translation: DVec3::ZERO,
-            fx: 100.0,
-            fy: 100.0,
-            cx: 32.0,
-            cy: 32.0,
-            width: 64,
-            height: 64,
-        };
+        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let camera = Camera { rotation, translation, fx: 100.0, fy: 100.0, cx: 32.0, cy: 32.0, width: 64, height: 64 };
         let at = |depth: f32| Gaussians { means: vec![[0.0, 0.0, depth]; 9], ..Gaussians::default() };
         let near = |model: &Gaussians| near_plane(std::iter::once(&camera), model);
         assert_eq!(near(&at(10.0)), NEAR);

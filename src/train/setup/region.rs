@@ -1,9 +1,7 @@
 //! A part of a scene that is trained alone, in the light of the rest.
 
 use crate::error::{Error, Result};
-use crate::scene::{Dataset, Gaussians, Zone};
-use crate::train::TrainConfig;
-use crate::train::input::step_input::SceneScale;
+use crate::scene::{Gaussians, Zone};
 use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
@@ -24,16 +22,6 @@ impl Region {
     /// Returns the frozen Gaussians of a training.
     pub(in crate::train) fn frozen(region: Option<&Self>) -> u32 {
         region.map_or(0, |region| region.frozen)
-    }
-
-    /// Returns where Gaussians grow; `None`: everywhere.
-    pub(in crate::train) fn grow_zone(region: Option<&Self>, config: &TrainConfig) -> Option<Zone> {
-        region.map(|region| region.zone).or(config.grow_box.map(Zone::along_world))
-    }
-
-    /// Returns the scale of a training.
-    pub(in crate::train) fn scale(region: Option<&Self>, dataset: &Dataset) -> SceneScale {
-        SceneScale { extent: region.map_or_else(|| dataset.extent(), |region| region.extent) }
     }
 
     /// Refuses a first model without a Gaussian to train.

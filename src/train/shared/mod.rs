@@ -147,12 +147,10 @@ impl Shared {
         rows.start as usize..rows.end as usize
     }
 
-    /// Returns the total number of rows.
     pub(in crate::train) fn rows(&self, views: usize) -> u32 {
         self.layout().count(views)
     }
 
-    /// Returns the initial rows.
     pub(in crate::train) fn start(&self, views: usize) -> Result<Vec<[f32; 4]>> {
         let mut rows = Vec::new();
         for of_view in std::iter::once(None).chain((0..views).map(Some)) {
@@ -178,7 +176,6 @@ impl Shared {
         Ok(self.layout().of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
     }
 
-    /// Returns the passes of the parameters.
     pub(in crate::train) fn extensions(&self) -> Vec<Arc<dyn Extension>> {
         self.placed().map(|(of, place)| of.extension(place)).collect()
     }

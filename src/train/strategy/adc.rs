@@ -3,11 +3,9 @@
 
 use super::{At, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
-use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
-use std::sync::Arc;
 
 /// Largest Gaussian that is cloned instead of split, a standard deviation, scene extents (3DGS).
 pub(crate) const CLONED_MAX: f32 = 0.01;
@@ -46,10 +44,6 @@ impl Strategy for AdcStrategy {
 
     fn blurs_depth_after(&self, at: At) -> bool {
         resets_opacity_at(at.config, at.step)
-    }
-
-    fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(passes::Passes)
     }
 
     fn passes(&self, at: At) -> u32 {

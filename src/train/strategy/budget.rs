@@ -5,19 +5,14 @@
 //! make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the cameras.
 
 use super::exchange::exchange;
-use super::{At, FirstCount, OPACITY_MIN, Population, Strategy, passes};
+use super::{At, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
-use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
-use serde_json::Value;
-use std::sync::Arc;
 
 /// Growth within a budget.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct BudgetStrategy {
-    start: FirstCount,
-}
+pub(crate) struct BudgetStrategy;
 
 impl Strategy for BudgetStrategy {
     fn name(&self) -> &'static str {
@@ -32,7 +27,6 @@ impl Strategy for BudgetStrategy {
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
         let config = at.config;
         let grows = config.densifies_at(at.step);
-        let start = self.start.of(population);
         let uniforms = StepUniforms {
             densify_threshold: if grows { config.densify_grad_threshold } else { 0.0 },
             // All that grow split.
@@ -41,7 +35,7 @@ impl Strategy for BudgetStrategy {
             prune_opacity: OPACITY_MIN,
             ..population.uniforms()
         };
-        let mut what = population.densify(uniforms, config.budget_at(at.step, start))?;
+        let mut what = population.densify(uniforms, config.budget_at(at.step, population.first_count()))?;
         if config.exchanges_at(at.step) {
             let changed = exchange(population, config)?;
             what.pruned += changed.pruned;
@@ -56,23 +50,11 @@ impl Strategy for BudgetStrategy {
         to.sum_absolute = 1;
     }
 
-    fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(passes::Passes)
-    }
-
     fn passes(&self, at: At) -> u32 {
         passes::of(at)
     }
 
     fn planes(&self) -> &'static [Buf] {
         &[Buf::DENSIFY_STATS]
-    }
-
-    fn keep(&self) -> Value {
-        self.start.keep()
-    }
-
-    fn restore(&mut self, kept: &Value) -> Result<(), String> {
-        self.start.restore(kept)
     }
 }

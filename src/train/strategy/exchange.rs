@@ -14,7 +14,7 @@ use crate::train::TrainConfig;
 pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<Densified> {
     let ballot = ballot(population, config)?;
     let weights = match &ballot {
-        Some(ballot) if config.mask_border == 0 && population.views().iter().all(|view| view.mask.is_some()) => {
+        Some(ballot) if config.mask_border == 0 && population.views.iter().all(|view| view.mask.is_some()) => {
             (0..population.trained_count()).map(|row| ballot.spread(row).0).collect()
         }
         _ => weights_of_all(population)?,
@@ -31,7 +31,7 @@ pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Res
 
 /// Returns the votes of all masks; none without any, or if they are not asked for.
 fn ballot(population: &mut Population, config: &TrainConfig) -> Result<Option<Ballot>> {
-    let voters = population.views().voters();
+    let voters = population.views.voters();
     if config.contour_share <= 0.0 || voters.is_empty() || population.engine().vote_columns() == 0 {
         return Ok(None);
     }
@@ -39,7 +39,7 @@ fn ballot(population: &mut Population, config: &TrainConfig) -> Result<Option<Ba
 }
 
 fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
-    let views = population.views();
+    let views = population.views;
     let cameras = views.iter().enumerate().map(|(index, view)| (views.camera(index), view.near));
     Ok(weights(population.engine(), cameras)?.into_iter().map(f64::from).collect())
 }

@@ -5,22 +5,17 @@
 //! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
 //! factor of the learning rates for short runs does not apply to the moves.
 
-use super::{At, FirstCount, OPACITY_MIN, Population, Strategy, passes};
+use super::{At, OPACITY_MIN, Population, Strategy, passes};
 use crate::error::Result;
-use crate::pass::Extension;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
-use serde_json::Value;
-use std::sync::Arc;
 
 /// Random moves by the learning rate of positions, both in scene extents (3DGS-MCMC).
 const NOISE: f64 = 5e5;
 
 /// Relocation.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct McmcStrategy {
-    start: FirstCount,
-}
+pub(crate) struct McmcStrategy;
 
 impl Strategy for McmcStrategy {
     fn name(&self) -> &'static str {
@@ -33,7 +28,7 @@ impl Strategy for McmcStrategy {
 
     fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
         let config = at.config;
-        let start = self.start.of(population);
+        let start = population.first_count();
         let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, start) } else { 0 };
         let uniforms = StepUniforms { prune_opacity: OPACITY_MIN, ..population.uniforms() };
         let what = population.relocate(uniforms, wanted)?;
@@ -47,23 +42,11 @@ impl Strategy for McmcStrategy {
         to.noise = (NOISE * rate / at.extent) as f32;
     }
 
-    fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(passes::Passes)
-    }
-
     fn passes(&self, at: At) -> u32 {
         passes::of(at) | passes::EXPLORE
     }
 
     fn planes(&self) -> &'static [Buf] {
         &[Buf::DENSIFY_STATS]
-    }
-
-    fn keep(&self) -> Value {
-        self.start.keep()
-    }
-
-    fn restore(&mut self, kept: &Value) -> Result<(), String> {
-        self.start.restore(kept)
     }
 }

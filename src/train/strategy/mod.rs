@@ -31,8 +31,8 @@ pub(crate) const OPACITY_MIN: f32 = 0.005;
 /// Makes the strategy of a configuration.
 pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {
-        StrategyKind::Budget => Box::new(BudgetStrategy::default()),
-        StrategyKind::Mcmc => Box::new(McmcStrategy::default()),
+        StrategyKind::Budget => Box::new(BudgetStrategy),
+        StrategyKind::Mcmc => Box::new(McmcStrategy),
         StrategyKind::Adc => Box::new(AdcStrategy),
     }
 }
@@ -85,9 +85,9 @@ pub trait Strategy: Debug + Send {
     /// Sets uniforms of a step.
     fn uniforms(&self, _at: At, _to: &mut StepUniforms) {}
 
-    /// Returns the passes to add to steps; called once.
+    /// Returns the passes to add to steps; called once. The default has those of the built-in strategies.
     fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(())
+        Arc::new(passes::Passes)
     }
 
     /// Returns the number of its pass list for a step, for [`Extension::extend`]. 0: the step has none of its passes.
@@ -115,26 +115,6 @@ pub trait Strategy: Debug + Send {
 impl Strategy for () {
     fn name(&self) -> &'static str {
         "none"
-    }
-}
-
-/// The number of Gaussians before the first change of a strategy, from which a budget rises.
-#[derive(Clone, Copy, Debug, Default)]
-struct FirstCount(Option<u32>);
-
-impl FirstCount {
-    /// Returns the number, which the first call decides.
-    fn of(&mut self, population: &Population) -> u64 {
-        u64::from(*self.0.get_or_insert(population.count()))
-    }
-
-    fn keep(self) -> Value {
-        self.0.into()
-    }
-
-    fn restore(&mut self, kept: &Value) -> Result<(), String> {
-        self.0 = serde_json::from_value(kept.clone()).map_err(|error| format!("first number: {error}"))?;
-        Ok(())
     }
 }
 

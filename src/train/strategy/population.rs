@@ -27,29 +27,25 @@ pub(crate) struct Bound {
 
 /// The Gaussians on the device, with nothing in flight.
 pub struct Population<'a> {
-    engine: &'a mut Engine,
-    bound: &'a mut Bound,
-    views: &'a Views,
-    uniforms: StepUniforms,
-    step: u32,
-    densified: Option<Densified>,
+    pub(in crate::train) engine: &'a mut Engine,
+    pub(in crate::train) bound: &'a mut Bound,
+    pub(in crate::train) views: &'a Views,
+    pub(in crate::train) uniforms: StepUniforms,
+    pub(in crate::train) step: u32,
+    pub(in crate::train) first_count: u32,
+    /// Counts of the densification since the step.
+    pub(in crate::train) densified: Option<Densified>,
 }
 
-impl<'a> Population<'a> {
-    /// Makes the population after a step with these uniforms.
-    pub(in crate::train) fn new(
-        engine: &'a mut Engine,
-        bound: &'a mut Bound,
-        views: &'a Views,
-        uniforms: StepUniforms,
-        step: u32,
-    ) -> Self {
-        Self { engine, bound, views, uniforms, step, densified: None }
-    }
-
+impl Population<'_> {
     /// Returns the number of Gaussians.
     pub fn count(&self) -> u32 {
         self.engine.gaussian_count()
+    }
+
+    /// Returns the number of Gaussians before the first change of a strategy, from which a budget rises.
+    pub fn first_count(&self) -> u64 {
+        self.first_count.into()
     }
 
     /// Returns the number of Gaussians that are trained, the first ones.
@@ -57,19 +53,9 @@ impl<'a> Population<'a> {
         self.engine.trained_count() as usize
     }
 
-    /// Returns the counts of the densification since the step.
-    pub fn densified(&self) -> Option<Densified> {
-        self.densified
-    }
-
     /// Returns the uniforms of the step, with a seed of its own.
     pub fn uniforms(&self) -> StepUniforms {
         self.uniforms
-    }
-
-    /// Returns the training views.
-    pub(in crate::train) fn views(&self) -> &'a Views {
-        self.views
     }
 
     /// Returns the engine.
@@ -85,10 +71,9 @@ impl<'a> Population<'a> {
         let (uniforms, counted) = loop {
             let bounded = self.bounded(uniforms, wanted, most)?;
             let counted = self.count_densified(bounded)?;
-            let room = self.engine.size().gaussians;
-            match self.engine.make_room_for_gaussians(u64::from(counted.densified_count)) {
-                Err(error) if error.is_out_of_memory() && most > room => most = self.bound_to_room(&error),
-                other => break other.map(|()| (bounded, counted))?,
+            match self.make_room(counted.densified_count.into(), most)? {
+                Some(room) => most = room,
+                None => break (bounded, counted),
             }
         };
         self.engine.run(ListKey::DensifyApply, &uniforms)?;
@@ -128,12 +113,8 @@ impl<'a> Population<'a> {
             return Err(Error::Pruned { step: self.step });
         }
         let mut most = self.most(u32::try_from(wanted).unwrap_or(u32::MAX))?.max(alive);
-        loop {
-            let room = self.engine.size().gaussians;
-            match self.engine.make_room_for_gaussians(most) {
-                Err(error) if error.is_out_of_memory() && most > room => most = self.bound_to_room(&error),
-                other => break other?,
-            }
+        while let Some(room) = self.make_room(most, most)? {
+            most = room;
         }
         let draws = (most - alive) as u32;
         let uniforms = StepUniforms { draws, draws_per_weight: draws as f32 / weight as f32, ..uniforms };
@@ -144,12 +125,18 @@ impl<'a> Population<'a> {
         Ok(done)
     }
 
-    /// Memory limits the number of Gaussians to that of now.
-    fn bound_to_room(&mut self, error: &Error) -> u64 {
+    /// Makes room for a number of Gaussians. If memory is short, the room of now becomes the limit, which it returns, unless
+    /// `most` is no more than that.
+    fn make_room(&mut self, count: u64, most: u64) -> Result<Option<u64>> {
         let room = self.engine.size().gaussians;
-        tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
-        *self.bound = Bound { most: room, by_memory: true };
-        room
+        match self.engine.make_room_for_gaussians(count) {
+            Err(error) if error.is_out_of_memory() && most > room => {
+                tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
+                *self.bound = Bound { most: room, by_memory: true };
+                Ok(Some(room))
+            }
+            made => made.map(|()| None),
+        }
     }
 
     /// Lowers all opacities to at most 0.01.

@@ -36,6 +36,7 @@ impl Trainer {
             origin: self.context.engine.origin().to_array(),
             labelled_once: self.jobs.votes.have_labelled,
             memory_bounds: self.jobs.growth.bound.by_memory,
+            first_count: self.jobs.growth.first_count,
             sizes: self.context.engine.sizes(),
             config: self.context.config.clone(),
             near_planes: self.context.views.iter().map(|view| view.near).collect(),
@@ -136,7 +137,8 @@ impl Trainer {
         self.set_occluders(&state.occluders);
         self.order = ViewOrder::after(self.context.config.seed, self.context.views.parts().len(), state.step);
         (self.step, self.updates) = (state.step, state.updates);
-        (self.jobs.votes.have_labelled, self.jobs.growth.bound.by_memory) = (state.labelled_once, state.memory_bounds);
+        self.jobs.votes.have_labelled = state.labelled_once;
+        (self.jobs.growth.bound.by_memory, self.jobs.growth.first_count) = (state.memory_bounds, state.first_count);
         self.sentinel = Default::default();
         Ok(())
     }

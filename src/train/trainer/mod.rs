@@ -141,15 +141,10 @@ impl Trainer {
         self.context.engine.gaussian_count()
     }
 
-    /// Returns the current degree of the spherical harmonics.
-    pub fn sh_degree(&self) -> u32 {
-        self.config().sh_degree_at(self.step)
-    }
-
     /// Returns the options of the steps, for previews.
     pub fn render_options(&self) -> RenderOptions {
-        let &TrainConfig { near, background, .. } = self.config();
-        RenderOptions { near, background, sh_degree: Some(self.sh_degree()), ..RenderOptions::default() }
+        let config @ &TrainConfig { near, background, .. } = self.config();
+        RenderOptions { near, background, sh_degree: Some(config.sh_degree_at(self.step)), ..RenderOptions::default() }
     }
 
     /// Halves all learning rates for the rest of the run.

@@ -4,7 +4,7 @@ use super::Trainer;
 use crate::error::Result;
 use crate::label::vote::decide;
 use crate::scene::{Camera, ColourMatrix, Gaussians, Occluders};
-use crate::train::between::{Between, occluders_of, set_occluders};
+use crate::train::between::Between;
 use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
@@ -51,12 +51,29 @@ impl Trainer {
     /// Sets the occluders by name of the view. Drops ids without pixels in the mask of the view. Returns the names of
     /// views with masks that `found` lacks; their objects count as not hidden.
     pub fn set_occluders(&mut self, found: &BTreeMap<String, Occluders>) -> Vec<String> {
-        set_occluders(&mut self.context.views, found)
+        let mut without = Vec::new();
+        for view in self.context.views.iter_mut().filter(|view| view.mask.is_some()) {
+            let shown = |label: &u16| view.objects.binary_search(label).is_ok();
+            match found.get(&view.name) {
+                Some(lists) => {
+                    let lists = lists.iter().filter(|(label, _)| shown(label));
+                    let kept = |by: &Vec<u16>| by.iter().copied().filter(|label| *label == 0 || shown(label)).collect();
+                    view.occluders = lists.map(|(&label, by)| (label, kept(by))).collect();
+                }
+                None => without.push(view.name.clone()),
+            }
+        }
+        without
     }
 
     /// Returns the occluders of the last step, by name of the view. Every object of a view has an entry.
     pub fn occluders(&self) -> BTreeMap<String, Occluders> {
-        occluders_of(&self.context.views)
+        let with_masks = self.context.views.iter().filter(|view| view.mask.is_some());
+        let lists = with_masks.map(|view| {
+            let list = |&label: &u16| (label, view.occluders.get(&label).cloned().unwrap_or_default());
+            (view.name.clone(), view.objects.iter().map(list).collect())
+        });
+        lists.collect()
     }
 
     /// Returns the matrix of colours of each training photo, by name; none without exposure. Nothing may be in flight.

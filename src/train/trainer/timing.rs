@@ -31,7 +31,6 @@ impl Timing {
         Ok(())
     }
 
-    /// Takes the times.
     pub(super) fn take(&mut self) -> Vec<StepTimes> {
         std::mem::take(&mut self.times)
     }

@@ -13,7 +13,6 @@ export class Link {
     this.changed = changed;
     this.seq = 0;
     this.socket = null;
-    this.frames = 0;
     this.isOver = false;
     setInterval(() => this.send({ kind: "alive" }), ALIVE);
     this.open();
@@ -88,7 +87,6 @@ export class Link {
     }
     try {
       await this.draw(frame);
-      this.frames += 1;
     } finally {
       this.send({ kind: "ack", seq: frame.seq });
     }

@@ -233,13 +233,4 @@ export class Stage {
     const at = [x * ratio, y * ratio];
     return this.isPair && at[0] >= this.rig.size[0] ? [at[0] - this.rig.size[0], at[1]] : at;
   }
-
-  /** The pixels of the last frame, for whoever wants to compare them. */
-  pixels(index = 0) {
-    const image = this.images[index];
-    const canvas = new OffscreenCanvas(image.width, image.height);
-    const context = canvas.getContext("2d", { willReadFrequently: true });
-    context.drawImage(image, 0, 0);
-    return context.getImageData(0, 0, image.width, image.height);
-  }
 }

@@ -58,7 +58,7 @@ pub(super) fn run(args: &EstimateArgs, context: &Context) -> Result<()> {
 }
 
 fn hours(found: &Estimate) -> Option<f64> {
-    found.minutes.map(|minutes| minutes / 60.0)
+    found.need.minutes.map(|minutes| minutes / 60.0)
 }
 
 fn to_text(found: &Estimate) -> String {
@@ -73,9 +73,9 @@ fn to_text(found: &Estimate) -> String {
         counted(found.gaussians, "Gaussian"),
         found.frozen,
         counted(found.views, "view"),
-        found.device.div_ceil(MIB),
-        found.host.div_ceil(MIB),
-        counted(found.steps, "step")
+        found.need.device.div_ceil(MIB),
+        found.need.host.div_ceil(MIB),
+        counted(found.need.steps, "step")
     )
 }
 
@@ -86,9 +86,9 @@ fn to_json(found: &Estimate) -> serde_json::Value {
         "gaussians": found.gaussians,
         "frozen": found.frozen,
         "views": found.views,
-        "device_mib": found.device.div_ceil(MIB),
-        "host_mib": found.host.div_ceil(MIB),
-        "steps": found.steps,
+        "device_mib": found.need.device.div_ceil(MIB),
+        "host_mib": found.need.host.div_ceil(MIB),
+        "steps": found.need.steps,
         "hours": hours(found),
         "card_hours": hours(found).map(|hours| hours * found.blocks as f64),
     })
