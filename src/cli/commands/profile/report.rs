@@ -145,7 +145,7 @@ impl Profile {
         let counted: HashSet<u32> = times.iter().map(|times| times.step).collect();
         self.pairs = reports.iter().filter(|report| counted.contains(&report.step)).map(walked).sum();
         let threads = self.workers.map_or(1.0, |workers| workers.count as f64);
-        self.ns_per_pair = [Stage::BlendForward, Stage::BlendBackward].map(|stage| {
+        self.ns_per_pair = [Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD].map(|stage| {
             let items = times.iter().flat_map(|times| &times.items).filter(|item| item.0 == stage);
             items.map(|item| item.2 as f64).sum::<f64>() * threads / self.pairs
         });
@@ -213,7 +213,7 @@ impl Profile {
         text +=
             &format!("{:<34} {:>5} {:>10} {:>10} {:>7}\n", "stage and pass", "items", "median ms", "p90 ms", "share");
         for (stage, sum) in &self.stages {
-            text += &line(stage.name(), sum);
+            text += &line(stage.name, sum);
             for (_, pass) in self.passes.iter().filter(|(of, _)| of == stage) {
                 text += &line(&format!("  {}", pass.label), pass);
             }
@@ -232,7 +232,7 @@ impl Profile {
     pub(crate) fn to_json(&self) -> Value {
         let row = |(stage, pass): &(Stage, PassTime)| {
             json!({
-                "stage": stage.name(), "name": pass.label, "items": pass.items, "median_ms": ms(pass.median),
+                "stage": stage.name, "name": pass.label, "items": pass.items, "median_ms": ms(pass.median),
                 "p90_ms": ms(pass.p90), "share": pass.share,
             })
         };
@@ -273,7 +273,7 @@ impl Profile {
         let counters = &report.report.counters;
         let mut stages: HashMap<&str, f64> = HashMap::new();
         for (stage, _, ns) in times.iter().flat_map(|times| &times.items) {
-            *stages.entry(stage.name()).or_default() += ms(*ns);
+            *stages.entry(stage.name).or_default() += ms(*ns);
         }
         json!({
             "step": report.step,
@@ -330,7 +330,7 @@ fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<(Stage, PassTi
     for times in times {
         let items = times.items.iter().map(|(stage, name, ns)| {
             let name = label(name);
-            let key = format!("{}: {name}", stage.name());
+            let key = format!("{}: {name}", stage.name);
             named.entry(key.clone()).or_insert_with(|| (*stage, name.to_owned()));
             (key, *ns)
         });
