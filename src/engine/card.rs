@@ -4,7 +4,8 @@ use super::{Engine, EngineSize, capacity};
 use crate::error::Result;
 use crate::gpu::limits::PlanLimits;
 use crate::pass::KernelShape;
-use crate::scheduler::plan::{MemoryReport, PlanOptions, TABLE};
+use crate::pass::buffers::TABLE;
+use crate::scheduler::plan::{MemoryReport, PlanOptions};
 
 /// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
 /// allocations of 4 GiB.
@@ -24,5 +25,5 @@ pub(crate) fn predict_for(shape: &KernelShape, limits: &PlanLimits, size: &Engin
     let size = &size.in_bands(shape);
     let capacity = capacity(shape, size);
     let lists = Engine::lists_of(shape, &capacity, size);
-    MemoryReport::predict(TABLE, &capacity, &lists, limits, PlanOptions::default())
+    MemoryReport::predict(TABLE, &capacity.counts(), &lists, limits, PlanOptions::default())
 }

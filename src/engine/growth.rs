@@ -3,9 +3,10 @@
 use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::pass::buffers::Capacity;
 use crate::pass::{self, KernelShape, Supervision, Variant, loss};
 use crate::scheduler::SchedulerOptions;
-use crate::scheduler::plan::{Buf, Capacity, MemoryReport, PassList};
+use crate::scheduler::plan::{Buf, MemoryReport, PassList};
 use crate::shaders::constants::LABEL_ROUNDS;
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
@@ -187,7 +188,7 @@ impl Engine {
 
     /// Returns capacities for a larger size, with at least the pairs, tiles and segments needed so far.
     fn capacity_for(&self, size: &EngineSize) -> Capacity {
-        let old = self.sched.capacity();
+        let old = &self.capacity;
         let mut new = capacity(&self.shape, size);
         new.layer_tiles = new.layer_tiles.max(old.layer_tiles);
         new.segments = old.segments;
@@ -203,7 +204,7 @@ impl Engine {
             let variant = widest(&self.size);
             lists.push(pass::extended_step(&self.shape, capacity, variant, (&*self.extension, self.passes)));
         }
-        match self.sched.predict_here(capacity, &lists) {
+        match self.sched.predict_here(&capacity.counts(), &lists) {
             Ok(_) => Ok(true),
             Err(Error::OutOfMemory { .. }) => Ok(false),
             Err(other) => Err(other),
@@ -223,7 +224,7 @@ impl Engine {
         // If reserves do not fit, allocate exactly what is needed.
         let least = self.capacity_of(needed, |_, needed| needed);
         let new = if self.fits(&grown)? { grown } else { least };
-        if new == *self.sched.capacity() {
+        if new == self.capacity {
             return Err(Error::Bug(format!(
                 "failure {}, but all buffers are large enough: {needed:?}",
                 report.failure
@@ -245,7 +246,7 @@ impl Engine {
 
     /// Returns the present capacities, grown where they were too small.
     fn capacity_of(&self, needed: &Counters, grown: impl Fn(u64, u64) -> u64) -> Capacity {
-        let mut new = *self.sched.capacity();
+        let mut new = self.capacity;
         let follow = |have: &mut u64, needed: u32| {
             if u64::from(needed) > *have {
                 *have = grown(*have, u64::from(needed));
@@ -261,7 +262,7 @@ impl Engine {
 
     /// Returns the grown sizes.
     pub(crate) fn sizes(&self) -> GrownSizes {
-        let capacity = self.sched.capacity();
+        let capacity = &self.capacity;
         let word = |size: u64| u32::try_from(size).unwrap_or(u32::MAX);
         GrownSizes {
             gaussians: word(self.size.gaussians),
@@ -286,8 +287,12 @@ impl Engine {
         Ok(())
     }
 
-    fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
+    /// Changes the capacities; all lists are then recorded again.
+    #[doc(hidden)]
+    pub fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
         self.lists.clear();
-        self.sched.set_capacity(capacity)
+        self.sched.set_counts(capacity.counts())?;
+        self.capacity = capacity;
+        Ok(())
     }
 }

@@ -26,9 +26,10 @@ pub use size::{EngineSize, LabelSize};
 
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::pass::buffers::{Capacity, TABLE};
 use crate::pass::{Extension, KernelShape};
 use crate::scene::{Camera, Gaussians, Zone};
-use crate::scheduler::plan::{FRAMES_IN_FLIGHT, TABLE};
+use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
 use glam::DVec3;
@@ -39,6 +40,7 @@ use std::sync::Arc;
 /// A device with a model in its memory.
 pub struct Engine {
     sched: Scheduler,
+    capacity: Capacity,
     shape: KernelShape,
     size: EngineSize,
     lists: HashMap<ListKey, ListId>,
@@ -85,8 +87,10 @@ impl Engine {
         shape.check()?;
         let size = size.in_bands(&shape);
         size.check(&shape)?;
+        let capacity = capacity(&shape, &size);
         Ok(Self {
-            sched: Scheduler::new(gpu, TABLE, capacity(&shape, &size), options)?,
+            sched: Scheduler::new(gpu, TABLE, capacity.counts(), options)?,
+            capacity,
             shape,
             size,
             lists: HashMap::new(),
@@ -113,6 +117,12 @@ impl Engine {
     #[doc(hidden)]
     pub fn shape(&self) -> &KernelShape {
         &self.shape
+    }
+
+    /// Present capacities of the buffers.
+    #[doc(hidden)]
+    pub fn capacity(&self) -> &Capacity {
+        &self.capacity
     }
 
     /// Sizes of the memory.

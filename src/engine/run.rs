@@ -72,7 +72,7 @@ impl Engine {
         if let Some(&id) = self.lists.get(&key) {
             return Ok(id);
         }
-        let (shape, capacity) = (&self.shape, self.sched.capacity());
+        let (shape, capacity) = (&self.shape, &self.capacity);
         let list = match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
             ListKey::Extended(variant, passes) => {

@@ -3,9 +3,10 @@
 
 use super::Engine;
 use crate::error::Result;
+use crate::pass::buffers::TABLE;
 use crate::pass::{ATTRIBUTES, SHARED_PLANES};
 use crate::records::checkpoint::Plane;
-use crate::scheduler::plan::{Buf, Domain, TABLE};
+use crate::scheduler::plan::{Buf, Domain};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -22,10 +23,13 @@ pub(crate) struct Counts {
 
 impl Counts {
     fn of(&self, buf: Buf) -> u32 {
-        match TABLE[buf.index()].domain {
-            Domain::Trained => self.gaussians.saturating_sub(self.frozen),
-            Domain::SharedRows => self.shared,
-            _ => self.gaussians,
+        let count = TABLE[buf.index()].domain.count;
+        if count == Domain::TRAINED.count {
+            self.gaussians.saturating_sub(self.frozen)
+        } else if count == Domain::SHARED_ROWS.count {
+            self.shared
+        } else {
+            self.gaussians
         }
     }
 }

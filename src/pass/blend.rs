@@ -20,7 +20,7 @@ pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
 fn forward(b: &mut Builder, pairs: Buf, main: bool) {
     let (segments, counts) = (b.segments(), b.counts);
     let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
-    b.list.stage = Stage::BlendForward;
+    b.list.stage = Stage::BLEND_FORWARD;
     for segment in 0..segments {
         pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -40,7 +40,7 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let (segments, supervision) = (b.segments(), b.supervision);
     let (labels, disagreement) = (supervision.has_layers(), supervision == Supervision::Disagreement);
     let depth = supervision == Supervision::Depth;
-    b.list.stage = Stage::BlendBackward;
+    b.list.stage = Stage::BLEND_BACKWARD;
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,

@@ -1,7 +1,8 @@
 //! Builds a pass list; all pass families use it.
 
 use super::{KernelShape, Supervision};
-use crate::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList};
+use crate::pass::buffers::Capacity;
+use crate::scheduler::plan::{Buf, Grid, PassDecl, PassList, Stage};
 use crate::shaders::{ShaderDesc, constants};
 
 /// A pass list under construction.
@@ -36,8 +37,8 @@ pub enum Count {
 impl<'a> Builder<'a> {
     /// An empty list, without bands of colour.
     pub fn new(name: &str, shape: &'a KernelShape, capacity: &'a Capacity) -> Self {
-        let (supervision, list) = (Supervision::Photo, PassList::new(name));
-        Self { shape, capacity, supervision, sh_degree: 0, counts: false, list }
+        let list = PassList { stage: Stage::PROJECT, ..PassList::new(name) };
+        Self { shape, capacity, supervision: Supervision::Photo, sh_degree: 0, counts: false, list }
     }
 
     /// Number of dispatches that walk the longest list of a tile, at least 1.

@@ -8,14 +8,14 @@ use crate::scheduler::plan::{Buf, Stage};
 
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, mark_near { step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, failure: Buf::FAILURE } [],
         over_gaussians());
 }
 
 /// Decides the fate of each Gaussian and counts the result.
 pub(super) fn mark(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, densify_mark {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
         children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
@@ -25,7 +25,7 @@ pub(super) fn mark(b: &mut Builder) {
 
 /// Weighs the Gaussians for [`relocate`], and counts those to be removed.
 pub(super) fn weigh(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, relocate_weigh {
         step: Buf::STEP, means: Buf::MEANS, densify_stats: Buf::DENSIFY_STATS, children_counts: Buf::CHILDREN_COUNTS,
         counters: Buf::COUNTERS,

@@ -7,7 +7,7 @@ use crate::scheduler::plan::{Buf, Stage};
 
 /// Sums the records and updates the densification statistic.
 pub(super) fn gather(b: &mut Builder) {
-    b.list.stage = Stage::Gather;
+    b.list.stage = Stage::GATHER;
     pass!(b, gather(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
@@ -18,7 +18,7 @@ pub(super) fn gather(b: &mut Builder) {
 
 /// Adds the blending weights of the view to those of the Gaussians, if every pixel has a gradient of 1.
 pub(super) fn weigh(b: &mut Builder) {
-    b.list.stage = Stage::Gather;
+    b.list.stage = Stage::GATHER;
     pass!(b, weigh {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,

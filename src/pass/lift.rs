@@ -9,7 +9,7 @@ use crate::shaders::constants;
 
 /// Gives each Gaussian the label with the highest vote of this step.
 pub(super) fn resolve(b: &mut Builder) {
-    b.list.stage = Stage::Labels;
+    b.list.stage = Stage::LABELS;
     pass!(b, lift_resolve {
         step: Buf::STEP, failure: Buf::FAILURE, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
     } [], over_gaussians());
@@ -19,7 +19,7 @@ pub(super) fn resolve(b: &mut Builder) {
 /// labels each time.
 pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
     let segments = b.segments();
-    b.list.stage = Stage::Labels;
+    b.list.stage = Stage::LABELS;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
         pass!(b, label_map(segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -34,7 +34,7 @@ pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
 /// Adds the weight of every contributor to the vote for its pixel's label; with `alone` its alpha, whatever is in front.
 pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32, alone: bool) {
     let segments = b.segments();
-    b.list.stage = Stage::Labels;
+    b.list.stage = Stage::LABELS;
     for (round, segment) in (0..rounds).flat_map(|round| (0..segments).map(move |segment| (round, segment))) {
         pass!(b, vote(segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,

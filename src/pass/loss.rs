@@ -11,7 +11,7 @@ const STRIP: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
 pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
-    b.list.stage = Stage::Loss;
+    b.list.stage = Stage::LOSS;
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
     pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
@@ -30,13 +30,13 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 
 /// Sums the loss after the backward walk, which finds the disagreement of the labels.
 pub(super) fn reduce_last(b: &mut Builder, width: u32, height: u32) {
-    b.list.stage = Stage::Loss;
+    b.list.stage = Stage::LOSS;
     reduce(b, partials(b.shape.subgroup, width, height));
 }
 
 /// Multiplies the picture by the exposure of its photo, row `row` of the step.
 pub(crate) fn expose(b: &mut Builder, row: u32) {
-    b.list.stage = Stage::Loss;
+    b.list.stage = Stage::LOSS;
     pass!(b, expose {
         step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
     } [row: row], over_pixels(b, 64));
@@ -45,7 +45,7 @@ pub(crate) fn expose(b: &mut Builder, row: u32) {
 /// Turns the gradient of the exposed picture into that of the blended one, and writes the gradient of the exposure, row
 /// `row` of the `stride` rows of a photo.
 pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
-    b.list.stage = Stage::Loss;
+    b.list.stage = Stage::LOSS;
     // The maps of SSIM are not needed any more.
     let partials = Buf::SSIM_B;
     pass!(b, expose_backward {

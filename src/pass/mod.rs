@@ -3,6 +3,7 @@
 //! Start with [`training_step`]: it lists all stages of a step.
 
 mod blend;
+pub mod buffers;
 pub mod build;
 pub(crate) mod densify;
 mod gather;
@@ -22,8 +23,9 @@ pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
 pub use shape::KernelShape;
 
+use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
-use crate::scheduler::plan::{Buf, Capacity, PassList};
+use crate::scheduler::plan::{Buf, PassList};
 
 pub use crate::scheduler::plan::Stage;
 
@@ -117,7 +119,7 @@ fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degr
 }
 
 fn end(mut b: Builder) -> PassList {
-    b.list.stage = Stage::Report;
+    b.list.stage = Stage::REPORT;
     b.list.copy(Buf::COUNTERS, Buf::REPORT, 0);
     b.list.copy(Buf::FAILURE, Buf::REPORT_FAILURE, 0);
     b.list

@@ -45,7 +45,7 @@ pub(crate) const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_S
 /// One Adam update of the active attributes: of all Gaussians if `unseen`, else only of those in the view.
 pub(super) fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
         update(b, false, (a.planes, a.gradient), [a.stride, a.rate, seen_only], args(a.args));
     }
@@ -86,7 +86,7 @@ fn update(
 
 /// Adds the gradients of the mean opacity and size to those of the visible Gaussians.
 pub(crate) fn regularise(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, regularise {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         means: Buf::MEANS, scales: Buf::SCALES, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES,
@@ -95,14 +95,14 @@ pub(crate) fn regularise(b: &mut Builder) {
 
 /// Keeps Gaussians from becoming finer than the photos can show.
 pub(crate) fn smooth(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, smooth { step: Buf::STEP, failure: Buf::FAILURE, means: Buf::MEANS, scales_in: Buf::SCALES, scales: Buf::SCALES } [],
         over_gaussians());
 }
 
 /// Moves faint Gaussians at random.
 pub(crate) fn explore(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, explore {
         step: Buf::STEP, failure: Buf::FAILURE, means_in: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
         means: Buf::MEANS,
@@ -111,7 +111,7 @@ pub(crate) fn explore(b: &mut Builder) {
 
 /// Limits opacities to 0.01 and zeroes their moments.
 pub(super) fn opacity_reset(b: &mut Builder) {
-    b.list.stage = Stage::Optimise;
+    b.list.stage = Stage::OPTIMISE;
     pass!(b, opacity_reset { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
         over_gaussians());
 }

@@ -14,7 +14,7 @@ const DEPTH_BITS: u32 = 32;
 
 /// Lists the visible Gaussians in depth order and projects them.
 pub(super) fn visible_splats(b: &mut Builder) {
-    b.list.stage = Stage::Project;
+    b.list.stage = Stage::PROJECT;
     pass!(b, cull {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
         splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
@@ -47,7 +47,7 @@ fn project_forward(b: &mut Builder) {
 
 /// Corrects the pose of the step's camera by rows `row` and the next of the step.
 pub(crate) fn pose(b: &mut Builder, row: u32) {
-    b.list.stage = Stage::Project;
+    b.list.stage = Stage::PROJECT;
     pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE);
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn pose(b: &mut Builder, row: u32) {
 pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
     // The gradients of the splats are not needed any more.
     let (sh_degree, partials) = (b.sh_degree, Buf::V_SPLATS);
-    b.list.stage = Stage::ProjectBackward;
+    b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, pose_backward {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         quats: Buf::QUATS, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
@@ -70,7 +70,7 @@ pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
 /// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    b.list.stage = Stage::ProjectBackward;
+    b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, project_backward {
         step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
@@ -82,8 +82,9 @@ pub(super) fn project_backward(b: &mut Builder) {
 #[cfg(test)]
 mod tests {
     use super::GAUSSIAN_FROM_SPLAT;
+    use crate::pass::buffers::Capacity;
     use crate::pass::{KernelShape, render_view};
-    use crate::scheduler::plan::{Buf, Capacity, Work};
+    use crate::scheduler::plan::{Buf, Work};
 
     #[test]
     fn the_depth_sort_ends_in_one_buffer_whatever_its_passes() {

@@ -31,7 +31,7 @@ fn passes(shape: &KernelShape, bits: u32) -> u32 {
 /// Sorts by the low `bits` bits. With `identity`, the values are the positions of the keys before the sort. `by` is
 /// appended to the pass titles. Returns the buffers with the sorted keys and values.
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
-    let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::Sort));
+    let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::SORT));
     let lanes = b.capacity.sort_lanes as u32;
     let workgroups = lanes / b.shape.subgroup;
     let groups = Grid::Groups(workgroups, 1, 1);

@@ -12,7 +12,7 @@ use crate::shaders::constants;
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     let instances = b.capacity.instances as u32;
-    b.list.stage = Stage::Tile;
+    b.list.stage = Stage::TILE;
     pass!(b, prepare_instances {
         counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [instance_capacity: instances], ONE);

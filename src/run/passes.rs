@@ -44,9 +44,9 @@ fn means(times: &[StepTimes]) -> Vec<Pass> {
     let mut passes: Vec<Pass> = Vec::new();
     for (stage, name, ns) in times.iter().flat_map(|times| &times.items) {
         let ms = *ns as f64 / 1e6 / times.len() as f64;
-        match passes.iter_mut().find(|pass| pass.stage == stage.name() && pass.name == *name) {
+        match passes.iter_mut().find(|pass| pass.stage == stage.name && pass.name == *name) {
             Some(pass) => pass.ms += ms,
-            None => passes.push(Pass { stage: stage.name().to_owned(), name: name.clone(), ms, share: 0.0 }),
+            None => passes.push(Pass { stage: stage.name.to_owned(), name: name.clone(), ms, share: 0.0 }),
         }
     }
     let all: f64 = passes.iter().map(|pass| pass.ms).sum();
@@ -67,8 +67,8 @@ mod tests {
             is_first: false,
             items: items.iter().map(|(stage, name, ns)| (*stage, (*name).to_owned(), *ns)).collect(),
         };
-        let sort = (Stage::Sort, "scan", 1_000_000);
-        let found = means(&[step(&[sort, sort]), step(&[sort, sort, (Stage::Loss, "labels", 2_000_000)])]);
+        let sort = (Stage::SORT, "scan", 1_000_000);
+        let found = means(&[step(&[sort, sort]), step(&[sort, sort, (Stage::LOSS, "labels", 2_000_000)])]);
         let rows: Vec<_> = found.iter().map(|pass| (pass.name.as_str(), pass.ms, pass.share)).collect();
         assert_eq!(rows, [("scan", 2.0, 2.0 / 3.0), ("labels", 1.0, 1.0 / 3.0)]);
     }

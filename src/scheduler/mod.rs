@@ -16,7 +16,7 @@ pub use profiler::{PassTime, Profiler};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
 use crate::scheduler::plan::{
-    Barrier, Buf, BufferDecl, Capacity, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, memory,
+    Buf, BufferDecl, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory,
 };
 use crate::stage::Stage;
 use recorder::Recorder;
@@ -52,7 +52,7 @@ impl SchedulerOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ListId {
     index: usize,
-    /// A change of capacities discards all lists; ids of earlier generations are refused.
+    /// A change of counts discards all lists; ids of earlier generations are refused.
     generation: u64,
 }
 
@@ -81,24 +81,20 @@ pub struct Scheduler {
     /// The list that was prepared or submitted last; `upload` and `download` access its scratch buffers.
     current: Option<usize>,
     generation: u64,
-    capacity: Capacity,
+    /// Numbers of elements, where domains look them up.
+    counts: Vec<u64>,
     options: SchedulerOptions,
     limits: Limits,
-    table: &'static [BufferDecl],
+    table: &'static Table,
     // Last field, so that the device outlives everything made from it.
     gpu: Arc<Gpu>,
 }
 
 impl Scheduler {
     /// Allocates everything except scratch memory; model and persistent buffers start as zeros.
-    pub fn new(
-        gpu: Arc<Gpu>,
-        table: &'static [BufferDecl],
-        capacity: Capacity,
-        options: SchedulerOptions,
-    ) -> Result<Self> {
+    pub fn new(gpu: Arc<Gpu>, table: &'static Table, counts: Vec<u64>, options: SchedulerOptions) -> Result<Self> {
         let limits = options.limits(&gpu);
-        MemoryReport::predict(table, &capacity, &[], &limits, options.plan)?;
+        MemoryReport::predict(table, &counts, &[], &limits, options.plan)?;
         let mut scheduler = Self {
             lists: Vec::new(),
             storage: Storage::new(table.len()),
@@ -109,7 +105,7 @@ impl Scheduler {
             frame_busy: [0; FRAMES_IN_FLIGHT],
             current: None,
             generation: 0,
-            capacity,
+            counts,
             options,
             limits,
             table,
@@ -119,19 +115,9 @@ impl Scheduler {
         Ok(scheduler)
     }
 
-    /// Predicts the memory of lists, without allocating.
-    pub fn predict(
-        table: &'static [BufferDecl],
-        capacity: &Capacity,
-        lists: &[PassList],
-        limits: &Limits,
-    ) -> Result<MemoryReport> {
-        MemoryReport::predict(table, capacity, lists, limits, PlanOptions::default())
-    }
-
-    /// Predicts the memory of lists with other capacities, under the limits and options of this scheduler.
-    pub fn predict_here(&self, capacity: &Capacity, lists: &[PassList]) -> Result<MemoryReport> {
-        MemoryReport::predict(self.table, capacity, lists, &self.limits, self.options.plan)
+    /// Predicts the memory of lists with other counts, under the limits and options of this scheduler.
+    pub fn predict_here(&self, counts: &[u64], lists: &[PassList]) -> Result<MemoryReport> {
+        MemoryReport::predict(self.table, counts, lists, &self.limits, self.options.plan)
     }
 
     /// Plans and records a list.
@@ -145,10 +131,10 @@ impl Scheduler {
         self.replace_lost()?;
         let mut plans = Vec::new();
         for list in lists {
-            plans.push(Plan::new(self.table, &self.capacity, list, &self.limits, self.options.plan)?);
+            plans.push(Plan::new(self.table, &self.counts, list, &self.limits, self.options.plan)?);
         }
         let all = self.lists.iter().map(|list| &list.plan).chain(&plans).collect::<Vec<_>>();
-        MemoryReport::of_plans(self.table, &self.capacity, &all, &self.limits, self.options.plan)?;
+        MemoryReport::of_plans(self.table, &self.counts, &all, &self.limits, self.options.plan)?;
         let pages = memory::merge_pages(all.iter().map(|plan| plan.step_pages.as_slice()));
         self.grow_arena(&pages)?;
         if self.options.poison_step {
@@ -216,38 +202,28 @@ impl Scheduler {
         self.wait(Ticket(self.frame_busy[frame]))
     }
 
-    /// Changes capacities. Model buffers keep their contents (the common prefix; new elements are 0), all others start
-    /// over, and all lists are discarded. If memory does not suffice, the old capacities stay in force.
-    pub fn set_capacity(&mut self, capacity: Capacity) -> Result<()> {
+    /// Changes the counts. Model buffers keep their contents (the common prefix; new elements are 0), all others start
+    /// over, and all lists are discarded. If memory does not suffice, the old counts stay in force.
+    pub fn set_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         self.wait_all()?;
-        MemoryReport::predict(self.table, &capacity, &[], &self.limits, self.options.plan)?;
+        MemoryReport::predict(self.table, &counts, &[], &self.limits, self.options.plan)?;
         self.lists.clear();
         self.current = None;
         self.generation += 1;
         self.storage.drop_arena();
-        self.resize_own(capacity)
+        self.resize_own(counts)
     }
 
     /// Makes all lists from now on write the times of their items, with a barrier before each. Discards the lists that
     /// there are.
     pub fn time_items(&mut self) -> Result<()> {
         (self.options.timestamps, self.options.plan.barrier_everywhere) = (true, true);
-        self.set_capacity(self.capacity)
+        self.set_counts(self.counts.clone())
     }
 
-    /// Present capacities.
-    pub fn capacity(&self) -> &Capacity {
-        &self.capacity
-    }
-
-    /// The table of buffers.
-    pub fn table(&self) -> &'static [BufferDecl] {
-        self.table
-    }
-
-    /// Limits that plans respect.
-    pub fn limits(&self) -> &Limits {
-        &self.limits
+    /// Present counts.
+    pub fn counts(&self) -> &[u64] {
+        &self.counts
     }
 
     /// The device.
@@ -272,11 +248,6 @@ impl Scheduler {
         Ok(&self.lists[self.index(id)?].plan)
     }
 
-    /// Barriers of a list, one entry per item.
-    pub fn barriers(&self, id: ListId) -> Result<Vec<Option<Barrier>>> {
-        Ok(self.plan(id)?.items.iter().map(|item| item.barrier.clone()).collect())
-    }
-
     /// Nanoseconds of each item of a list, from its last submit with a frame. Waits for that submit.
     ///
     /// Without `barrier_everywhere`, items overlap, and an entry is the time that the item added. The result is empty
@@ -295,7 +266,7 @@ impl Scheduler {
         if id.generation == self.generation && id.index < self.lists.len() {
             return Ok(id.index);
         }
-        Err(Error::Bug("a pass list was used after capacities changed; prepare it again".to_owned()))
+        Err(Error::Bug("a pass list was used after counts changed; prepare it again".to_owned()))
     }
 
     fn check_frame(&self, frame: usize) -> Result<()> {

@@ -3,7 +3,7 @@
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};
-use crate::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Page, Plan, memory};
+use crate::scheduler::plan::{Buf, BufferDecl, Class, Page, Plan, Table, memory};
 use std::sync::Arc;
 
 /// All buffers of a scheduler.
@@ -45,7 +45,7 @@ impl Storage {
     }
 
     /// Allocated bytes of each buffer and page.
-    pub(super) fn memory(&self, table: &'static [BufferDecl]) -> Vec<(String, u64)> {
+    pub(super) fn memory(&self, table: &'static Table) -> Vec<(String, u64)> {
         let own = table.iter().zip(&self.own).filter(|(_, copies)| !copies.is_empty());
         let own = own.map(|(decl, copies)| (decl.name.to_owned(), copies.iter().map(Buffer::bytes).sum()));
         let step = self.step.iter().enumerate().map(|(page, buffer)| (format!("scratch page {page}"), buffer.bytes()));
@@ -66,8 +66,8 @@ fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>
 
 impl Scheduler {
     /// Bytes of the VkBuffer of one copy of a buffer.
-    fn own_bytes(&self, decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
-        memory::own_bytes(decl, capacity, self.options.plan, self.limits.alignment())
+    fn own_bytes(&self, decl: &BufferDecl, counts: &[u64]) -> Result<u64> {
+        memory::own_bytes(decl, counts, self.options.plan, self.limits.alignment())
     }
 
     /// Allocates every buffer outside of scratch.
@@ -75,7 +75,7 @@ impl Scheduler {
         for index in 0..self.table.len() {
             let decl = &self.table[index];
             if decl.class != Class::Step {
-                self.storage.own[index] = allocate(&self.gpu, decl, self.own_bytes(decl, &self.capacity)?)?;
+                self.storage.own[index] = allocate(&self.gpu, decl, self.own_bytes(decl, &self.counts)?)?;
                 self.clear(Buf(index as u16))?;
             }
         }
@@ -84,15 +84,15 @@ impl Scheduler {
 
     /// Reallocates every buffer whose size changes. Model buffers keep the common prefix, all others start over.
     ///
-    /// Growing buffers go first. If one does not fit, those that grew before are only larger than the old capacities
+    /// Growing buffers go first. If one does not fit, those that grew before are only larger than the old counts
     /// need, and nothing is lost.
-    pub(super) fn resize_own(&mut self, capacity: Capacity) -> Result<()> {
-        let resized = self.resize_those(&capacity, true).and_then(|()| self.resize_those(&capacity, false));
+    pub(super) fn resize_own(&mut self, counts: Vec<u64>) -> Result<()> {
+        let resized = self.resize_those(&counts, true).and_then(|()| self.resize_those(&counts, false));
         if resized.is_ok() {
-            self.capacity = capacity;
+            self.counts = counts;
         } else {
             // Shrink again what has grown, since others need that memory; a buffer that fails to shrink stays large.
-            let old = self.capacity;
+            let old = self.counts.clone();
             if let Err(error) = self.resize_those(&old, false) {
                 tracing::debug!("some buffers keep their larger size: {error}");
             }
@@ -110,37 +110,37 @@ impl Scheduler {
     /// memory was freed for the new one, and could not be allocated again.
     pub(super) fn replace_lost(&mut self) -> Result<()> {
         for index in 0..self.table.len() {
-            if self.grows(index, &self.capacity)? == Some(true) {
-                return self.resize_own(self.capacity);
+            if self.grows(index, &self.counts)? == Some(true) {
+                return self.resize_own(self.counts.clone());
             }
         }
         Ok(())
     }
 
-    fn resize_those(&mut self, capacity: &Capacity, grow: bool) -> Result<()> {
+    fn resize_those(&mut self, counts: &[u64], grow: bool) -> Result<()> {
         for index in 0..self.table.len() {
-            if self.grows(index, capacity)? == Some(grow) {
-                self.resize(index, capacity)?;
+            if self.grows(index, counts)? == Some(grow) {
+                self.resize(index, counts)?;
             }
         }
         Ok(())
     }
 
     /// Returns true if a buffer must grow, false if it may shrink, `None` if it stays.
-    fn grows(&self, index: usize, capacity: &Capacity) -> Result<Option<bool>> {
+    fn grows(&self, index: usize, counts: &[u64]) -> Result<Option<bool>> {
         let decl = &self.table[index];
         if decl.class == Class::Step {
             return Ok(None);
         }
         let now = self.storage.own[index].first().map_or(0, Buffer::bytes);
-        let wanted = self.own_bytes(decl, capacity)?;
+        let wanted = self.own_bytes(decl, counts)?;
         Ok((wanted != now).then_some(wanted > now))
     }
 
-    fn resize(&mut self, index: usize, capacity: &Capacity) -> Result<()> {
+    fn resize(&mut self, index: usize, counts: &[u64]) -> Result<()> {
         let (decl, buf) = (&self.table[index], Buf(index as u16));
-        let keep = memory::bytes_of(decl, capacity)?.min(memory::bytes_of(decl, &self.capacity)?);
-        let bytes = self.own_bytes(decl, capacity)?;
+        let keep = memory::bytes_of(decl, counts)?.min(memory::bytes_of(decl, &self.counts)?);
+        let bytes = self.own_bytes(decl, counts)?;
         if decl.class != Class::Model {
             // There are no contents to keep, so the old memory is freed before the new is allocated.
             let old = std::mem::take(&mut self.storage.own[index]);
@@ -222,10 +222,10 @@ impl Scheduler {
         if !self.options.plan.guards {
             return Ok(());
         }
-        let (table, capacity) = (self.table, self.capacity);
+        let (table, counts) = (self.table, self.counts.clone());
         self.immediately(|recorder, storage, _| {
             for (decl, copies) in table.iter().zip(&storage.own) {
-                let bytes = memory::bytes_of(decl, &capacity)?;
+                let bytes = memory::bytes_of(decl, &counts)?;
                 copies.iter().try_for_each(|buffer| guard::write(recorder, buffer, bytes))?;
             }
             Ok(())

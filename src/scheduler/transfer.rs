@@ -95,12 +95,12 @@ impl Scheduler {
 
     /// Bytes of all elements of a buffer.
     pub fn bytes(&self, buf: Buf) -> Result<u64> {
-        memory::bytes_of(self.decl(buf)?, &self.capacity)
+        memory::bytes_of(self.decl(buf)?, &self.counts)
     }
 
-    /// Returns true if the capacities give a buffer no elements; it then has no memory of its own.
+    /// Returns true if a buffer has no elements; it then has no memory of its own.
     pub(super) fn is_empty(&self, buf: Buf) -> Result<bool> {
-        Ok(self.capacity.count(self.decl(buf)?.domain) == 0)
+        Ok(self.decl(buf)?.count(&self.counts)? == 0)
     }
 
     /// Returns true if the current list uses a scratch buffer.

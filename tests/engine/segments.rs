@@ -61,7 +61,7 @@ fn sixty_thousand_gaussians_in_one_tile_equal_the_mirror() {
     let mut engine = Engine::new(gpu, room, SchedulerOptions::default()).expect("room");
     engine.upload_model(&model).expect("model");
     let rendered = render(&mut engine, &camera, &RenderOptions::default()).expect("render");
-    assert!(engine.raw().capacity().segments > 1, "the list fits one segment; the test shows nothing");
+    assert!(engine.capacity().segments > 1, "the list fits one segment; the test shows nothing");
     let rules = Rules::default();
     let splats: Vec<_> = project::project_all(&rules, &camera, &Model::from_gaussians(&model))
         .into_iter()
@@ -111,7 +111,7 @@ fn segments_change_no_bit() {
             trainer.step().expect("step");
         }
         let model = trainer.model().expect("model");
-        (model, trainer.engine_mut().raw().capacity().segments)
+        (model, trainer.engine_mut().capacity().segments)
     };
     let ((whole, one), (parts, many)) = (run(40_960), run(16));
     assert!(one == 1 && many > 2, "{one} and {many} segments");
@@ -128,7 +128,7 @@ fn segments_of_narrow_pictures_fit_their_buffer() {
         // Guards behind the buffers are checked after each run.
         let mut fixture = Fixture::with_options(turn, made, true, shape, readable());
         fixture.train();
-        let segments = fixture.engine.raw().capacity().segments;
+        let segments = fixture.engine.capacity().segments;
         assert!(segments > 1, "{width} x {height}: one segment shows nothing");
     }
 }

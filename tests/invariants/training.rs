@@ -6,11 +6,12 @@ use crate::support::device::Turn;
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
 use labelgs::formats::write_model;
+use labelgs::pass::buffers::Capacity;
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
 use labelgs::scenes::initial_gaussians;
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::{Capacity, PlanOptions};
+use labelgs::scheduler::plan::PlanOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{StepReport, Trainer};
 
@@ -117,7 +118,7 @@ pub fn train_with(
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.ply");
     write_model(&path, &model).expect("a PLY");
-    let instances = trainer.engine_mut().raw().capacity().instances;
+    let instances = trainer.engine_mut().capacity().instances;
     Outcome {
         instances,
         memory,
@@ -137,10 +138,10 @@ fn same(what: &str, other: &Outcome, first: &Outcome) {
 /// Capacity that is too small for the first step.
 pub fn tiny(trainer: &mut Trainer) {
     let engine = trainer.engine_mut();
-    let old = *engine.raw().capacity();
+    let old = *engine.capacity();
     let layer_pixels = u64::from(engine.shape().tile_pixels());
     let tiny = Capacity { instances: 100, trained_instances: 100, layer_tiles: 1, layer_pixels, ..old };
-    engine.raw_mut().set_capacity(tiny).expect("less fits too");
+    engine.set_capacity(tiny).expect("less fits too");
 }
 
 fn large(trainer: &mut Trainer) {

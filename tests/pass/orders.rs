@@ -8,12 +8,13 @@ use crate::support::device;
 use crate::support::scenes::generator;
 use bytemuck::Zeroable;
 use labelgs::engine::{Engine, EngineSize};
+use labelgs::pass::buffers::Capacity;
 use labelgs::pass::build::Count;
 use labelgs::pass::scan::Total;
 use labelgs::pass::sort::SortBuffers;
 use labelgs::pass::{Builder, KernelShape, scan, sort};
 use labelgs::scheduler::ListId;
-use labelgs::scheduler::plan::{Buf, Capacity};
+use labelgs::scheduler::plan::Buf;
 use labelgs::shaders::constants::KEY_INVISIBLE;
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -27,7 +28,7 @@ fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
 
 /// Records the passes that `declare` adds.
 fn list(engine: &mut Engine, declare: impl FnOnce(&mut Builder)) -> ListId {
-    let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.raw().capacity());
+    let (shape, capacity): (KernelShape, Capacity) = (*engine.shape(), *engine.capacity());
     let mut builder = Builder::new("test", &shape, &capacity);
     declare(&mut builder);
     let list = builder.list;
@@ -139,9 +140,9 @@ fn sort_with_the_lanes_of_a_large_scene_is_exact() {
         sort_lanes: lanes,
         sort_cells: lanes << digit_bits,
         sort_totals: 140 << digit_bits,
-        ..*engine.raw().capacity()
+        ..*engine.capacity()
     };
-    engine.raw_mut().set_capacity(large).expect("room");
+    engine.set_capacity(large).expect("room");
     sort_exactly(&mut engine, &[(ITEMS, u32::MAX), (ITEMS, 3)]);
 }
 

@@ -28,10 +28,10 @@ fn work() -> labelgs::Result<()> {
     scheduler.run(id, 0)?;
     let ramp = (0..100).collect::<Vec<u32>>();
     scheduler.upload(MODEL, 0, 0, &ramp)?;
-    if let Err(error) = scheduler.set_capacity(Capacity { gaussians: 200, ..pixels(512) }) {
+    if let Err(error) = scheduler.set_counts(counts(200, 512)) {
         if exit_status(&error) == 5 {
             // The model is unchanged and the old capacities still work.
-            assert_eq!(scheduler.capacity(), &pixels(256));
+            assert_eq!(scheduler.counts(), &pixels(256));
             assert_eq!(scheduler.download_all::<u32>(MODEL, 0)?, ramp);
             let id = scheduler.prepare(&list)?;
             scheduler.run(id, 0)?;

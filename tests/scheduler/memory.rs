@@ -3,6 +3,7 @@
 use super::*;
 use labelgs::Error;
 use labelgs::cli::support::exit_status::exit_status;
+use labelgs::scheduler::plan::MemoryReport;
 
 toy_shader!(
     overrun,
@@ -24,7 +25,8 @@ fn allocated_memory_equals_the_prediction() {
     let mut list = PassList::new("toy");
     list.fill(A, 5).pass(scaled(A, B, 3, 1, 5000)).copy(B, REPORT, 0);
     let (limits, capacity) = (gpu.limits().plan, pixels(5000));
-    let predicted = Scheduler::predict(TABLE, &capacity, std::slice::from_ref(&list), &limits).unwrap();
+    let predicted =
+        MemoryReport::predict(TABLE, &capacity, std::slice::from_ref(&list), &limits, PlanOptions::default()).unwrap();
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, capacity, SchedulerOptions::default()).unwrap();
     scheduler.prepare(&list).unwrap();
     assert_eq!(scheduler.memory_total(), predicted.total, "{}", predicted.report());
@@ -35,14 +37,14 @@ fn allocated_memory_equals_the_prediction() {
 #[test]
 fn what_does_not_fit_is_refused_before_anything_is_allocated() {
     let Some(gpu) = device() else { return };
-    let too_large = Capacity { gaussians: 1 << 40, ..pixels(64) };
-    let error = Scheduler::new(gpu.gpu(), TABLE, too_large, SchedulerOptions::default()).unwrap_err();
+    let too_large = counts(1 << 40, 64);
+    let error = Scheduler::new(gpu.gpu(), TABLE, too_large.clone(), SchedulerOptions::default()).unwrap_err();
     assert!(matches!(error, Error::OutOfMemory { .. }), "{error}");
     assert_eq!(exit_status(&error), 5);
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(64), SchedulerOptions::default()).unwrap();
     scheduler.upload(MODEL, 0, 0, &ramp(100)).unwrap();
-    assert!(scheduler.set_capacity(too_large).is_err());
-    assert_eq!(scheduler.capacity(), &pixels(64), "the old capacities stay in force");
+    assert!(scheduler.set_counts(too_large).is_err());
+    assert_eq!(scheduler.counts(), &pixels(64), "the old capacities stay in force");
     assert_eq!(scheduler.download_all::<u32>(MODEL, 0).unwrap(), ramp(100));
 }
 
@@ -54,16 +56,16 @@ fn a_new_capacity_keeps_the_model() {
     scheduler.upload(MODEL, 0, 0, &ramp(100)).unwrap();
     scheduler.upload(PLANES, 0, 99, &[[1.0_f32, 2.0, 3.0, 4.0]]).unwrap();
     scheduler.fill(TOTALS, 9).unwrap();
-    scheduler.set_capacity(Capacity { gaussians: 250, ..pixels(64) }).unwrap();
+    scheduler.set_counts(counts(250, 64)).unwrap();
     let grown = scheduler.download_all::<u32>(MODEL, 0).unwrap();
     assert_eq!((&grown[..100], &grown[100..]), (&ramp(100)[..], &vec![0; 150][..]));
     let planes = scheduler.download::<[f32; 4]>(PLANES, 0, 98, 3).unwrap();
     assert_eq!(planes, [[0.0; 4], [1.0, 2.0, 3.0, 4.0], [0.0; 4]]);
     assert_eq!(scheduler.download_all::<u32>(TOTALS, 0).unwrap(), vec![0; 16], "kept buffers start afresh");
-    scheduler.set_capacity(Capacity { gaussians: 30, ..pixels(64) }).unwrap();
+    scheduler.set_counts(counts(30, 64)).unwrap();
     assert_eq!(scheduler.download_all::<u32>(MODEL, 0).unwrap(), ramp(30));
-    scheduler.set_capacity(Capacity { gaussians: 0, ..pixels(0) }).unwrap();
-    scheduler.set_capacity(pixels(64)).unwrap();
+    scheduler.set_counts(counts(0, 0)).unwrap();
+    scheduler.set_counts(pixels(64)).unwrap();
     let mut list = PassList::new("after");
     list.fill(A, 5).pass(scaled(A, B, 3, 1, 64)).copy(B, REPORT, 0);
     let id = scheduler.prepare(&list).unwrap();
@@ -137,7 +139,7 @@ fn scratch_can_be_uploaded_without_aliasing_and_is_poisoned_when_asked() {
 fn transfers_larger_than_the_staging_memory_are_exact() {
     let Some(gpu) = device() else { return };
     let count = 5_000_001_u32;
-    let capacity = Capacity { gaussians: u64::from(count), ..pixels(64) };
+    let capacity = counts(u64::from(count), 64);
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, capacity, SchedulerOptions::default()).unwrap();
     let values = (0..count).map(|i| i.wrapping_mul(2_654_435_761)).collect::<Vec<_>>();
     scheduler.upload(MODEL, 0, 0, &values).unwrap();

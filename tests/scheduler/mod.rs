@@ -9,27 +9,28 @@ mod replay;
 mod shaders;
 
 use crate::support::{device, toy};
-use labelgs::scheduler::plan::{Buf, Capacity, Grid, PassDecl, PassList, PlanOptions};
+use labelgs::pass::buffers::Capacity;
+use labelgs::scheduler::plan::{Buf, Grid, PassDecl, PassList, PlanOptions};
 use labelgs::scheduler::{Scheduler, SchedulerOptions};
 use labelgs::shaders::{Access, BindingKind, ShaderDesc};
 
 /// Buffers of the toy passes.
 mod table {
-    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
-    labelgs::buffers! { consts;
-        MODEL "model": 4, Domain::Gaussians, Class::Model, Some(TexelFormat::R32Uint), "Kept.";
-        PLANES "planes": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept vectors.";
-        TOTALS "totals": 4, Domain::Fixed(16), Class::Persistent, None, "Kept, zeroed when allocated.";
-        UNIFORMS "uniforms": 4, Domain::Fixed(4), Class::PerFrame, None, "From the host.";
-        FLOATS "floats": 4, Domain::Pixels, Class::PerFrame, Some(TexelFormat::R32Sfloat), "From the host, as floats.";
-        REPORT "report": 4, Domain::Pixels, Class::Report, None, "To the host.";
-        A "a": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        B "b": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        C "c": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        D "d": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        E "e": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        F "f": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        ARGUMENTS "arguments": 4, Domain::Fixed(8), Class::Step, None, "Indirect arguments.";
+    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, Table, TexelFormat};
+    labelgs::buffers! { || "lower something".to_owned(); consts;
+        MODEL "model": 4, Domain::GAUSSIANS, Class::Model, Some(TexelFormat::R32Uint), "Kept.";
+        PLANES "planes": 16, Domain::GAUSSIANS, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept vectors.";
+        TOTALS "totals": 4, Domain::fixed(16), Class::Persistent, None, "Kept, zeroed when allocated.";
+        UNIFORMS "uniforms": 4, Domain::fixed(4), Class::PerFrame, None, "From the host.";
+        FLOATS "floats": 4, Domain::PIXELS, Class::PerFrame, Some(TexelFormat::R32Sfloat), "From the host, as floats.";
+        REPORT "report": 4, Domain::PIXELS, Class::Report, None, "To the host.";
+        A "a": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        B "b": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        C "c": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        D "d": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        E "e": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        F "f": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        ARGUMENTS "arguments": 4, Domain::fixed(8), Class::Step, None, "Indirect arguments.";
     }
 }
 use table::*;
@@ -76,8 +77,13 @@ impl DownloadAll for Scheduler {
     }
 }
 
-fn pixels(count: u64) -> Capacity {
-    Capacity { gaussians: 100, pixels: count, ..Capacity::default() }
+fn pixels(count: u64) -> Vec<u64> {
+    counts(100, count)
+}
+
+/// Counts of Gaussians and pixels.
+fn counts(gaussians: u64, pixels: u64) -> Vec<u64> {
+    Capacity { gaussians, pixels, ..Capacity::default() }.counts()
 }
 
 /// `to[i] = from[i] * factor + term`.
@@ -146,7 +152,7 @@ fn wrong_use_is_an_error_that_says_so() {
         let message = result.expect_err(expected).to_string();
         assert!(message.contains(expected), "{message}");
     }
-    scheduler.set_capacity(pixels(128)).unwrap();
+    scheduler.set_counts(pixels(128)).unwrap();
     let message = scheduler.submit(id, 0).expect_err("the list is forgotten").to_string();
     assert!(message.contains("prepare it again"), "{message}");
 }

@@ -56,7 +56,7 @@ toy_shader!(
 #[test]
 fn buffers_can_be_read_as_texels() {
     let Some(gpu) = device() else { return };
-    let capacity = Capacity { gaussians: 128, ..pixels(128) };
+    let capacity = counts(128, 128);
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, capacity, SchedulerOptions::default()).unwrap();
     let mut list = PassList::new("texels");
     // A scratch buffer with an offset in its page.
@@ -160,7 +160,7 @@ fn the_lists_of_the_engine_can_be_prepared() {
         let shape = labelgs::pass::KernelShape::of(gpu.capabilities());
         let (capacity, lists) = crate::scheduler::plan::engine_lists(labelgs::pass::KernelShape { texel, ..shape });
         let with = SchedulerOptions { timestamps: true, poison_step: true, ..SchedulerOptions::default() };
-        let mut scheduler = Scheduler::new(gpu.gpu(), labelgs::scheduler::plan::TABLE, capacity, with).unwrap();
+        let mut scheduler = Scheduler::new(gpu.gpu(), labelgs::pass::buffers::TABLE, capacity.counts(), with).unwrap();
         let ids = scheduler.prepare_all(&lists.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(ids.len(), lists.len());
     }

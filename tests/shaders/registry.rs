@@ -2,9 +2,10 @@
 
 use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
+use labelgs::pass::buffers::{Capacity, TABLE};
 use labelgs::pass::{KernelShape, Supervision, Variant};
 use labelgs::run::StrategyKind;
-use labelgs::scheduler::plan::{Capacity, Grid, Limits, PassList, Plan, PlanOptions, TABLE, Work};
+use labelgs::scheduler::plan::{Grid, Limits, PassList, Plan, PlanOptions, Work};
 use labelgs::train::shared::exposure::Exposure;
 use labelgs::train::shared::poses::Poses;
 use labelgs::train::shared::{Place, SharedParameters};
@@ -170,7 +171,7 @@ fn subgroups_without_kernels_have_no_shape() {
 #[test]
 fn every_list_can_be_planned_and_printed() {
     for (capacity, list) in lists() {
-        let plan = Plan::new(TABLE, &capacity, &list, &Limits::default(), PlanOptions::default());
+        let plan = Plan::new(TABLE, &capacity.counts(), &list, &Limits::default(), PlanOptions::default());
         let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", list.name));
         let text = plan.report();
         assert_eq!(plan.items.len(), list.work.len());
@@ -189,7 +190,7 @@ fn two_hundred_layers_can_be_planned() {
     assert!(capacity.virtual_tiles.div_ceil(64) > 65_535, "an axis would do");
     let limits = Limits { max_storage_range: 1 << 32, max_allocation: 1 << 34, ..Limits::default() };
     for list in Engine::lists_of(&shape, &capacity, &room) {
-        let plan = Plan::new(TABLE, &capacity, &list, &limits, PlanOptions::default());
+        let plan = Plan::new(TABLE, &capacity.counts(), &list, &limits, PlanOptions::default());
         plan.unwrap_or_else(|error| panic!("{}: {error}", list.name));
     }
 }
@@ -202,7 +203,7 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
         let lists = Engine::lists_of(&shape, &capacity, room);
         let report = labelgs::scheduler::plan::MemoryReport::predict(
             TABLE,
-            &capacity,
+            &capacity.counts(),
             &lists,
             &Limits::default(),
             PlanOptions::default(),

@@ -31,12 +31,12 @@ fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bo
     let mut trainer =
         Trainer::new(std::sync::Arc::clone(gpu), config, &data, &model, SchedulerOptions::default()).expect("trainer");
     trainer.engine_mut().make_room_for_gaussians(room).expect("room");
-    let before = trainer.engine_mut().raw().capacity().instances;
+    let before = trainer.engine_mut().capacity().instances;
     for _ in 0..6 {
         trainer.step().expect("a step");
     }
     let model = trainer.model().expect("a model");
-    (model, before != trainer.engine_mut().raw().capacity().instances)
+    (model, before != trainer.engine_mut().capacity().instances)
 }
 
 #[test]

@@ -9,12 +9,13 @@ use crate::support::device::Turn;
 use crate::support::{device, toy};
 use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize};
+use labelgs::pass::buffers::TABLE;
 use labelgs::pass::{Builder, Extension, Hook, KernelShape, Variant, training_step};
 use labelgs::run::{LabelRule, TrainConfig};
 use labelgs::scene::Dataset;
 use labelgs::scenes::initial_gaussians;
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::scheduler::plan::{Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, TABLE, Work};
+use labelgs::scheduler::plan::{Buf, Domain, Grid, Limits, MemoryReport, PassDecl, PlanOptions, Work};
 use labelgs::shaders::ShaderDesc;
 use labelgs::train::Trainer;
 use labelgs::train::setup::TrainerOptions;
@@ -312,11 +313,13 @@ fn a_training_without_shared_rows_pays_nothing_for_them() {
     let is_added = |text: &&String| text.starts_with("adam_shared") || text.contains(&format!("{:?}", Buf::V_SHARED));
     assert_eq!((with.iter().filter(is_added).count(), without.iter().filter(is_added).count()), (2, 0));
     assert_eq!(with.iter().filter(|text| !is_added(text)).collect::<Vec<_>>(), without.iter().collect::<Vec<_>>());
-    let own: Vec<&str> = TABLE.iter().filter(|decl| decl.domain == Domain::SharedRows).map(|decl| decl.name).collect();
+    let own: Vec<&str> =
+        TABLE.iter().filter(|decl| decl.domain.count == Domain::SHARED_ROWS.count).map(|decl| decl.name).collect();
     let reported = |room: &EngineSize| {
         let capacity = capacity(&shape, room);
         let lists = Engine::lists_of(&shape, &capacity, room);
-        let report = MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), PlanOptions::default());
+        let report =
+            MemoryReport::predict(TABLE, &capacity.counts(), &lists, &Limits::default(), PlanOptions::default());
         let rows = report.expect("it fits").rows;
         rows.iter().filter(|row| own.contains(&row.name)).count()
     };

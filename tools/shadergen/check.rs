@@ -6,42 +6,8 @@ use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
 /// Keywords of Rust, and names with another meaning in the generated modules.
-const RESERVED: &[&str] = &[
-    "as",
-    "async",
-    "await",
-    "box",
-    "crate",
-    "do",
-    "dyn",
-    "enum",
-    "extern",
-    "fn",
-    "gen",
-    "impl",
-    "let",
-    "loop",
-    "macro",
-    "match",
-    "mod",
-    "move",
-    "mut",
-    "priv",
-    "pub",
-    "ref",
-    "self",
-    "static",
-    "super",
-    "trait",
-    "try",
-    "type",
-    "unsafe",
-    "use",
-    "where",
-    "yield",
-    "structs",
-    "constants",
-];
+const RESERVED: &str = "as async await box crate do dyn enum extern fn gen impl let loop macro match mod move mut priv pub \
+    ref self static super trait try type unsafe use where yield structs constants";
 
 /// Breaches in one shader: its text and all its variants.
 pub fn shader(shader: &Shader) -> Vec<Finding> {
@@ -144,7 +110,7 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
     }
     let names = bindings.iter().map(|binding| binding.name.clone());
     for name in names.chain(spec.iter().map(|spec| spec.name.to_lowercase())) {
-        if RESERVED.contains(&name.as_str()) || !is_snake_case(&name) {
+        if RESERVED.split(' ').any(|word| word == name) || !is_snake_case(&name) {
             breach(&name, format!("`{name}` cannot be the name of a Rust field; use another name in snake_case"));
         }
     }

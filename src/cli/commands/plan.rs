@@ -5,8 +5,9 @@ use crate::cli::support::Context;
 use crate::cli::support::parsers::{Size, bytes, count, size};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for};
 use crate::gpu;
+use crate::pass::buffers::{Capacity, TABLE};
 use crate::pass::{KernelShape, Supervision, Variant, training_step};
-use crate::scheduler::plan::{Capacity, Limits, MemoryReport, PassList, Plan, PlanOptions, TABLE};
+use crate::scheduler::plan::{Limits, MemoryReport, PassList, Plan, PlanOptions};
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -99,8 +100,8 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
 fn planned(subject: &Subject, limits: &Limits) -> Result<(MemoryReport, Plan)> {
     let lists = Engine::lists_of(&subject.shape, &subject.capacity, &subject.room);
     let options = PlanOptions::default();
-    let memory = MemoryReport::predict(TABLE, &subject.capacity, &lists, limits, options)?;
-    Ok((memory, Plan::new(TABLE, &subject.capacity, &subject.list, limits, options)?))
+    let memory = MemoryReport::predict(TABLE, &subject.capacity.counts(), &lists, limits, options)?;
+    Ok((memory, Plan::new(TABLE, &subject.capacity.counts(), &subject.list, limits, options)?))
 }
 
 /// Returns the limits with unlimited memory, for a report of the needed memory.

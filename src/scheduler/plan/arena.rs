@@ -1,9 +1,8 @@
 //! Places buffers: Step buffers share pages by first fit, all others have their own memory.
 
 use super::Limits;
-use super::buffers::{Buf, BufferDecl, Class};
+use super::buffers::{Buf, BufferDecl, Class, Table};
 use super::lifetime::Life;
-use super::memory::Size;
 use super::{GUARD_BYTES, Page, Placement, PlanOptions};
 use crate::error::{Error, Result};
 
@@ -19,8 +18,8 @@ struct Placed {
 /// Larger buffers go first, equal ones in the order of their names: this wastes little space in first fit, and the
 /// result does not depend on the order of the table.
 pub(super) fn place(
-    table: &'static [BufferDecl],
-    sizes: &[Size],
+    table: &'static Table,
+    sizes: &[u64],
     lives: &[Option<Life>],
     limits: &Limits,
     options: PlanOptions,
@@ -28,7 +27,7 @@ pub(super) fn place(
     let mut placements = vec![None; table.len()];
     let mut scratch = Vec::new();
     for (index, decl) in table.iter().enumerate() {
-        let bytes = sizes[index].bytes;
+        let bytes = sizes[index];
         let bound = bytes + if options.guards { GUARD_BYTES } else { 0 };
         if decl.class != Class::Step {
             check_allocation(decl, bound, limits)?;
@@ -89,6 +88,6 @@ fn check_allocation(decl: &BufferDecl, bytes: u64, limits: &Limits) -> Result<()
         needed,
         limit_name: "the largest allocation of this device".to_owned(),
         limit: limits.max_allocation,
-        cure: decl.domain.cure(fits),
+        cure: (decl.domain.cure)(fits),
     })
 }

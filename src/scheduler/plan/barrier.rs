@@ -4,8 +4,7 @@
 //! read, like any other. All barriers are global memory barriers: a barrier orders all earlier items before all later
 //! items, for the kinds of use in its masks.
 
-use super::buffers::{Buf, BufferDecl};
-use super::memory::Size;
+use super::buffers::{Buf, Table};
 use super::pass::{Grid, Work};
 use super::{Page, Placement, name};
 use crate::error::{Error, Result};
@@ -103,12 +102,12 @@ pub struct Barrier {
 }
 
 /// Lists an item's uses of buffers.
-pub(super) fn uses(work: &Work, sizes: &[Size]) -> Vec<BufferUse> {
+pub(super) fn uses(work: &Work, sizes: &[u64]) -> Vec<BufferUse> {
     let whole = |buf, kind| BufferUse { buf, kind, range: None };
     match work {
         Work::Fill { buf, .. } => vec![whole(*buf, Use::TransferWrite)],
         Work::Copy { from, to, bytes, .. } => {
-            let most = sizes[from.index()].bytes.min(sizes[to.index()].bytes);
+            let most = sizes[from.index()].min(sizes[to.index()]);
             let range = Some((0, if *bytes == 0 { most } else { *bytes }));
             vec![
                 BufferUse { buf: *from, kind: Use::TransferRead, range },
@@ -152,7 +151,7 @@ pub(super) fn touches(uses: &[BufferUse], placements: &[Option<Placement>]) -> R
 /// A barrier is placed as late as possible, directly before the item that needs it. Later hazards across it only widen
 /// its masks, which costs nothing, because it is global.
 pub(super) fn derive(
-    table: &'static [BufferDecl],
+    table: &'static Table,
     labels: &[String],
     items: &[Vec<Touch>],
     everywhere: bool,
@@ -198,7 +197,7 @@ pub(super) fn derive(
     barriers
 }
 
-fn reason(table: &'static [BufferDecl], now_by: &str, then_by: &str, now: &Touch, then: &Touch) -> String {
+fn reason(table: &'static Table, now_by: &str, then_by: &str, now: &Touch, then: &Touch) -> String {
     let now_name = name(table, now.buf);
     let does = if now.kind.writes() { "writes" } else { "reads" };
     let did = if then.kind.writes() { "written" } else { "read" };

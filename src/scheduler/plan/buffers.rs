@@ -1,9 +1,10 @@
-//! Types for the rows of a table of buffers; the table itself is `plan/table.rs`.
+//! Types for a table of buffers, which the owner of the pass lists declares.
 //!
 //! A buffer is an array of equal elements. The shaders declare its bindings (read, written, texel); the planner chooses
 //! its place in memory by its class.
 
-use super::capacity::Domain;
+use crate::error::{Error, Result};
+use std::ops::Deref;
 
 /// A buffer: the index of its row in the table. [`buffers!`](crate::buffers) makes the constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,7 +20,7 @@ impl Buf {
 /// Lifetime of a buffer's contents, and who accesses them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
-    /// The trained model and its state; kept when capacities change; never aliased.
+    /// Kept, with its contents, when counts change; never aliased.
     Model,
     /// Kept from step to step and never aliased; zeroed whenever it is (re)allocated.
     Persistent,
@@ -73,14 +74,44 @@ impl TexelFormat {
     }
 }
 
-/// One row of the table of buffers.
+/// Number of elements of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// The same in every plan.
+    Fixed(u32),
+    /// The number at this place of the counts that a plan is made with.
+    At(usize),
+}
+
+/// What the elements of a buffer stand for.
+#[derive(Clone, Copy, Debug)]
+pub struct Domain {
+    /// How many there are.
+    pub count: Count,
+    /// Advice to the user if at most so many fit.
+    pub cure: fn(u64) -> String,
+    /// Reports of memory leave the buffers out while there are no elements.
+    pub is_optional: bool,
+}
+
+impl Domain {
+    /// A single element.
+    pub const ONE: Self = Self::fixed(1);
+
+    /// A fixed number of elements.
+    pub const fn fixed(count: u32) -> Self {
+        Self { count: Count::Fixed(count), cure: |_| "use another device".to_owned(), is_optional: false }
+    }
+}
+
+/// One row of a table of buffers.
+#[derive(Clone, Copy, Debug)]
 pub struct BufferDecl {
     /// Plural noun, the same in GLSL, plan and reference.
     pub name: &'static str,
     /// Bytes per element; a multiple of 4.
     pub element_bytes: u32,
-    /// Domain; its capacity is the number of elements.
+    /// What the elements stand for, and how many there are.
     pub domain: Domain,
     /// Lifetime of the contents.
     pub class: Class,
@@ -90,27 +121,60 @@ pub struct BufferDecl {
     pub doc: &'static str,
 }
 
-/// Declares a table of buffers: `pub static TABLE: &[BufferDecl]`, and a constant for each row.
+impl BufferDecl {
+    /// Number of elements under these counts.
+    pub fn count(&self, counts: &[u64]) -> Result<u64> {
+        match self.domain.count {
+            Count::Fixed(count) => Ok(count.into()),
+            Count::At(place) => counts.get(place).copied().ok_or_else(|| {
+                Error::Bug(format!("buffer {} needs count {place}, there are {}", self.name, counts.len()))
+            }),
+        }
+    }
+}
+
+/// All buffers that pass lists may use.
+#[derive(Debug)]
+pub struct Table {
+    /// One row per buffer.
+    pub rows: &'static [BufferDecl],
+    /// Advice to the user if the memory does not suffice for all buffers.
+    pub cure: fn() -> String,
+}
+
+impl Deref for Table {
+    type Target = [BufferDecl];
+
+    fn deref(&self) -> &[BufferDecl] {
+        self.rows
+    }
+}
+
+/// Declares a table of buffers: `pub static TABLE: &Table`, and a constant for each row.
 ///
-/// Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The constants are `Buf::NAME`; with `consts;`
-/// before the rows they are free, for tables of tests. `Buf` and `BufferDecl` have to be in scope.
+/// First comes the advice if not all fit. Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The
+/// constants are `Buf::NAME`; with `consts;` before the rows they are free, for tables of tests. `Buf`, `BufferDecl` and
+/// `Table` have to be in scope.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {
-    (consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
-        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
-        $(#[doc = $doc] #[allow(dead_code)] pub const $ident: Buf = Buf(BufferIndex::$ident as u16);)*
-    };
-    (@table $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+    (@table $cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
         enum BufferIndex { $($ident),* }
-        /// All rows of the table of buffers, in the order of their declaration.
-        pub static TABLE: &[BufferDecl] = &[$(BufferDecl {
-            name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
-        }),*];
+        /// All buffers, in the order of their declaration.
+        pub static TABLE: &Table = &Table {
+            rows: &[$(BufferDecl {
+                name: $name, element_bytes: $bytes, domain: $domain, class: $class, texel: $texel, doc: $doc,
+            }),*],
+            cure: $cure,
+        };
     };
-    ($($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
-        $crate::buffers!(@table $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+    ($cure:expr; consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $cure; $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
+        $(#[doc = $doc] #[allow(dead_code)] pub const $ident: Buf = Buf(BufferIndex::$ident as u16);)*
+    };
+    ($cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+        $crate::buffers!(@table $cure; $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
         impl Buf {
             $(#[doc = $doc] pub const $ident: Self = Self(BufferIndex::$ident as u16);)*
         }

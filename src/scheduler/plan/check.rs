@@ -1,16 +1,14 @@
 //! Checks a pass list against the shaders' interfaces and the device's limits, before planning.
 
 use super::Limits;
-use super::buffers::{Buf, BufferDecl};
-use super::capacity::Domain;
-use super::memory::Size;
+use super::buffers::{Buf, BufferDecl, Count, Table};
 use super::name;
 use super::pass::{Grid, PassDecl, PassList, Work};
 use crate::error::{Error, Result};
 use crate::shaders::{BindingDesc, BindingKind};
 
 /// Checks every item of a list.
-pub(super) fn list(table: &'static [BufferDecl], sizes: &[Size], list: &PassList, limits: &Limits) -> Result<()> {
+pub(super) fn list(table: &'static Table, sizes: &[u64], list: &PassList, limits: &Limits) -> Result<()> {
     for work in &list.work {
         match work {
             Work::Pass(pass) => check_pass(table, sizes, pass, limits)
@@ -26,14 +24,14 @@ fn in_pass(list: &PassList, pass: &PassDecl, what: &str) -> Error {
     Error::Bug(format!("pass {} of list {}: {what}", pass.label, list.name))
 }
 
-fn row(table: &'static [BufferDecl], buf: Buf) -> Result<&'static BufferDecl> {
+fn row(table: &'static Table, buf: Buf) -> Result<&'static BufferDecl> {
     table.get(buf.index()).ok_or_else(|| Error::Bug(format!("there is no buffer {} in the table", buf.0)))
 }
 
-fn check_copy(table: &'static [BufferDecl], sizes: &[Size], from: Buf, to: Buf, bytes: u64) -> Result<()> {
+fn check_copy(table: &'static Table, sizes: &[u64], from: Buf, to: Buf, bytes: u64) -> Result<()> {
     row(table, from)?;
     row(table, to)?;
-    let most = sizes[from.index()].bytes.min(sizes[to.index()].bytes);
+    let most = sizes[from.index()].min(sizes[to.index()]);
     if from == to || bytes > most || !bytes.is_multiple_of(4) {
         let (from, to) = (name(table, from), name(table, to));
         return Err(Error::Bug(format!(
@@ -43,7 +41,7 @@ fn check_copy(table: &'static [BufferDecl], sizes: &[Size], from: Buf, to: Buf, 
     Ok(())
 }
 
-fn check_pass(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, limits: &Limits) -> Result<()> {
+fn check_pass(table: &'static Table, sizes: &[u64], pass: &PassDecl, limits: &Limits) -> Result<()> {
     let shader = pass.shader;
     let expect = |what: &str, found: usize, expected: usize| {
         let problem = || Error::Bug(format!("{found} {what} given, the shader has {expected}"));
@@ -82,7 +80,7 @@ fn check_counts(pass: &PassDecl, limits: &Limits) -> Result<()> {
     Ok(())
 }
 
-fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, limits: &Limits) -> Result<()> {
+fn check_grid(table: &'static Table, sizes: &[u64], pass: &PassDecl, limits: &Limits) -> Result<()> {
     match pass.grid {
         Grid::Groups(x, y, z) => {
             let fits = [x, y, z].iter().zip(&limits.max_groups).all(|(count, limit)| count <= limit);
@@ -91,39 +89,39 @@ fn check_grid(table: &'static [BufferDecl], sizes: &[Size], pass: &PassDecl, lim
         }
         Grid::Indirect(buf, offset) => {
             let decl = row(table, buf)?;
-            let inside = u64::from(offset) + 12 <= sizes[buf.index()].bytes && offset.is_multiple_of(4);
+            let inside = u64::from(offset) + 12 <= sizes[buf.index()] && offset.is_multiple_of(4);
             let problem = || format!("indirect arguments at byte {offset} of {}: outside of the buffer", decl.name);
             if inside { Ok(()) } else { Err(Error::Bug(problem())) }
         }
     }
 }
 
-fn check_storage(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
+fn check_storage(decl: &BufferDecl, bytes: u64, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let (ours, shaders) = (decl.element_bytes, binding.element_bytes);
     // In a buffer of fixed size, a shader's struct may span several elements. In other buffers, wider elements would
     // read past the end.
-    let fixed = matches!(decl.domain, Domain::Fixed(_)) && shaders.is_multiple_of(ours);
+    let fixed = matches!(decl.domain.count, Count::Fixed(_)) && shaders.is_multiple_of(ours);
     let divides = shaders == 0 || ours.is_multiple_of(shaders) || fixed;
-    if !divides || size.bytes < u64::from(shaders) {
-        let (name, block, bytes) = (decl.name, binding.name, size.bytes);
+    if !divides || bytes < u64::from(shaders) {
+        let (name, block) = (decl.name, binding.name);
         return Err(Error::Bug(format!(
             "buffer {name} ({bytes} bytes, elements of {ours}) is bound as {block}, whose elements have {shaders} bytes"
         )));
     }
     // Compare without the guard: it exists in tests only, and the message would name a size that includes it.
-    if size.bytes <= limits.max_storage_range {
+    if bytes <= limits.max_storage_range {
         return Ok(());
     }
     Err(Error::OutOfMemory {
         what: decl.name.to_owned(),
-        needed: size.bytes,
+        needed: bytes,
         limit_name: "the largest storage binding of this device".to_owned(),
         limit: limits.max_storage_range,
-        cure: decl.domain.cure(limits.max_storage_range / u64::from(ours)),
+        cure: (decl.domain.cure)(limits.max_storage_range / u64::from(ours)),
     })
 }
 
-fn check_texel(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Limits) -> Result<()> {
+fn check_texel(decl: &BufferDecl, bytes: u64, binding: &BindingDesc, limits: &Limits) -> Result<()> {
     let Some(format) = decl.texel else {
         let (name, block) = (decl.name, binding.name);
         return Err(Error::Bug(format!("buffer {name} has no texel format but is bound as the texel buffer {block}")));
@@ -135,14 +133,14 @@ fn check_texel(decl: &BufferDecl, size: Size, binding: &BindingDesc, limits: &Li
             "elements of {name} have {ours} bytes; expected a multiple of the texel size, {texel}"
         )));
     }
-    if size.bytes / texel <= limits.max_texel_elements {
+    if bytes / texel <= limits.max_texel_elements {
         return Ok(());
     }
     Err(Error::OutOfMemory {
         what: format!("{} (read as texels)", decl.name),
-        needed: size.bytes,
+        needed: bytes,
         limit_name: "the largest texel view of this device".to_owned(),
         limit: limits.max_texel_elements * texel,
-        cure: decl.domain.cure(limits.max_texel_elements * texel / u64::from(decl.element_bytes)),
+        cure: (decl.domain.cure)(limits.max_texel_elements * texel / u64::from(decl.element_bytes)),
     })
 }

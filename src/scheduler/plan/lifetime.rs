@@ -1,7 +1,7 @@
 //! First and last use of each buffer in a list.
 
 use super::barrier::BufferUse;
-use super::buffers::{BufferDecl, Class};
+use super::buffers::{Class, Table};
 use crate::error::{Error, Result};
 
 /// The range of items in which a buffer's contents matter, both ends inclusive.
@@ -32,11 +32,7 @@ pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Life>
 }
 
 /// Fails if the first use of a scratch buffer only reads it: its contents are undefined, so a pass is missing.
-pub(super) fn check_written_first(
-    table: &'static [BufferDecl],
-    labels: &[String],
-    uses: &[Vec<BufferUse>],
-) -> Result<()> {
+pub(super) fn check_written_first(table: &'static Table, labels: &[String], uses: &[Vec<BufferUse>]) -> Result<()> {
     let mut written = vec![false; table.len()];
     for (item, uses) in uses.iter().enumerate() {
         for touched in uses.iter().filter(|touched| touched.kind.writes()) {

@@ -1,41 +1,33 @@
 //! Sizes of buffers, and the memory of pass lists, predicted before anything is allocated.
 
 use super::Limits;
-use super::buffers::{BufferDecl, Class};
-use super::capacity::{Capacity, Domain};
+use super::buffers::{BufferDecl, Class, Table};
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
-use crate::error::{Error, Result, Setting};
+use crate::error::{Error, Result};
 
 /// Bytes of the staging memory for transfers to and from device memory: one half for each direction.
 pub(crate) const STAGING_BYTES: u64 = 8 << 20;
 
-/// Size of one copy of a buffer.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Size {
-    /// Bytes, for at least one element.
-    pub(super) bytes: u64,
-}
-
-/// Sizes of all rows of a table.
-pub(super) fn sizes(table: &'static [BufferDecl], capacity: &Capacity) -> Result<Vec<Size>> {
-    table.iter().map(|decl| Ok(Size { bytes: bytes_of(decl, capacity)? })).collect()
+/// Bytes of one copy of each buffer of a table, for at least one element.
+pub(super) fn sizes(table: &'static Table, counts: &[u64]) -> Result<Vec<u64>> {
+    table.iter().map(|decl| bytes_of(decl, counts)).collect()
 }
 
 /// Bytes of one copy of a buffer, for at least one element: Vulkan has no empty buffers.
-pub(crate) fn bytes_of(decl: &BufferDecl, capacity: &Capacity) -> Result<u64> {
+pub(crate) fn bytes_of(decl: &BufferDecl, counts: &[u64]) -> Result<u64> {
     if decl.element_bytes == 0 || !decl.element_bytes.is_multiple_of(4) {
         let (name, bytes) = (decl.name, decl.element_bytes);
         return Err(Error::Bug(format!("elements of buffer {name} have {bytes} bytes; expected a multiple of 4")));
     }
-    let count = capacity.count(decl.domain).max(1);
+    let count = decl.count(counts)?.max(1);
     count.checked_mul(u64::from(decl.element_bytes)).filter(|&bytes| bytes < 1 << 62).ok_or_else(|| {
         Error::OutOfMemory {
             what: decl.name.to_owned(),
             needed: u64::MAX,
             limit_name: "the address space".to_owned(),
             limit: 1 << 62,
-            cure: decl.domain.cure((1 << 62) / u64::from(decl.element_bytes)),
+            cure: (decl.domain.cure)((1 << 62) / u64::from(decl.element_bytes)),
         }
     })
 }
@@ -47,9 +39,9 @@ pub(crate) fn allocated_bytes(bytes: u64, options: PlanOptions, alignment: u64) 
 
 /// Bytes allocated for one copy of a buffer with its own memory; 0 if it has no elements, so that unused features cost
 /// no memory. No list may bind a buffer of 0 bytes.
-pub(crate) fn own_bytes(decl: &BufferDecl, capacity: &Capacity, options: PlanOptions, alignment: u64) -> Result<u64> {
-    let bytes = bytes_of(decl, capacity)?;
-    Ok(if capacity.count(decl.domain) == 0 { 0 } else { allocated_bytes(bytes, options, alignment) })
+pub(crate) fn own_bytes(decl: &BufferDecl, counts: &[u64], options: PlanOptions, alignment: u64) -> Result<u64> {
+    let bytes = bytes_of(decl, counts)?;
+    Ok(if decl.count(counts)? == 0 { 0 } else { allocated_bytes(bytes, options, alignment) })
 }
 
 /// One buffer of a [`MemoryReport`].
@@ -85,21 +77,21 @@ pub struct MemoryReport {
 impl MemoryReport {
     /// Predicts the memory of lists. If a buffer or the total does not fit, the error suggests a cure.
     pub fn predict(
-        table: &'static [BufferDecl],
-        capacity: &Capacity,
+        table: &'static Table,
+        counts: &[u64],
         lists: &[PassList],
         limits: &Limits,
         options: PlanOptions,
     ) -> Result<Self> {
         let plans =
-            lists.iter().map(|list| Plan::new(table, capacity, list, limits, options)).collect::<Result<Vec<_>>>()?;
-        Self::of_plans(table, capacity, &plans.iter().collect::<Vec<_>>(), limits, options)
+            lists.iter().map(|list| Plan::new(table, counts, list, limits, options)).collect::<Result<Vec<_>>>()?;
+        Self::of_plans(table, counts, &plans.iter().collect::<Vec<_>>(), limits, options)
     }
 
     /// Memory of existing plans.
     pub fn of_plans(
-        table: &'static [BufferDecl],
-        capacity: &Capacity,
+        table: &'static Table,
+        counts: &[u64],
         plans: &[&Plan],
         limits: &Limits,
         options: PlanOptions,
@@ -108,42 +100,36 @@ impl MemoryReport {
         let mut total = STAGING_BYTES;
         for (index, decl) in table.iter().enumerate() {
             let one = if decl.class == Class::Step {
-                allocated_bytes(bytes_of(decl, capacity)?, options, limits.alignment())
+                allocated_bytes(bytes_of(decl, counts)?, options, limits.alignment())
             } else {
-                own_bytes(decl, capacity, options, limits.alignment())?
+                own_bytes(decl, counts, options, limits.alignment())?
             };
             let bytes = one * decl.class.copies();
-            // Only users of the library add shared rows; without any, the report omits their buffers.
-            let added = decl.domain != Domain::SharedRows || capacity.shared_rows > 0;
+            let count = decl.count(counts)?;
+            let shown = count > 0 || !decl.domain.is_optional;
             let used = decl.class != Class::Step || plans.iter().any(|plan| plan.placements[index].is_some());
             if decl.class != Class::Step {
                 total = total.saturating_add(bytes);
             }
-            if used && added {
+            if used && shown {
                 let (name, class, element_bytes) = (decl.name, decl.class, decl.element_bytes);
-                rows.push(MemoryRow { name, class, count: capacity.count(decl.domain), element_bytes, bytes });
+                rows.push(MemoryRow { name, class, count, element_bytes, bytes });
             }
         }
         let step_pages = merge_pages(plans.iter().map(|plan| plan.step_pages.as_slice()));
         let total = step_pages.iter().fold(total, |sum, bytes| sum.saturating_add(*bytes));
         let step_unaliased = plans.iter().map(|plan| unaliased(plan)).max().unwrap_or(0);
         let report = Self { rows, step_pages, step_unaliased, staging: STAGING_BYTES, total };
-        report.check(limits)?;
-        Ok(report)
-    }
-
-    /// Fails if the total does not fit.
-    fn check(&self, limits: &Limits) -> Result<()> {
-        if self.total <= limits.max_memory {
-            return Ok(());
+        if report.total > limits.max_memory {
+            return Err(Error::OutOfMemory {
+                what: "the whole engine".to_owned(),
+                needed: report.total,
+                limit_name: "the memory of this device that may be used".to_owned(),
+                limit: limits.max_memory,
+                cure: (table.cure)(),
+            });
         }
-        Err(Error::OutOfMemory {
-            what: "the whole engine".to_owned(),
-            needed: self.total,
-            limit_name: "the memory of this device that may be used".to_owned(),
-            limit: limits.max_memory,
-            cure: format!("lower {}, use smaller images or use another device", Setting("max_gaussians")),
-        })
+        Ok(report)
     }
 }
 

@@ -1,4 +1,5 @@
-//! The planner: derives sizes, places in memory and barriers from capacities, a pass list and the limits of a device.
+//! The planner: derives sizes, places in memory and barriers from a table of buffers, counts of their
+//! elements, a pass list and the limits of a device.
 //!
 //! These are pure functions without Vulkan. A plan exists before anything is allocated, can be printed
 //! ([`Plan::report`]) and is tested without a GPU. The same input gives the same plan, byte for byte.
@@ -6,25 +7,19 @@
 mod arena;
 pub(crate) mod barrier;
 pub(crate) mod buffers;
-pub(crate) mod capacity;
 mod check;
 mod lifetime;
 pub(crate) mod memory;
 pub(crate) mod pass;
 mod report;
-mod stage;
-mod table;
 
 pub use crate::gpu::limits::PlanLimits as Limits;
 pub use barrier::Use;
 pub(crate) use barrier::{Barrier, Touch, Uses};
-pub use buffers::{Buf, BufferDecl, Class, TexelFormat};
-pub use capacity::{Capacity, Domain};
+pub use buffers::{Buf, BufferDecl, Class, Count, Domain, Table, TexelFormat};
 pub(crate) use lifetime::Life;
 pub use memory::MemoryReport;
-pub use pass::{Grid, PassDecl, PassList, Work};
-pub use stage::Stage;
-pub use table::TABLE;
+pub use pass::{Grid, PassDecl, PassList, Stage, Work};
 
 use crate::error::{Error, Result};
 use crate::shaders::BindingKind;
@@ -107,11 +102,11 @@ pub struct PlanItem {
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The table of buffers.
-    pub table: &'static [BufferDecl],
+    pub table: &'static Table,
     /// The list.
     pub list: PassList,
-    /// The capacities.
-    pub capacity: Capacity,
+    /// Numbers of elements, where domains look them up.
+    pub counts: Vec<u64>,
     /// The options.
     pub options: PlanOptions,
     /// Place of each buffer by row of the table; `None` for Step buffers outside of the list.
@@ -129,13 +124,13 @@ pub struct Plan {
 impl Plan {
     /// Plans a pass list.
     pub fn new(
-        table: &'static [BufferDecl],
-        capacity: &Capacity,
+        table: &'static Table,
+        counts: &[u64],
         list: &PassList,
         limits: &Limits,
         options: PlanOptions,
     ) -> Result<Self> {
-        let sizes = memory::sizes(table, capacity)?;
+        let sizes = memory::sizes(table, counts)?;
         check::list(table, &sizes, list, limits)?;
         let labels = list.work.iter().map(|work| label(table, work)).collect::<Vec<_>>();
         let uses = list.work.iter().map(|work| barrier::uses(work, &sizes)).collect::<Vec<_>>();
@@ -149,8 +144,8 @@ impl Plan {
         let items = labels.into_iter().zip(touches).zip(barriers);
         let items = items.map(|((label, touches), barrier)| PlanItem { label, touches, barrier }).collect();
         let descriptors = count_descriptors(list);
-        let (list, capacity) = (list.clone(), *capacity);
-        Ok(Self { table, list, capacity, options, placements, lives, step_pages, items, descriptors })
+        let (list, counts) = (list.clone(), counts.to_vec());
+        Ok(Self { table, list, counts, options, placements, lives, step_pages, items, descriptors })
     }
 
     /// Returns the place of a buffer; a scratch buffer must be part of the list.
@@ -188,11 +183,11 @@ impl Plan {
 }
 
 /// Name of a buffer, for messages; also for invalid rows.
-pub(crate) fn name(table: &'static [BufferDecl], buf: Buf) -> &'static str {
+pub(crate) fn name(table: &'static Table, buf: Buf) -> &'static str {
     table.get(buf.index()).map_or("(no such buffer)", |decl| decl.name)
 }
 
-fn label(table: &'static [BufferDecl], work: &Work) -> String {
+fn label(table: &'static Table, work: &Work) -> String {
     match work {
         Work::Pass(pass) => pass.label.clone(),
         Work::Fill { buf, .. } => format!("fill {}", name(table, *buf)),

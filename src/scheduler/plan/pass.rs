@@ -1,8 +1,16 @@
 //! Declarations of passes: shader, buffers, number of workgroups.
 
-use super::Stage;
 use super::buffers::Buf;
 use crate::shaders::ShaderDesc;
+
+/// A part of the work, for reports, which sum times by stage. The owner of the lists numbers and names its stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Stage {
+    /// Place in the order of execution.
+    pub order: u8,
+    /// Name for tables.
+    pub name: &'static str,
+}
 
 /// Number of workgroups of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +28,7 @@ pub struct PassDecl {
     pub label: String,
     /// Name in tables of times, shared by variants; by default the shader's stem.
     pub title: String,
-    /// Stage of the step; set when the pass enters a list.
+    /// Stage of the work; set when the pass enters a list.
     pub stage: Stage,
     /// The shader variant.
     pub shader: &'static ShaderDesc,
@@ -65,7 +73,7 @@ pub enum Work {
         buf: Buf,
         /// The word.
         word: u32,
-        /// Stage of the step.
+        /// Stage of the work.
         stage: Stage,
     },
     /// Copies the first bytes of a buffer to the start of another buffer.
@@ -76,7 +84,7 @@ pub enum Work {
         to: Buf,
         /// Number of bytes, a multiple of 4; 0 copies as many bytes as both buffers hold.
         bytes: u64,
-        /// Stage of the step.
+        /// Stage of the work.
         stage: Stage,
     },
 }

@@ -210,7 +210,7 @@ impl Fixture {
 
     /// Sorted pairs of the device: keys, and positions before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
-        let virtual_tiles = self.engine.raw().capacity().virtual_tiles;
+        let virtual_tiles = self.engine.capacity().virtual_tiles;
         let bits = 64 - (virtual_tiles - 1).leading_zeros();
         let passes = bits.div_ceil(self.engine.shape().digit_bits);
         let (keys, values) = if passes.is_multiple_of(2) {

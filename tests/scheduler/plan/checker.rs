@@ -35,7 +35,7 @@ pub fn check_places(plan: &Plan, limits: &Limits) {
             assert!(decl.class == Class::Step && users.is_empty(), "{} has no place", decl.name);
             continue;
         };
-        let elements = plan.capacity.count(decl.domain).max(1);
+        let elements = decl.count(&plan.counts).unwrap().max(1);
         assert_eq!(place.bytes, elements * u64::from(decl.element_bytes), "{}", decl.name);
         match place.page {
             Page::Own(own) => assert!(own == buf && place.offset == 0 && decl.class != Class::Step, "{}", decl.name),

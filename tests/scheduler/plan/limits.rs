@@ -5,7 +5,7 @@ use labelgs::Error;
 use labelgs::cli::support::exit_status::exit_status;
 
 fn plan_with(list: &PassList, limits: &Limits) -> labelgs::Result<Plan> {
-    Plan::new(table::TABLE, &capacity(), list, limits, PlanOptions::default())
+    Plan::new(table::TABLE, &counts(), list, limits, PlanOptions::default())
 }
 
 fn one(pass: PassDecl) -> PassList {
@@ -39,7 +39,7 @@ fn allocations_and_sums_are_checked() {
     let options = PlanOptions::default();
     let predict = |max_memory| {
         let limits = Limits { max_memory, ..Limits::default() };
-        MemoryReport::predict(table::TABLE, &capacity(), std::slice::from_ref(&list), &limits, options)
+        MemoryReport::predict(table::TABLE, &counts(), std::slice::from_ref(&list), &limits, options)
     };
     let total = predict(u64::MAX).unwrap().total;
     assert_eq!(predict(total).unwrap().total, total);
@@ -103,7 +103,7 @@ fn a_shader_block_must_fit_its_buffer() {
 
 #[test]
 fn a_scene_without_gaussians_can_be_planned() {
-    let none = Capacity::default();
+    let none = Capacity::default().counts();
     let plan = Plan::new(table::TABLE, &none, &small_list(), &Limits::default(), PlanOptions::default()).unwrap();
     assert_eq!(plan.placement(MODEL).unwrap().bytes, 16, "room for one element");
 }

@@ -5,35 +5,34 @@ mod limits;
 
 use checker::Random;
 use labelgs::pass;
+use labelgs::pass::buffers::{Capacity, TABLE};
 use labelgs::pass::{KernelShape, Supervision, Variant};
-use labelgs::scheduler::plan::{
-    Buf, Capacity, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan, PlanOptions, TABLE, Work,
-};
+use labelgs::scheduler::plan::{Buf, Grid, Limits, MemoryReport, Page, PassDecl, PassList, Plan, PlanOptions, Work};
 use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc};
 
 /// Buffers of the random lists: all classes, and sizes that do not divide each other.
 mod table {
-    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, TexelFormat};
-    labelgs::buffers! { consts;
-        MODEL "model": 16, Domain::Gaussians, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept.";
-        LABELS "labels": 4, Domain::Gaussians, Class::Model, None, "Kept.";
-        TOTALS "totals": 4, Domain::One, Class::Persistent, None, "Kept.";
-        UNIFORMS "uniforms": 4, Domain::Fixed(20), Class::PerFrame, None, "From the host.";
-        REPORT "report": 4, Domain::One, Class::Report, None, "To the host.";
-        A "a": 4, Domain::Pixels, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
-        B "b": 12, Domain::Pixels, Class::Step, None, "Scratch.";
-        C "c": 4, Domain::Fixed(100), Class::Step, None, "Scratch.";
-        D "d": 48, Domain::Instances, Class::Step, None, "Scratch.";
-        E "e": 4, Domain::Instances, Class::Step, None, "Scratch.";
-        F "f": 4, Domain::Instances, Class::Step, None, "Scratch.";
-        G "g": 16, Domain::Pixels, Class::Step, None, "Scratch.";
-        H "h": 4, Domain::One, Class::Step, None, "Scratch.";
+    use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, Table, TexelFormat};
+    labelgs::buffers! { || "lower something".to_owned(); consts;
+        MODEL "model": 16, Domain::GAUSSIANS, Class::Model, Some(TexelFormat::Rgba32Sfloat), "Kept.";
+        LABELS "labels": 4, Domain::GAUSSIANS, Class::Model, None, "Kept.";
+        TOTALS "totals": 4, Domain::ONE, Class::Persistent, None, "Kept.";
+        UNIFORMS "uniforms": 4, Domain::fixed(20), Class::PerFrame, None, "From the host.";
+        REPORT "report": 4, Domain::ONE, Class::Report, None, "To the host.";
+        A "a": 4, Domain::PIXELS, Class::Step, Some(TexelFormat::R32Uint), "Scratch.";
+        B "b": 12, Domain::PIXELS, Class::Step, None, "Scratch.";
+        C "c": 4, Domain::fixed(100), Class::Step, None, "Scratch.";
+        D "d": 48, Domain::INSTANCES, Class::Step, None, "Scratch.";
+        E "e": 4, Domain::INSTANCES, Class::Step, None, "Scratch.";
+        F "f": 4, Domain::INSTANCES, Class::Step, None, "Scratch.";
+        G "g": 16, Domain::PIXELS, Class::Step, None, "Scratch.";
+        H "h": 4, Domain::ONE, Class::Step, None, "Scratch.";
     }
 }
 use table::*;
 
-fn capacity() -> Capacity {
-    Capacity { gaussians: 1000, pixels: 777, instances: 1234, ..Capacity::default() }
+fn counts() -> Vec<u64> {
+    Capacity { gaussians: 1000, pixels: 777, instances: 1234, ..Capacity::default() }.counts()
 }
 
 /// A shader that does nothing, with these bindings; only its interface counts here.
@@ -80,9 +79,9 @@ fn small_list() -> PassList {
 #[test]
 fn the_text_of_a_small_plan_equals_the_stored_one() {
     let list = small_list();
-    let plan = Plan::new(table::TABLE, &capacity(), &list, &Limits::default(), PlanOptions::default()).unwrap();
+    let plan = Plan::new(table::TABLE, &counts(), &list, &Limits::default(), PlanOptions::default()).unwrap();
     let options = PlanOptions::default();
-    let memory = MemoryReport::predict(table::TABLE, &capacity(), &[list], &Limits::default(), options).unwrap();
+    let memory = MemoryReport::predict(table::TABLE, &counts(), &[list], &Limits::default(), options).unwrap();
     let text = format!("{}\n{}\n{}", memory.report(), plan.report(), plan.arena_report());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/plan.txt");
     if std::env::var("LABELGS_BLESS").is_ok_and(|name| name == "plan") {
@@ -139,7 +138,7 @@ fn the_lists_of_the_engine_have_no_race() {
     let (capacity, lists) = engine_lists(KernelShape::new(8, true));
     for list in &lists {
         for options in checker::all_options() {
-            let plan = Plan::new(TABLE, &capacity, list, &Limits::default(), options).unwrap();
+            let plan = Plan::new(TABLE, &capacity.counts(), list, &Limits::default(), options).unwrap();
             checker::check_places(&plan, &Limits::default());
             assert_eq!(checker::first_race(&plan), None, "{}", plan.report());
         }
@@ -147,7 +146,7 @@ fn the_lists_of_the_engine_have_no_race() {
     let options = PlanOptions::default();
     // The list of objects one by one is for benchmarks; its scratch lives longer.
     let lists: Vec<PassList> = lists.into_iter().filter(|list| !list.name.contains("one by one")).collect();
-    let memory = MemoryReport::predict(TABLE, &capacity, &lists, &Limits::default(), options).unwrap();
+    let memory = MemoryReport::predict(TABLE, &capacity.counts(), &lists, &Limits::default(), options).unwrap();
     assert!(memory.step_pages.iter().sum::<u64>() * 3 < memory.step_unaliased * 2, "{}", memory.report());
 }
 
@@ -159,10 +158,10 @@ fn random_lists_have_places_without_overlap_and_barriers_without_gaps() {
         let list = Random::new(seed).list();
         for limits in [Limits::default(), small_pages] {
             for options in checker::all_options() {
-                let plan = Plan::new(table::TABLE, &capacity(), &list, &limits, options).unwrap();
+                let plan = Plan::new(table::TABLE, &counts(), &list, &limits, options).unwrap();
                 checker::check_places(&plan, &limits);
                 assert_eq!(checker::first_race(&plan), None, "{}", plan.report());
-                let again = Plan::new(table::TABLE, &capacity(), &list, &limits, options).unwrap();
+                let again = Plan::new(table::TABLE, &counts(), &list, &limits, options).unwrap();
                 assert_eq!(format!("{plan:?}"), format!("{again:?}"), "the same plan for the same input");
             }
         }
@@ -174,7 +173,7 @@ fn no_barrier_can_be_left_out() {
     let mut left_out = 0;
     for seed in 0..50 {
         let list = Random::new(seed).list();
-        let plan = Plan::new(table::TABLE, &capacity(), &list, &Limits::default(), PlanOptions::default()).unwrap();
+        let plan = Plan::new(table::TABLE, &counts(), &list, &Limits::default(), PlanOptions::default()).unwrap();
         for item in 0..plan.items.len() {
             let mut without = plan.clone();
             if without.items[item].barrier.take().is_some() {
@@ -194,7 +193,7 @@ fn independent_items_run_without_barriers() {
     }
     let plan = Plan::new(
         table::TABLE,
-        &capacity(),
+        &counts(),
         &list,
         &Limits::default(),
         PlanOptions { alias: false, ..PlanOptions::default() },

@@ -60,7 +60,7 @@ impl<'a> Bed<'a> {
 
     fn prepare(&mut self) -> Result<()> {
         let engine = &self.fixture.engine;
-        let default = pass::training_step(engine.shape(), engine.raw().capacity(), self.variant());
+        let default = pass::training_step(engine.shape(), engine.capacity(), self.variant());
         let lists = self.modes.iter().map(|(mode, kernels)| mode.list(&default, kernels));
         let lists = lists.collect::<Result<Vec<_>>>()?;
         self.stages = pass::stage::stages(&default).into_iter().map(|(stage, _)| stage).collect();

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Stages that no mode touches.
-const UNTOUCHED: [Stage; 4] = [Stage::Loss, Stage::Optimise, Stage::Labels, Stage::Report];
+const UNTOUCHED: [Stage; 4] = [Stage::LOSS, Stage::OPTIMISE, Stage::LABELS, Stage::REPORT];
 /// Decisions nearer than this to their threshold may go the other way in f32 (tests/pass/step.rs).
 const MARGIN: f64 = 2e-5;
 
@@ -121,7 +121,7 @@ fn result(
         name: mode.name,
         relative_median,
         relative_cpu,
-        stages: own[0].stages.keys().map(|stage| (stage.name(), ms(stage))).collect(),
+        stages: own[0].stages.keys().map(|stage| (stage.name, ms(stage))).collect(),
         instances: own[0].counters.instance_count,
         against_rules,
         against_no_cut_offs,

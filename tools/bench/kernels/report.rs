@@ -8,13 +8,13 @@ use labelgs::pass::Stage;
 
 /// Stages with a column of their own.
 const STAGES: [Stage; 7] = [
-    Stage::Project,
-    Stage::Sort,
-    Stage::Tile,
-    Stage::BlendForward,
-    Stage::BlendBackward,
-    Stage::Gather,
-    Stage::ProjectBackward,
+    Stage::PROJECT,
+    Stage::SORT,
+    Stage::TILE,
+    Stage::BLEND_FORWARD,
+    Stage::BLEND_BACKWARD,
+    Stage::GATHER,
+    Stage::PROJECT_BACKWARD,
 ];
 
 /// Legend of the columns, and the modes by number.
@@ -44,7 +44,7 @@ pub fn scene(scene: &SceneResult) {
         scene.load.unwrap_or(f64::NAN),
     );
     let mut times = vec![vec![String::new(), "passes".to_owned(), "CPU".to_owned()]];
-    times[0].extend(STAGES.map(|stage| format!("{} ms", stage.name())));
+    times[0].extend(STAGES.map(|stage| format!("{} ms", stage.name)));
     times[0].push("instances".to_owned());
     let names = ["C max", "C 99.9%", "C rms", "G max", "G 99.9%", "G norm"];
     let mut errors = vec![vec![String::new()]];
@@ -53,7 +53,7 @@ pub fn scene(scene: &SceneResult) {
     for mode in &scene.modes {
         let cpu = mode.relative_cpu.map_or("-".to_owned(), |cpu| format!("{cpu:.3}"));
         let mut row = vec![mode.name.to_owned(), format!("{:.3}", mode.relative_median), cpu];
-        row.extend(STAGES.map(|stage| format!("{:.2}", mode.stages.get(stage.name()).unwrap_or(&0.0))));
+        row.extend(STAGES.map(|stage| format!("{:.2}", mode.stages.get(stage.name).unwrap_or(&0.0))));
         row.push(mode.instances.to_string());
         times.push(row);
         let open = numbers(&mode.against_no_cut_offs);

@@ -3,7 +3,7 @@
 use crate::compiler::shader;
 use labelgs::Result;
 use labelgs::gpu::Gpu;
-use labelgs::scheduler::plan::{Buf, BufferDecl, Capacity, Class, Domain, Grid, PassDecl, PassList, TexelFormat};
+use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, Grid, PassDecl, PassList, Table, TexelFormat};
 use labelgs::scheduler::{Scheduler, SchedulerOptions};
 use serde::Serialize;
 use std::sync::Arc;
@@ -46,15 +46,16 @@ pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
     let row = |name, elements| BufferDecl {
         name,
         element_bytes: 16,
-        domain: Domain::Fixed(elements),
+        domain: Domain::fixed(elements),
         class: Class::Persistent,
         texel: Some(TexelFormat::Rgba32Sfloat),
         doc: "A benchmark's.",
     };
-    let table = Box::leak(Box::new([row("from", vecs), row("to", vecs)]));
+    let rows = Box::leak(Box::new([row("from", vecs), row("to", vecs)]));
+    let table = Box::leak(Box::new(Table { rows, cure: || "use another device".to_owned() }));
     let (from, to) = (Buf(0), Buf(1));
     let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
-    let mut sched = Scheduler::new(Arc::clone(gpu), table, Capacity::default(), options)?;
+    let mut sched = Scheduler::new(Arc::clone(gpu), table, Vec::new(), options)?;
     let arithmetic = shader("arithmetic", include_str!("arithmetic.comp"), texel)?;
     let mut seconds = |operation: Operation, rounds: u32| {
         let mut list = PassList::new("arithmetic");

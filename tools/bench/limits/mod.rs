@@ -52,46 +52,46 @@ fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
     let vec4 = 16.0;
     match stage {
         // Means and scales of all; four planes in, three records out of the visible.
-        Stage::Project => Need {
+        Stage::PROJECT => Need {
             operations: 40.0 * s.gaussians + 150.0 * s.splats,
             bytes: (2.0 * vec4 + 8.0) * s.gaussians + (7.0 * vec4 + 8.0) * s.splats,
             ..Need::default()
         },
         // A pass reads the keys twice and keys and values once, and writes both.
-        Stage::Sort => {
+        Stage::SORT => {
             Need { bytes: 20.0 * (passes(32) * s.splats + passes(tile_bits) * s.instances), ..Need::default() }
         }
-        Stage::Tile => Need {
+        Stage::TILE => Need {
             operations: 35.0 * s.instances,
             bytes: (3.0 * vec4 + 8.0) * s.splats + 8.0 * s.instances,
             ..Need::default()
         },
         // Exponent 6, weight and transmittance 3, colour 6 (method of 3DGS in base 2).
-        Stage::BlendForward => Need {
+        Stage::BLEND_FORWARD => Need {
             operations: 15.0 * s.pairs,
             exp2: s.pairs,
             bytes: (3.0 * vec4 + 8.0) * s.instances + 20.0 * s.pixels,
             ..Need::default()
         },
         // Exponent 6, transmittance 1, light 6, gradient of alpha 4, three moments 5, colour 6.
-        Stage::BlendBackward => Need {
+        Stage::BLEND_BACKWARD => Need {
             operations: 28.0 * s.pairs,
             exp2: s.pairs,
             divisions: s.pairs,
             bytes: (6.0 * vec4 + 8.0) * s.instances + 52.0 * s.pixels,
         },
         // Two windows of 11 taps along both axes: over four moments and over three derivatives, three channels.
-        Stage::Loss => Need {
+        Stage::LOSS => Need {
             operations: s.pixels * 3.0 * (2.0 * 2.0 * 11.0 * (4.0 + 3.0) + 30.0),
             bytes: 2.0 * (vec4 + 4.0) * s.pixels + 3.0 * 3.0 * 2.0 * vec4 * s.pixels + vec4 * s.pixels,
             ..Need::default()
         },
-        Stage::Gather => Need { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Need::default() },
-        Stage::ProjectBackward => {
+        Stage::GATHER => Need { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Need::default() },
+        Stage::PROJECT_BACKWARD => {
             Need { operations: 400.0 * s.splats, bytes: 11.0 * vec4 * s.splats, ..Need::default() }
         }
         // Four planes of parameters with two moments, read and written, and the gradients of the visible.
-        Stage::Optimise => Need {
+        Stage::OPTIMISE => Need {
             operations: 16.0 * 12.0 * s.gaussians,
             bytes: 4.0 * 6.0 * vec4 * s.gaussians + 4.0 * vec4 * s.splats,
             ..Need::default()
@@ -150,13 +150,8 @@ pub fn run(common: &Common) -> Result<()> {
     for (stage, times) in &pace.stages {
         let (ms, limit) = (median(times.iter().copied()), need(*stage, &step, shape.digit_bits).seconds(&c) * 1e3);
         (all, limits) = (all + ms, limits + limit);
-        found.push(json!({ "stage": stage.name(), "ms": ms, "limit_ms": limit }));
-        rows.push(vec![
-            stage.name().to_owned(),
-            format!("{ms:.2}"),
-            format!("{limit:.2}"),
-            format!("{:.2}", limit / ms),
-        ]);
+        found.push(json!({ "stage": stage.name, "ms": ms, "limit_ms": limit }));
+        rows.push(vec![stage.name.to_owned(), format!("{ms:.2}"), format!("{limit:.2}"), format!("{:.2}", limit / ms)]);
     }
     let dispatches = pace.items as f64 * c.dispatch * 1e3;
     rows.push(vec![format!("{} dispatches", pace.items), String::new(), format!("{dispatches:.2}"), String::new()]);

@@ -193,8 +193,8 @@ impl Profile {
             contributing_share: weighted / (counted.iter().map(walked_splats).sum::<f64>() * pixels),
             balance_of_halves: spread(reports.iter().map(balance)).mean,
             ns_per_pair: PerPair {
-                blend_forward: per_pair(Stage::BlendForward),
-                blend_backward: per_pair(Stage::BlendBackward),
+                blend_forward: per_pair(Stage::BLEND_FORWARD),
+                blend_backward: per_pair(Stage::BLEND_BACKWARD),
             },
             steps,
         }
@@ -259,7 +259,7 @@ fn step_json(report: &StepReport, times: Option<&StepTimes>, pixels: f64) -> Val
     let counters = &report.report.counters;
     let mut stages: HashMap<&str, f64> = HashMap::new();
     for (stage, _, ns) in times.iter().flat_map(|times| &times.items) {
-        *stages.entry(stage.name()).or_default() += ms(*ns);
+        *stages.entry(stage.name).or_default() += ms(*ns);
     }
     json!({
         "step": report.step,
@@ -305,7 +305,7 @@ fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<Row> {
     for times in times {
         let items = times.items.iter().map(|(stage, name, ns)| {
             let name = label(name);
-            let key = format!("{}: {name}", stage.name());
+            let key = format!("{}: {name}", stage.name);
             named.entry(key.clone()).or_insert_with(|| (*stage, name.to_owned()));
             (key, *ns)
         });
@@ -314,7 +314,7 @@ fn rows(times: &[StepTimes], label: impl Fn(&str) -> &str) -> Vec<Row> {
     let rows = profiler.rows().into_iter().filter_map(|row| {
         let (stage, name) = named.get(&row.label)?.clone();
         let (median_ms, p90_ms) = (ms(row.median), ms(row.p90));
-        Some((stage, Row { stage: stage.name(), name, items: row.items, median_ms, p90_ms, share: row.share }))
+        Some((stage, Row { stage: stage.name, name, items: row.items, median_ms, p90_ms, share: row.share }))
     });
     let mut rows: Vec<(Stage, Row)> = rows.collect();
     rows.sort_by_key(|(stage, _)| *stage);

@@ -1,0 +1,156 @@
+//! Domains (the things that buffers count) and capacities (their maximum numbers): one table, with a row per domain.
+
+use crate::scheduler::plan::{Count, Domain};
+
+/// Cures by the cause of a domain's size, given the number that fits and the domain's name.
+pub(super) mod cures {
+    use crate::error::Setting;
+
+    fn at_most(fits: u64, name: &str, settings: &[&'static str]) -> String {
+        let settings: Vec<String> = settings.iter().map(|&field| Setting(field).to_string()).collect();
+        let others = if settings.len() > 1 { "," } else { "" };
+        format!("at most {fits} {name} fit; lower {}{others} or use another device", settings.join(" or "))
+    }
+
+    pub(super) fn model(fits: u64, _: &str) -> String {
+        format!("lower {} to {fits} or use another device", Setting("max_gaussians"))
+    }
+
+    pub(super) fn votes(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_gaussians"])
+    }
+
+    pub(super) fn pairs(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_gaussians", "max_resolution"])
+    }
+
+    pub(super) fn image(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["max_resolution"])
+    }
+
+    pub(super) fn layers(fits: u64, name: &str) -> String {
+        at_most(fits, name, &["label_samples"])
+    }
+
+    /// Advice if all buffers together do not fit.
+    pub(in crate::pass::buffers) fn whole() -> String {
+        format!("lower {}, use smaller images or use another device", Setting("max_gaussians"))
+    }
+
+    pub(super) fn none(_: u64, _: &str) -> String {
+        "use another device".to_owned()
+    }
+}
+
+/// Declares the domains, and the capacities that count them.
+///
+/// Each row is `DOMAIN field: "name", cure, "doc";`, with `optional` at its end if plans do not show it without elements.
+/// The rows after `..` are capacities without a buffer.
+macro_rules! domains {
+    ($($row:ident $field:ident: $name:literal, $cure:expr, $doc:literal $(, $optional:ident)?;)*
+        .. $($other:ident: $other_doc:literal;)*) => {
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
+        enum Place { $($row),* }
+
+        impl Domain {
+            $(#[doc = $doc] pub const $row: Self = Self {
+                count: Count::At(Place::$row as usize),
+                cure: |fits| $cure(fits, $name),
+                is_optional: !stringify!($($optional)?).is_empty(),
+            };)*
+        }
+
+        /// Maximum number of each domain; decides the size of every buffer.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct Capacity {
+            $(#[doc = $doc] pub $field: u64,)*
+            $(#[doc = $other_doc] pub $other: u64,)*
+        }
+
+        impl Capacity {
+            /// The numbers of elements, for plans.
+            pub fn counts(&self) -> Vec<u64> {
+                vec![$(self.$field),*]
+            }
+        }
+    };
+}
+
+domains! {
+    GAUSSIANS gaussians: "gaussians", cures::model,
+        "Rows of the model; also the maximum number of visible splats.";
+    TRAINED trained: "trained", cures::model,
+        "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
+    LABELLED labelled: "labelled", cures::model,
+        "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
+    INSTANCES instances: "instances", cures::pairs,
+        "(splat, tile) pairs.";
+    TRAINED_INSTANCES trained_instances: "trained instances", cures::pairs,
+        "Pairs with a gradient record: equal to Instances, or 0 without training.";
+    VIRTUAL_TILES virtual_tiles: "virtual tiles", cures::image,
+        "Tiles of all layers: the scene and each sampled object.";
+    LAYER_TILES layer_tiles: "layer tiles", cures::layers,
+        "Tiles of object layers with at least one splat.";
+    LAYER_PIXELS layer_pixels: "layer pixels", cures::layers,
+        "Pixels of the layer tiles.";
+    PIXELS pixels: "pixels", cures::image,
+        "Pixels of one image.";
+    LABELLED_PIXELS labelled_pixels: "labelled pixels", cures::image,
+        "Pixels with labels: equal to Pixels, or 0 in a scene without masks.";
+    LABELLED_TILES labelled_tiles: "labelled tiles", cures::image,
+        "Tiles of one image, or 0 in a scene without masks.";
+    KNOWN_DEPTHS known_depths: "known depths", cures::image,
+        "Pixels with room for a known depth: equal to Pixels, or 0 in a training without them.";
+    LABEL_TABLES label_tables: "label tables", cures::image,
+        "Tiles times walks for the label map, or 0 in a scene without masks.";
+    LABELS labels: "labels", cures::layers,
+        "Label ids, including 0.";
+    VOTE_COLUMNS vote_columns: "vote columns", cures::votes,
+        "Labels that a sweep of votes counts at once.";
+    VOTE_CELLS vote_cells: "vote cells", cures::votes,
+        "Gaussians times vote columns.";
+    LAYERS layers: "layers", cures::layers,
+        "Layers, including the scene.";
+    OCCLUDER_WORDS occluder_words: "occluder words", cures::layers,
+        "Words of occluder bits of all layers.";
+    SORT_CELLS sort_cells: "sort cells", cures::pairs,
+        "Cells of the histogram of the sort.";
+    SORT_TOTALS sort_totals: "sort totals", cures::pairs,
+        "Cells of the totals of the sort.";
+    SCAN_LANES scan_lanes: "scan lanes", cures::pairs,
+        "Lanes of the scan.";
+    LOSS_PARTIALS loss_partials: "loss partials", cures::image,
+        "Partial sums of the loss.";
+    SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,
+        "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
+    SHARED_ROWS shared_rows: "shared rows", cures::none,
+        "Rows of four shared parameters, or 0 without any.", optional;
+    .. sort_lanes: "Lanes of the sort.";
+    segments: "Maximum number of dispatches for one walk of a tile's list.";
+}
+
+impl Capacity {
+    /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, and at least
+    /// 1.1 times `needed`, so that slow growth does not overflow at every step.
+    pub fn grown(current: u64, needed: u64) -> u64 {
+        let half_again = current.saturating_add(current / 2);
+        let tenth_more = needed.saturating_add(needed.div_ceil(10));
+        half_again.max(tenth_more)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Capacity, Count, Domain};
+
+    #[test]
+    fn a_domain_finds_its_number_among_the_counts() {
+        let capacity = Capacity { gaussians: 7, layer_tiles: 5, shared_rows: 3, ..Capacity::default() };
+        let counts = capacity.counts();
+        for (domain, expected) in [(Domain::GAUSSIANS, 7), (Domain::LAYER_TILES, 5), (Domain::SHARED_ROWS, 3)] {
+            assert!(matches!(domain.count, Count::At(place) if counts[place] == expected), "{domain:?} in {counts:?}");
+        }
+        assert!(Domain::SHARED_ROWS.is_optional && !Domain::GAUSSIANS.is_optional);
+        assert_eq!((Domain::LAYERS.cure)(5), "at most 5 layers fit; lower `label_samples` or use another device");
+    }
+}
