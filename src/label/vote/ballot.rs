@@ -35,6 +35,11 @@ impl<'a> Voter<'a> {
     pub fn of(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
         Self { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
     }
+
+    /// Makes voters of the views that have masks.
+    pub fn of_views(views: &[&'a View]) -> Vec<Self> {
+        views.iter().filter_map(|view| Some(Self::of(view, view.mask.as_ref()?))).collect()
+    }
 }
 
 /// The options of a sweep.
