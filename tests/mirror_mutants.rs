@@ -6,11 +6,11 @@ use crate::reference::densify::{densify, is_near, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, label_map, lift};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::relocate::{explored, relocate};
-use crate::reference::rules::{Family, mutants};
 use crate::reference::smooth::smooth;
 use crate::reference::step::{splats_of, step};
 use crate::reference::{Model, Row, Rules};
 use crate::support::compare::{Tolerance, close};
+use crate::support::mutants::{Family, mutants};
 use crate::support::scenes::{Scene, Shape, population, scene};
 use labelgs::verify::selftest::model::large;
 

@@ -1,10 +1,10 @@
 //! The fixture of the self-test on the shared device; errors panic.
 
-use crate::reference::rules::mutants;
 use crate::reference::splat::{Splat, SplatGradient};
 use crate::reference::{Row, Rules};
 use crate::support::compare::{Verdict, check};
 use crate::support::device::Turn;
+use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
