@@ -14,7 +14,7 @@ use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENTS, PARAMETERS, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
