@@ -123,7 +123,7 @@ fn regions(scores: &Scores) -> String {
             "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
             number(mean.psnr_seen, 2),
             number(mean.psnr_seen_corrected, 2),
-            100.0 * mean.seen_share,
+            100.0 * mean.seen_share.unwrap_or(0.0),
             number(mean.psnr_unseen, 2)
         );
         if mean.psnr_objects.is_some() {
