@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::scene::{LabelMap, Photo};
 
 /// Opacity above which an object rendered alone covers a pixel.
-pub(crate) const COVERED: f32 = 0.5;
+const COVERED: f32 = 0.5;
 /// Channel value above which an object on black covers a pixel, in the rule of the paper.
 pub(crate) const PAPER_COVERED: f32 = 0.01;
 

@@ -4,6 +4,7 @@ use crate::eval::boundary::boundary_iou;
 use crate::eval::metrics::{Overlap, PAPER_COVERED, covered, mean, paper_score, psnr, scores};
 use crate::eval::ssim::ssim;
 use crate::eval::ssim8::{ssim8, to_bytes};
+use crate::render::Rendered;
 use crate::scene::Photo;
 use crate::scenes::truth::TruthMask;
 
@@ -42,20 +43,11 @@ impl PairScores {
     }
 }
 
-/// An object rendered alone on black.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Drawn {
-    /// r, g, b, not clamped, row-major.
-    pub rgb: Vec<[f32; 3]>,
-    /// Opacity, row-major, 0 to 1.
-    pub alpha: Vec<f32>,
-}
-
 /// Scores a picture against a mask and a photo of the same size. Invalid pixels of the photo do not count. `compat`
 /// uses the PSNR and SSIM of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels,
 /// SSIM of 8-bit pictures with a uniform window.
 pub(crate) fn score(
-    drawn: &Drawn,
+    drawn: &Rendered,
     truth: &TruthMask,
     photo: &Photo,
     compat: bool,

@@ -9,10 +9,10 @@ use crate::cli::support::scene::{near_plane, open_gpu, open_scene, render_engine
 use crate::cli::support::scoring::{ScoreArgs, Watcher};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::bench::Bench;
-use crate::eval::protocol::paint::EnginePainter;
 use crate::eval::protocol::run::{picture_count, run as run_bench};
 use crate::eval::protocol::score::Distance;
 use crate::eval::protocol::{Ask, By, Layout, Prompt, Protocol};
+use crate::eval::subject::Whole;
 use crate::files::label_table::LabelTable;
 use crate::files::read;
 use crate::scene::{Dataset, UNLABELLED, View};
@@ -88,6 +88,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let bench = Bench {
         protocol,
         compat: args.compat,
+        near: near_plane(&args.model, args.scoring.near)?,
         views: &views,
         test: &test,
         names: names.as_ref(),
@@ -99,14 +100,9 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let mut watcher = Watcher::new(picture_count(&layout), args.scoring.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = render_engine(open_gpu(context)?, &model, sizes, args.scoring.memory.options())?;
-    let mut painter = EnginePainter::new(
-        &mut engine,
-        &model,
-        near_plane(&args.model, args.scoring.near)?,
-        args.scoring.sure.min_confidence,
-        args.compat,
-    );
-    let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
+    let min_confidence = args.scoring.sure.min_confidence;
+    let mut whole = Whole { engine: &mut engine, model: &model, min_confidence };
+    let report = run_bench(&layout, &bench, &mut whole, &mut watcher)?;
     let table = table(&report);
     watcher.finish(&table)?;
     args.scoring.put_out(&report, &table, context)?;
