@@ -8,7 +8,7 @@ use super::compared::{Compared, Watch};
 use crate::edit::fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
+use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep};
 use crate::label::vote::model::{label_by_lift, objects_of};
 use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, Photo, View};
@@ -65,10 +65,10 @@ pub fn removals(
     let ballot = sweep(engine, &Voter::of_views(views), Sweep::new(options.near, 0))?;
     let mut objects = BTreeMap::new();
     for id in objects_of(views) {
-        let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let places = views.iter().map(|view| Place::new(id, view, truth).transpose());
         let places: Vec<Place> = places.flatten().collect::<Result<_>>()?;
         let id = u32::from(id);
+        let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
         let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
         let mut draw = |part: &Gaussians, tally: &mut Tally, what: &'static str, watch: &mut dyn Watch| {
@@ -116,14 +116,12 @@ pub fn removals(
 }
 
 /// Returns the share of the votes for a label that Gaussians of other labels have.
-fn weight_left(ballot: &Ballot, id: u16, labels: &[u32]) -> Option<f64> {
-    let column = ballot.labels.iter().position(|&label| label == id);
-    let of = |row: usize| ballot.row(row).iter().filter(|cell| Some(usize::from(cell.0)) == column);
-    let sum = |rows: &dyn Fn(usize) -> bool| -> f64 {
-        (0..ballot.len()).filter(|&row| rows(row)).flat_map(of).map(|&(_, votes)| weight(votes)).sum()
+fn weight_left(ballot: &Ballot, id: u32, labels: &[u32]) -> Option<f64> {
+    let sum = |rows: &dyn Fn(&usize) -> bool| -> f64 {
+        (0..ballot.len()).filter(rows).map(|row| ballot.weight_on(row, id)).sum()
     };
     let all = sum(&|_| true);
-    (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
+    (all > 0.0).then(|| sum(&|&row| labels[row] != id) / all)
 }
 
 /// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.

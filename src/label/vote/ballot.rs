@@ -99,6 +99,12 @@ impl Ballot {
         &self.cells[self.starts[row]..self.starts[row + 1]]
     }
 
+    /// Returns the weight of Gaussian `row` on a label, px.
+    pub fn weight_on(&self, row: usize, label: u32) -> f64 {
+        let on = |cell: &&(u16, u64)| u32::from(self.labels[usize::from(cell.0)]) == label;
+        self.row(row).iter().find(on).map_or(0.0, |&(_, votes)| weight(votes))
+    }
+
     /// Returns the weight of Gaussian `row` on all labels, and on other ones than its main one, px.
     pub fn spread(&self, row: usize) -> (f64, f64) {
         let votes = || self.row(row).iter().map(|&(_, votes)| votes);
