@@ -48,5 +48,5 @@ pub fn boundary_iou(
 ) -> Option<f64> {
     let reach = rim_width(width, height);
     let (found, truth) = (rim(found, width, height, reach), rim(truth, width, height, reach));
-    Overlap::count((0..found.len()).filter(|&index| counts(index)).map(|index| (found[index], truth[index]))).iou()
+    Overlap::over(&found, &truth, counts).iou()
 }

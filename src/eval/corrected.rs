@@ -3,7 +3,7 @@
 //! The best affine map of the picture's colours to the photo's, of all pixels of a view, as multinerf and nerfstudio
 //! score captures whose exposure changes. It forgives every error of that form, so it is no replacement for the PSNR.
 
-use super::metrics::{byte_value, mean, psnr_of};
+use super::metrics::{clamped, colour_of, mean, psnr_of, square};
 use crate::scene::Photo;
 use glam::{DMat4, DVec4};
 
@@ -16,9 +16,9 @@ pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo, counts: impl Fn
     let pairs = || {
         let pixels = render.iter().zip(&photo.rgba).enumerate();
         let valid = pixels.filter(|&(index, (_, texel))| texel[3] > 0 && counts(index));
-        valid.map(|(_, (colour, &[r, g, b, _]))| {
-            let [x, y, z] = colour.map(|value| f64::from(value.clamp(0.0, 1.0)));
-            (DVec4::new(x, y, z, 1.0), [r, g, b].map(byte_value))
+        valid.map(|(_, (&colour, &texel))| {
+            let [x, y, z] = clamped(colour);
+            (DVec4::new(x, y, z, 1.0), colour_of(texel))
         })
     };
     let mut products = DMat4::from_diagonal(DVec4::splat(RIDGE));
@@ -32,10 +32,8 @@ pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo, counts: impl Fn
     }
     let inverse = products.inverse();
     let maps = sides.map(|side| inverse * side);
-    let square = |(colour, truth): (DVec4, [f64; 3])| {
-        (0..3).map(|c| (maps[c].dot(colour).clamp(0.0, 1.0) - truth[c]).powi(2)).sum::<f64>() / 3.0
-    };
-    mean(pairs().map(square)).map(psnr_of)
+    let corrected = |colour: DVec4| maps.map(|map| map.dot(colour).clamp(0.0, 1.0));
+    mean(pairs().map(|(colour, truth)| square(corrected(colour), truth))).map(psnr_of)
 }
 
 #[cfg(test)]

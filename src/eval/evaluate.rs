@@ -1,16 +1,16 @@
 //! Scores a model on posed photos: renders every view, then every object alone.
 
 use super::compared::{Compared, Watch};
-use super::metrics::COVERED;
+use super::metrics::covered;
 use super::protocol::score::Distance;
 use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
-use super::subject::{Subject, Whole};
-use crate::engine::Engine;
+use super::subject::Subject;
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
+use crate::label::vote::model::objects_of;
 use crate::render::{Parts, RenderOptions, Rendered};
-use crate::scene::{Gaussians, LabelMap, Photo, Pixels, View};
+use crate::scene::{LabelMap, Photo, View};
 use std::collections::BTreeMap;
 
 /// The options of the renders.
@@ -18,8 +18,6 @@ use std::collections::BTreeMap;
 pub struct Rendering<'a> {
     /// Options for whole scenes; objects are rendered on black.
     pub options: RenderOptions,
-    /// Least label confidence of Gaussians in objects rendered alone, 0 to 1.
-    pub min_confidence: f32,
     /// Training views, for scores by region; none leaves them out.
     pub train: &'a [View],
     /// The label of a pixel is that of its main Gaussian, as in LabelGS, instead of the one with the largest sum of
@@ -27,6 +25,13 @@ pub struct Rendering<'a> {
     pub by_main: bool,
     /// A perceptual distance of each view to its photo, such as LPIPS.
     pub lpips: Option<&'a dyn Distance>,
+}
+
+impl Rendering<'_> {
+    /// Makes the options of renders without scores by region and LPIPS.
+    pub fn new(options: RenderOptions) -> Self {
+        Self { options, train: &[], by_main: false, lpips: None }
+    }
 }
 
 /// Ground truth of objects including their hidden parts.
@@ -46,22 +51,8 @@ pub trait AmodalTruth {
 /// No ground truth beyond the masks.
 impl AmodalTruth for () {}
 
-/// Scores `model` on `views`, which have photos; scores objects too in views with masks. Replaces the model in the
-/// engine; `watch` receives each picture.
+/// Scores a model on `views`, which have photos; scores objects too in views with masks. `watch` receives each picture.
 pub fn evaluate(
-    engine: &mut Engine,
-    model: &Gaussians,
-    views: &[&View],
-    how: Rendering,
-    wholes: &dyn AmodalTruth,
-    watch: &mut dyn Watch,
-) -> Result<Scores> {
-    let mut whole = Whole { engine, model, min_confidence: how.min_confidence };
-    evaluate_subject(&mut whole, views, how, wholes, watch)
-}
-
-/// Like [`evaluate`], of a model that need not fit into the memory of the device.
-pub(crate) fn evaluate_subject(
     subject: &mut dyn Subject,
     views: &[&View],
     how: Rendering,
@@ -80,8 +71,8 @@ pub(crate) fn evaluate_subject(
         hidden.push(occluded);
     }
     let of_object = RenderOptions { background: [0.0; 3], parts: Parts::COLOUR, ..how.options };
-    for id in objects(views) {
-        let is_there = subject.show(Some(id))?;
+    for id in objects_of(views).into_iter().map(u32::from) {
+        let is_there = subject.show(Some(&[id]))?;
         for (index, view) in views.iter().enumerate() {
             let rendered = if is_there { Some(subject.render(&view.camera, &of_object)?) } else { None };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
@@ -158,7 +149,7 @@ fn show(
     let pixels = outline.len();
     let black = vec![[0.0; 3]; pixels];
     let (rgb, found) = match render {
-        Some(render) => (render.colour, render.alpha.iter().map(|&alpha| alpha > COVERED).collect()),
+        Some(render) => (render.colour, covered(render.alpha)),
         None => (&black[..], vec![false; pixels]),
     };
     watch.see(&Compared {
@@ -172,12 +163,7 @@ fn show(
 /// Returns the number of pictures that [`evaluate`] renders.
 #[cfg(feature = "cli")]
 pub(crate) fn picture_count(views: &[&View]) -> u64 {
-    (views.len() * (1 + objects(views).len())) as u64
-}
-
-fn objects(views: &[&View]) -> Vec<u32> {
-    let ids = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).map(u32::from);
-    ids.collect::<std::collections::BTreeSet<u32>>().into_iter().collect()
+    (views.len() * (1 + objects_of(views).len())) as u64
 }
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {

@@ -1,16 +1,37 @@
 //! Scores of one image against another. Colours are r, g, b in 0 to 1. Sums are in f64.
 
+use crate::error::{Error, Result};
 use crate::scene::{LabelMap, Photo};
 
 /// Opacity above which an object rendered alone covers a pixel.
-pub(crate) const COVERED: f32 = 0.5;
+const COVERED: f32 = 0.5;
 /// Channel value above which an object on black covers a pixel, in the rule of the paper.
 pub(crate) const PAPER_COVERED: f32 = 0.01;
+
+/// Returns the pixels that an object rendered alone covers.
+pub(crate) fn covered(alpha: &[f32]) -> Vec<bool> {
+    alpha.iter().map(|&alpha| alpha > COVERED).collect()
+}
 
 /// Returns the value of a photo's byte in 0 to 1, rounded to f32 as on the device, so that an exact render has no
 /// error.
 pub(crate) fn byte_value(byte: u8) -> f64 {
     f64::from(f32::from(byte) / 255.0)
+}
+
+/// Returns a rendered colour, clamped to 0 to 1.
+pub(crate) fn clamped(colour: [f32; 3]) -> [f64; 3] {
+    colour.map(|value| f64::from(value.clamp(0.0, 1.0)))
+}
+
+/// Returns the colour of a pixel of a photo.
+pub(crate) fn colour_of([r, g, b, _]: [u8; 4]) -> [f64; 3] {
+    [r, g, b].map(byte_value)
+}
+
+/// Returns the mean squared difference of two colours.
+pub(crate) fn square(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|channel| (a[channel] - b[channel]).powi(2)).sum::<f64>() / 3.0
 }
 
 /// Returns the peak signal-to-noise ratio for a mean squared error, dB; infinite for equal images.
@@ -58,6 +79,11 @@ impl Overlap {
         })
     }
 
+    /// Counts the pixels that count.
+    pub(crate) fn over(found: &[bool], truth: &[bool], counts: impl Fn(usize) -> bool) -> Self {
+        Self::count((0..truth.len()).filter(|&index| counts(index)).map(|index| (found[index], truth[index])))
+    }
+
     /// Returns the intersection over union; `None` if both masks are empty.
     pub fn iou(&self) -> Option<f64> {
         (self.either > 0).then(|| self.both as f64 / self.either as f64)
@@ -98,4 +124,43 @@ pub(crate) fn label_iou<T: Copy + Into<u32>>(found: &[T], truth: &LabelMap) -> O
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)
+}
+
+/// Declares scores by name; `None` if there was nothing to compare.
+macro_rules! scores {
+    ($(#[$of:meta])* $name:ident { $($(#[$doc:meta])* $field:ident,)+ }) => {
+        $(#[$of])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+        pub struct $name {
+            $($(#[$doc])* pub $field: Option<f64>,)+
+        }
+
+        impl $name {
+            /// Returns the mean of each score over its values.
+            pub fn mean<'a>(of: impl Iterator<Item = &'a Self> + Clone) -> Self {
+                Self { $($field: $crate::eval::metrics::mean(of.clone().filter_map(|scores| scores.$field)),)+ }
+            }
+
+            /// Returns the scores with their names.
+            pub fn named(&self) -> Vec<(&'static str, Option<f64>)> {
+                vec![$((stringify!($field), self.$field),)+]
+            }
+        }
+    };
+}
+pub(crate) use scores;
+
+/// Compares the means of a model with the bounds of `--min-psnr` and `--min-iou`.
+pub(crate) fn check_means(found: [Option<f64>; 2], bounds: [Option<f64>; 2]) -> Result<()> {
+    for (((what, unit), found), least) in [("PSNR", " dB"), ("IoU", "")].into_iter().zip(found).zip(bounds) {
+        let Some(least) = least else { continue };
+        let Some(found) = found else {
+            return Err(Error::Check(format!("there is no {what} to compare with {least}{unit}")));
+        };
+        // A NaN fails too.
+        if !(found >= least) {
+            return Err(Error::Check(format!("mean {what} is {found:.4}{unit}, less than {least}{unit}")));
+        }
+    }
+    Ok(())
 }

@@ -20,7 +20,7 @@ pub mod scores;
 pub mod specks;
 pub mod ssim;
 pub mod ssim8;
-pub(crate) mod subject;
+pub mod subject;
 
 pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};
@@ -32,3 +32,4 @@ pub use regions::RegionScores;
 pub use removal::{HoleScores, ObjectRemoval, RemovalScores, RemovalTruth, RuleScores, removals, sights};
 pub use scores::{MeanScores, ObjectScores, Scores, ViewScores};
 pub use ssim::ssim;
+pub use subject::{Subject, Whole};

@@ -1,6 +1,6 @@
 //! Scores by place in the world, such as those of each block of a scene and of the seams between them.
 
-use super::metrics::{byte_value, psnr_of};
+use super::metrics::{clamped, colour_of, psnr_of, square};
 use super::regions::world_points;
 use crate::error::Result;
 use crate::render::{Parts, RenderOptions, Rendered};
@@ -41,9 +41,8 @@ pub fn by_place(
         let rendered = draw(&view.camera, &RenderOptions { parts: Parts::DEPTH, ..options })?;
         let (photo, world) = (view.photo()?, world_points(&view.camera, &rendered.mean_depth()?));
         let pixels = world.iter().zip(&rendered.rgb).zip(&photo.rgba).filter(|(_, pixel)| pixel[3] > 0);
-        for ((&world, render), pixel) in pixels {
-            let error = |c: usize| f64::from(render[c].clamp(0.0, 1.0)) - byte_value(pixel[c]);
-            let squared = (0..3).map(|c| error(c).powi(2)).sum::<f64>() / 3.0;
+        for ((&world, &render), &pixel) in pixels {
+            let squared = square(clamped(render), colour_of(pixel));
             for group in places.of(world) {
                 sums[group].0 += squared;
                 sums[group].1 += 1;

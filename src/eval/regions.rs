@@ -5,13 +5,12 @@
 use super::corrected::psnr_corrected;
 use super::subject::Subject;
 use crate::Result;
-use crate::eval::metrics::{mean, psnr_over};
+use crate::eval::metrics::{psnr_over, scores};
 use crate::render::{Parts, RenderOptions, Rendered};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
 use crate::scenes::shelf::Shelf;
 use glam::DVec3;
 use rayon::prelude::*;
-use serde::Serialize;
 
 /// Training views that have to see a pixel of a held-out view.
 const VIEWS_MIN: usize = 3;
@@ -22,23 +21,24 @@ const BEYOND: f64 = 1e3;
 /// Pixels within this distance of a contour of the mask, px, are its contour.
 const CONTOUR: u32 = 2;
 
-/// PSNR by region, dB; `None` for a region without pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct RegionScores {
-    /// Share of the pixels that at least three training views see, by the depth of the model.
-    pub seen_share: f64,
-    /// Over these pixels.
-    pub psnr_seen: Option<f64>,
-    /// Over the same pixels after a correction of their colours: neither exposure nor what no photo shows counts.
-    pub psnr_seen_corrected: Option<f64>,
-    /// Over all others.
-    pub psnr_unseen: Option<f64>,
-    /// Over the objects of the mask, without their contours.
-    pub psnr_objects: Option<f64>,
-    /// Within 2 px of the contours of the mask.
-    pub psnr_contours: Option<f64>,
-    /// Over the unlabelled rest.
-    pub psnr_rest: Option<f64>,
+scores! {
+    /// PSNR by region, dB; `None` for a region without pixels.
+    RegionScores {
+        /// Share of the pixels that at least three training views see, by the depth of the model.
+        seen_share,
+        /// Over these pixels.
+        psnr_seen,
+        /// Over the same pixels after a correction of their colours: neither exposure nor what no photo shows counts.
+        psnr_seen_corrected,
+        /// Over all others.
+        psnr_unseen,
+        /// Over the objects of the mask, without their contours.
+        psnr_objects,
+        /// Within 2 px of the contours of the mask.
+        psnr_contours,
+        /// Over the unlabelled rest.
+        psnr_rest,
+    }
 }
 
 impl RegionScores {
@@ -51,7 +51,7 @@ impl RegionScores {
             over(&|index| counts(mask.ids[index] != 0, near[index]))
         };
         Self {
-            seen_share: seen.iter().filter(|&&seen| seen).count() as f64 / seen.len().max(1) as f64,
+            seen_share: Some(seen.iter().filter(|&&seen| seen).count() as f64 / seen.len().max(1) as f64),
             psnr_seen: over(&|index| seen[index]),
             psnr_seen_corrected: psnr_corrected(rgb, photo, |index| seen[index]),
             psnr_unseen: over(&|index| !seen[index]),
@@ -59,20 +59,6 @@ impl RegionScores {
             psnr_contours: labelled(&|_, near| near),
             psnr_rest: labelled(&|object, near| !object && !near),
         }
-    }
-
-    /// Returns the means over views.
-    pub(super) fn mean<'a>(of: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
-        let over = |field: fn(&Self) -> Option<f64>| mean(of.clone().filter_map(field));
-        Some(Self {
-            seen_share: mean(of.clone().map(|scores| scores.seen_share))?,
-            psnr_seen: over(|scores| scores.psnr_seen),
-            psnr_seen_corrected: over(|scores| scores.psnr_seen_corrected),
-            psnr_unseen: over(|scores| scores.psnr_unseen),
-            psnr_objects: over(|scores| scores.psnr_objects),
-            psnr_contours: over(|scores| scores.psnr_contours),
-            psnr_rest: over(|scores| scores.psnr_rest),
-        })
     }
 }
 

@@ -5,7 +5,9 @@
 use super::boundary::boundary_iou;
 use super::corrected::psnr_corrected;
 use super::crop::Crop;
-use super::metrics::{COVERED, Overlap, byte_value, mean, paper_score, psnr, psnr_of};
+use super::metrics::{
+    Overlap, byte_value, check_means, clamped, covered, mean, paper_score, psnr, psnr_of, scores, square,
+};
 use super::places::PlaceScore;
 use super::regions::RegionScores;
 use super::removal::RemovalScores;
@@ -20,29 +22,30 @@ use std::collections::BTreeMap;
 /// 3 dB.
 const ODD: f64 = 6.0;
 
-/// Scores of one object, in one view or on average over views; `None` if there was nothing to compare.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct ObjectScores {
-    /// Intersection over union of the rendered label map and the mask of the view.
-    pub iou_map: Option<f64>,
-    /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline, or its mask in
-    /// the view if the outline is unknown.
-    pub iou_object: Option<f64>,
-    /// Intersection over union by the rule of the paper: any channel above 0.01 against the mask of the view.
-    pub paper_iou: Option<f64>,
-    /// PSNR of the object alone on black against photo times mask, by the rule of the paper, dB.
-    pub object_psnr: Option<f64>,
-    /// Boundary IoU of the rendered label map and the mask of the view.
-    pub boundary_iou: Option<f64>,
-    /// SSIM of the object alone on black against photo times mask, over the `Crop` around its mask, without the pixels
-    /// of occluders.
-    pub object_ssim: Option<f64>,
-    /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels where the
-    /// mask of the view shows another object.
-    pub iou_hidden: Option<f64>,
-    /// PSNR of the object alone on black against its ground truth without occluders, over the pixels of its whole
-    /// outline where the mask of the view does not show it, dB.
-    pub psnr_hidden: Option<f64>,
+scores! {
+    /// Scores of one object, in one view or on average over views; `None` if there was nothing to compare.
+    ObjectScores {
+        /// Intersection over union of the rendered label map and the mask of the view.
+        iou_map,
+        /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline, or its mask in
+        /// the view if the outline is unknown.
+        iou_object,
+        /// Intersection over union by the rule of the paper: any channel above 0.01 against the mask of the view.
+        paper_iou,
+        /// PSNR of the object alone on black against photo times mask, by the rule of the paper, dB.
+        object_psnr,
+        /// Boundary IoU of the rendered label map and the mask of the view.
+        boundary_iou,
+        /// SSIM of the object alone on black against photo times mask, over the `Crop` around its mask, without the pixels
+        /// of occluders.
+        object_ssim,
+        /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels where the
+        /// mask of the view shows another object.
+        iou_hidden,
+        /// PSNR of the object alone on black against its ground truth without occluders, over the pixels of its whole
+        /// outline where the mask of the view does not show it, dB.
+        psnr_hidden,
+    }
 }
 
 /// Scores of one view.
@@ -131,8 +134,7 @@ impl ViewScores {
             if let (Some(map), Some(mask)) = (map, mask) {
                 let of = |map: &LabelMap| map.ids.iter().map(|&found| found == id).collect::<Vec<bool>>();
                 let (found, truth) = (of(map), of(mask));
-                let pairs = (0..pixels).filter(|&index| valid(index)).map(|index| (found[index], truth[index]));
-                row.iou_map = Overlap::count(pairs).iou();
+                row.iou_map = Overlap::over(&found, &truth, valid).iou();
                 row.boundary_iou = boundary_iou(&found, &truth, (photo.width as usize, photo.height as usize), valid);
             }
             scores.objects.insert(u32::from(id), row);
@@ -153,9 +155,9 @@ impl ViewScores {
         let visible = truth.visible(id);
         let scores = self.objects.entry(id).or_default();
         let unknown = |index: usize| truth.whole.is_none() && truth.hidden.is_some_and(|hidden| hidden[index]);
+        let covered = covered(render.alpha);
         let overlap = |counts: &dyn Fn(usize) -> bool| {
-            let indices = (0..pixels).filter(|&index| photo.rgba[index][3] > 0 && counts(index));
-            Overlap::count(indices.map(|index| (render.alpha[index] > COVERED, outline[index]))).iou()
+            Overlap::over(&covered, &outline, |index| photo.rgba[index][3] > 0 && counts(index)).iou()
         };
         scores.iou_object = overlap(&|index| !unknown(index));
         if let (Some(_), Some(mask)) = (truth.whole, truth.mask) {
@@ -168,8 +170,8 @@ impl ViewScores {
         if let Some(visible) = visible {
             let paper = paper_score(render.colour, photo, &visible);
             (scores.paper_iou, scores.object_psnr) = (paper.iou, Some(paper.psnr));
-            let covered = |index: usize| unknown(index) || (outline[index] && !visible[index]);
-            scores.object_ssim = ssim_around(render.colour, photo, &visible, covered);
+            let left_out = |index: usize| unknown(index) || (outline[index] && !visible[index]);
+            scores.object_ssim = ssim_around(render.colour, photo, &visible, left_out);
         }
         Ok(())
     }
@@ -181,7 +183,7 @@ fn psnr_alone(render: &[[f32; 3]], truth: &[[u8; 4]], pixels: impl Iterator<Item
     let square = |index: usize| {
         let [r, g, b, opacity] = truth[index].map(byte_value);
         let truth = [r, g, b].map(|value| value * opacity);
-        (0..3).map(|c| (f64::from(render[index][c].clamp(0.0, 1.0)) - truth[c]).powi(2)).sum::<f64>() / 3.0
+        square(clamped(render[index]), truth)
     };
     mean(pixels.map(square)).map(psnr_of)
 }
@@ -255,7 +257,7 @@ impl Scores {
         for view in views.values() {
             view.objects.iter().for_each(|(&id, &scores)| by_object.entry(id).or_default().push(scores));
         }
-        let pairs: Vec<ObjectScores> = by_object.values().flatten().copied().collect();
+        let regions = views.values().filter_map(|view| view.regions.as_ref());
         Self {
             schema_version: 1,
             mean: MeanScores {
@@ -263,11 +265,11 @@ impl Scores {
                 psnr_corrected: mean(views.values().map(|view| view.psnr_corrected)),
                 ssim: mean(views.values().map(|view| view.ssim)),
                 lpips: mean(views.values().filter_map(|view| view.lpips)),
-                regions: RegionScores::mean(views.values().filter_map(|view| view.regions.as_ref())),
+                regions: regions.clone().next().map(|_| RegionScores::mean(regions)),
                 specks: mean(views.values().filter_map(|view| view.specks).map(|count| count as f64)),
-                objects: average(&pairs),
+                objects: ObjectScores::mean(by_object.values().flatten()),
             },
-            objects: by_object.iter().map(|(&id, scores)| (id, average(scores))).collect(),
+            objects: by_object.iter().map(|(&id, scores)| (id, ObjectScores::mean(scores.iter()))).collect(),
             views,
             refined_poses: false,
             removal: None,
@@ -298,31 +300,6 @@ impl Scores {
 
     /// Compares the mean PSNR and the mean IoU of the label map with the bounds of `--min-psnr` and `--min-iou`.
     pub fn check(&self, min_psnr: Option<f64>, min_iou: Option<f64>) -> Result<()> {
-        let rows = [("PSNR", self.mean.psnr, min_psnr, " dB"), ("IoU", self.mean.objects.iou_map, min_iou, "")];
-        for (what, found, least, unit) in rows {
-            let Some(least) = least else { continue };
-            let Some(found) = found else {
-                return Err(Error::Check(format!("there is no {what} to compare with {least}{unit}")));
-            };
-            // A NaN fails too.
-            if !matches!(found.partial_cmp(&least), Some(std::cmp::Ordering::Greater | std::cmp::Ordering::Equal)) {
-                return Err(Error::Check(format!("mean {what} is {found:.4}{unit}, less than {least}{unit}")));
-            }
-        }
-        Ok(())
-    }
-}
-
-fn average(scores: &[ObjectScores]) -> ObjectScores {
-    let over = |field: fn(&ObjectScores) -> Option<f64>| mean(scores.iter().filter_map(field));
-    ObjectScores {
-        iou_map: over(|scores| scores.iou_map),
-        iou_object: over(|scores| scores.iou_object),
-        paper_iou: over(|scores| scores.paper_iou),
-        object_psnr: over(|scores| scores.object_psnr),
-        boundary_iou: over(|scores| scores.boundary_iou),
-        object_ssim: over(|scores| scores.object_ssim),
-        iou_hidden: over(|scores| scores.iou_hidden),
-        psnr_hidden: over(|scores| scores.psnr_hidden),
+        check_means([self.mean.psnr, self.mean.objects.iou_map], [min_psnr, min_iou])
     }
 }

@@ -4,27 +4,40 @@ use crate::edit::select::extract;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::render::large::Painter;
-use crate::render::{RenderOptions, Rendered, render};
-use crate::scene::{Camera, Gaussians};
+use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::scene::{Camera, Gaussians, LabelMap};
 
-/// A model to draw pictures of, as a whole or an object of it alone.
-pub(crate) trait Subject {
+/// A model to draw pictures of, as a whole or some objects of it alone.
+pub trait Subject {
     /// Labels of the Gaussians; main Gaussians are places in this list.
     fn labels(&self) -> Option<&[u32]>;
 
-    /// Draws an object alone from now on, or everything. Returns false if there is no such object.
-    fn show(&mut self, only: Option<u32>) -> Result<bool>;
+    /// Draws some objects alone from now on, or everything. Returns false if there are no such objects.
+    fn show(&mut self, only: Option<&[u32]>) -> Result<bool>;
 
     /// Draws what is shown.
     fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered>;
+
+    /// Draws the label of each pixel of everything: the one with the largest sum of weights, or that of the main Gaussian,
+    /// as in LabelGS.
+    fn label_map(&mut self, camera: &Camera, near: f32, by_main: bool) -> Result<LabelMap> {
+        if by_main {
+            let rendered = self.render(camera, &RenderOptions::of_main(near))?;
+            return rendered.main_label_map(self.labels().unwrap_or_default());
+        }
+        self.render(camera, &RenderOptions { sh_degree: Some(0), ..RenderOptions::new(near, Parts::LABELS) })?
+            .label_map()
+    }
 }
 
 /// A model on the device.
-pub(crate) struct Whole<'a> {
-    pub(crate) engine: &'a mut Engine,
-    pub(crate) model: &'a Gaussians,
+pub struct Whole<'a> {
+    /// The device.
+    pub engine: &'a mut Engine,
+    /// The model.
+    pub model: &'a Gaussians,
     /// Least label confidence of Gaussians in objects that are drawn alone, 0 to 1.
-    pub(crate) min_confidence: f32,
+    pub min_confidence: f32,
 }
 
 impl Subject for Whole<'_> {
@@ -32,18 +45,16 @@ impl Subject for Whole<'_> {
         self.model.labels.as_deref()
     }
 
-    fn show(&mut self, only: Option<u32>) -> Result<bool> {
-        let Some(label) = only else {
+    fn show(&mut self, only: Option<&[u32]>) -> Result<bool> {
+        let Some(labels) = only else {
             self.engine.upload_model(self.model)?;
             return Ok(true);
         };
-        if !self.labels().is_some_and(|labels| labels.contains(&label)) {
+        if !labels.iter().all(|label| self.labels().is_some_and(|own| own.contains(label))) {
             return Ok(false);
         }
-        let part = extract(self.model, &[label], self.min_confidence)?;
-        if !part.is_empty() {
-            self.engine.upload_model(&part)?;
-        }
+        let part = extract(self.model, labels, self.min_confidence)?;
+        self.engine.upload_model(&part)?;
         Ok(!part.is_empty())
     }
 
@@ -57,7 +68,7 @@ impl Subject for Painter<'_> {
         Painter::labels(self)
     }
 
-    fn show(&mut self, only: Option<u32>) -> Result<bool> {
+    fn show(&mut self, only: Option<&[u32]>) -> Result<bool> {
         Ok(Painter::show(self, only))
     }
 

@@ -6,7 +6,7 @@
 pub mod large;
 pub(crate) mod pictures;
 
-pub use pictures::{Format, Pictures, What, write_pictures, write_rgb};
+pub use pictures::{Format, What, write_pictures, write_rgb};
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
@@ -77,7 +77,7 @@ impl RenderOptions {
 }
 
 /// A rendered view, row-major. Parts that were not requested are empty.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rendered {
     /// Width, px.
     pub width: u32,

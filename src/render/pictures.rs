@@ -1,10 +1,12 @@
 //! Writes pictures of a view as NAME.WHAT.png or NAME.WHAT.exr.
 
+use super::Rendered;
 use crate::files::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_grey16, write_png_rgb8};
 use crate::scene::LABEL_MAX;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
 use crate::{Error, Result, Setting};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Largest whole number up to which a 32-bit float holds all of them.
@@ -40,70 +42,47 @@ pub enum Format {
     Exr,
 }
 
-/// The pictures of a view, row-major; `None` is not written.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Pictures<'a> {
-    /// Width, px.
-    pub width: u32,
-    /// Height, px.
-    pub height: u32,
-    /// r, g, b, not clamped.
-    pub rgb: Option<&'a [[f32; 3]]>,
-    /// z, world units; 0 for holes.
-    pub depth: Option<&'a [f32]>,
-    /// Opacity, 0 to 1.
-    pub alpha: Option<&'a [f32]>,
-    /// Object ids.
-    pub labels: Option<&'a [u32]>,
-    /// Ids are written with 32 bits, in an EXR: for models with an id above [`LABEL_MAX`].
-    pub wide_labels: bool,
-    /// Row of the Gaussian with the largest weight, -1 for none.
-    pub top_id: Option<&'a [i32]>,
-    /// Weight of that Gaussian.
-    pub top_weight: Option<&'a [f32]>,
-}
-
-/// Writes the pictures of the view `stem` into `folder`. Returns the paths of the files.
-pub fn write_pictures(folder: &Path, stem: &str, pictures: &Pictures, format: Format) -> Result<Vec<PathBuf>> {
-    check_sizes(stem, pictures)?;
-    let (width, height) = (pictures.width, pictures.height);
+/// Writes pictures of the view `stem` into `folder`. With `wide_labels`, ids have 32 bits, in an EXR: for models with one
+/// above [`LABEL_MAX`]. Returns the paths of the files.
+pub fn write_pictures(
+    folder: &Path,
+    stem: &str,
+    rendered: &Rendered,
+    what: &[What],
+    (format, wide_labels): (Format, bool),
+) -> Result<Vec<PathBuf>> {
+    let (width, height) = (rendered.width, rendered.height);
     let mut written = Vec::new();
     let mut path = |what: &str, extension: &str| {
         let path = folder.join(format!("{stem}.{what}.{extension}"));
         written.push(path.clone());
         path
     };
-    if let Some(rgb) = pictures.rgb {
-        let extension = if format == Format::Png { "png" } else { "exr" };
-        write_rgb(&path("rgb", extension), (width, height), rgb, format)?;
-    }
-    if let Some(depth) = pictures.depth {
-        match format {
-            Format::Exr => write_exr_y(path("depth", "exr"), width, height, depth)?,
-            Format::Png => write_png_grey16(path("depth", "png"), width, height, &depth_preview(depth))?,
-        }
-    }
-    if let Some(alpha) = pictures.alpha {
-        match format {
-            Format::Exr => write_exr_y(path("alpha", "exr"), width, height, alpha)?,
-            Format::Png => {
-                let words: Vec<u16> = alpha.iter().map(|&value| to_word(value)).collect();
+    for what in what.iter().copied().collect::<BTreeSet<What>>() {
+        check_size(stem, rendered, what)?;
+        match (what, format) {
+            (What::Rgb, Format::Png) => write_rgb(&path("rgb", "png"), (width, height), &rendered.rgb, format)?,
+            (What::Rgb, Format::Exr) => write_rgb(&path("rgb", "exr"), (width, height), &rendered.rgb, format)?,
+            (What::Depth, Format::Png) => {
+                write_png_grey16(path("depth", "png"), width, height, &depth_preview(&rendered.depth))?;
+            }
+            (What::Depth, Format::Exr) => write_exr_y(path("depth", "exr"), width, height, &rendered.depth)?,
+            (What::Alpha, Format::Png) => {
+                let words: Vec<u16> = rendered.alpha.iter().map(|&value| to_word(value)).collect();
                 write_png_grey16(path("alpha", "png"), width, height, &words)?;
             }
+            (What::Alpha, Format::Exr) => write_exr_y(path("alpha", "exr"), width, height, &rendered.alpha)?,
+            (What::Labels, _) => {
+                let labels = &rendered.labels;
+                match narrow(labels, wide_labels, format)? {
+                    Some(ids) => write_png_grey16(path("labels", "png"), width, height, &ids)?,
+                    None => write_exr_uint(path("labels", "exr"), width, height, labels)?,
+                }
+                write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(labels))?;
+            }
+            (What::TopId, _) => write_rows(&path("top-id", "exr"), (width, height), &rendered.top_id)?,
+            (What::TopWeight, _) => write_exr_y(path("top-weight", "exr"), width, height, &rendered.top_weight)?,
         }
-    }
-    if let Some(labels) = pictures.labels {
-        match narrow(labels, pictures.wide_labels, format)? {
-            Some(ids) => write_png_grey16(path("labels", "png"), width, height, &ids)?,
-            None => write_exr_uint(path("labels", "exr"), width, height, labels)?,
-        }
-        write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(labels))?;
-    }
-    if let Some(ids) = pictures.top_id {
-        write_rows(&path("top-id", "exr"), (width, height), ids)?;
-    }
-    if let Some(weights) = pictures.top_weight {
-        write_exr_y(path("top-weight", "exr"), width, height, weights)?;
     }
     Ok(written)
 }
@@ -144,20 +123,20 @@ pub fn write_rgb(path: &Path, (width, height): (u32, u32), rgb: &[[f32; 3]], for
     }
 }
 
-fn check_sizes(stem: &str, pictures: &Pictures) -> Result<()> {
-    let pixels = pictures.width as usize * pictures.height as usize;
-    let lengths = [
-        pictures.rgb.map(<[_]>::len),
-        pictures.depth.map(<[_]>::len),
-        pictures.alpha.map(<[_]>::len),
-        pictures.labels.map(<[_]>::len),
-        pictures.top_id.map(<[_]>::len),
-        pictures.top_weight.map(<[_]>::len),
-    ];
-    match lengths.into_iter().flatten().find(|&length| length != pixels) {
-        None => Ok(()),
-        Some(length) => Err(Error::Bug(format!("a picture of {stem} has {length} pixels instead of {pixels}"))),
+fn check_size(stem: &str, rendered: &Rendered, what: What) -> Result<()> {
+    let pixels = rendered.width as usize * rendered.height as usize;
+    let length = match what {
+        What::Rgb => rendered.rgb.len(),
+        What::Depth => rendered.depth.len(),
+        What::Alpha => rendered.alpha.len(),
+        What::Labels => rendered.labels.len(),
+        What::TopId => rendered.top_id.len(),
+        What::TopWeight => rendered.top_weight.len(),
+    };
+    if length == pixels {
+        return Ok(());
     }
+    Err(Error::Bug(format!("a picture of {stem} has {length} pixels instead of {pixels}")))
 }
 
 /// Returns the 16-bit value of a value from 0 to 1 in a picture.

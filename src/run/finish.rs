@@ -8,6 +8,7 @@ use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::error::Result;
 use crate::eval::evaluate::{Rendering, evaluate};
 use crate::eval::scores::{MeanScores, Scores};
+use crate::eval::subject::Whole;
 use crate::files::label_table::{self, LabelTable};
 use crate::files::{atomic, run_folder};
 use crate::records::occlusion_table::{self, OcclusionTable};
@@ -167,11 +168,12 @@ impl Run<'_> {
         if views.is_empty() {
             return Ok(None);
         }
-        let options = self.trainer.render_options();
-        let how = Rendering { options, min_confidence: MIN_LABEL_CONFIDENCE, train: &[], by_main: false, lpips: None };
+        let how = Rendering::new(self.trainer.render_options());
         let _stage = Stage::new("scoring the held-out views", 0);
         let mut worst = Worst::default();
-        let scores = evaluate(self.trainer.engine_mut(), model, &views, how, &(), &mut worst)?;
+        let engine = self.trainer.engine_mut();
+        let mut whole = Whole { engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
+        let scores = evaluate(&mut whole, &views, how, &(), &mut worst)?;
         scores.warn_of_odd_view(self.settings.train.near);
         self.info.pictures = worst.write(&self.request.output)?;
         Ok(Some(scores))

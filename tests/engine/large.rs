@@ -121,11 +121,11 @@ fn objects_of_a_large_model_are_drawn_alone() {
     for label in [2, 7] {
         let part = edit::extract(&model, &[label], 0.6).expect("an object");
         let mut engine = Engine::of_model(turn.gpu(), &part, [SIZE]).expect("an engine");
-        assert!(painter.show(Some(label)));
+        assert!(painter.show(Some(&[label])));
         let found = painter.render(camera, &options).expect("a picture");
         assert!(found == render(&mut engine, camera, &options).expect("a picture"), "label {label}");
     }
-    assert!(!painter.show(Some(77)));
+    assert!(!painter.show(Some(&[77])));
     // A view of nothing.
     assert!(painter.render(camera, &options).expect("a picture").alpha.iter().all(|&alpha| alpha == 0.0));
 }

@@ -5,7 +5,7 @@ use crate::support::device;
 use crate::support::device::Turn;
 use crate::support::scenes::Scene;
 use labelgs::pass::KernelShape;
-use labelgs::verify::selftest::antialias::{Antialiased, Smoothed, around, fine};
+use labelgs::verify::selftest::antialias::{around, fine, sizes, step};
 use labelgs::verify::selftest::fixture::Fixture;
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
@@ -16,13 +16,13 @@ fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
 fn antialiased_splats_and_their_gradients_equal_their_mirrors() {
     let Some(turn) = device() else { return };
     let mut fixture = rig(&turn, fine(95)).expect("the engine starts");
-    let ran = Antialiased::new(&mut fixture).expect("it runs");
-    prove("antialiased", &["antialiased", "dilation"], |rules| ran.verdict(rules, 1.0));
+    let judge = step(&mut fixture, 1.0).expect("it runs");
+    prove("antialiased", &["antialiased", "dilation"], judge);
 }
 
 #[test]
 fn least_sizes_equal_their_mirror() {
     let Some(turn) = device() else { return };
-    let ran = Smoothed::new(|| rig(&turn, around(96))).expect("it runs");
-    prove("smooth", &["finest", "smooth_margin"], |rules| ran.verdict(rules, 1.0));
+    let judge = sizes(|| rig(&turn, around(96)), 1.0).expect("it runs");
+    prove("smooth", &["finest", "smooth_margin"], judge);
 }

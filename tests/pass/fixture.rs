@@ -1,10 +1,10 @@
 //! The fixture of the self-test on the shared device; errors panic.
 
-use crate::reference::rules::mutants;
 use crate::reference::splat::{Splat, SplatGradient};
 use crate::reference::{Row, Rules};
 use crate::support::compare::{Verdict, check};
 use crate::support::device::Turn;
+use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
@@ -14,7 +14,7 @@ use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENTS, PARAMETERS, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {

@@ -4,14 +4,13 @@ use super::fixture::{Fixture, prove};
 use crate::reference::blend::blend_layers_forward;
 use crate::reference::loss::{ObjectPixel, Photo, label_loss};
 use crate::reference::step::Target;
-use crate::reference::{Row, Rules};
+use crate::reference::{Model, Row, Rules};
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, dot, plain_camera};
-use labelgs::scene::Gaussians;
 use labelgs::scheduler::plan::Buf;
 use labelgs::train::input::step_input;
-use labelgs::verify::selftest::model::{Lifted, dominant};
+use labelgs::verify::selftest::model::{dominant, lift};
 
 #[test]
 fn lift_equals_its_mirror_with_and_without_the_filter() {
@@ -22,8 +21,8 @@ fn lift_equals_its_mirror_with_and_without_the_filter() {
         // One object of the masks is not sampled.
         fixture.input.layers.pop();
         let count = fixture.scene.gaussians.len();
-        let ran = Lifted::new(&mut fixture).expect("it runs");
-        prove(&format!("lift, filter {gpf}"), &["lift_threshold"], |rules| ran.verdict(rules));
+        let judge = lift(&mut fixture).expect("it runs");
+        prove(&format!("lift, filter {gpf}"), &["lift_threshold"], judge);
         assert!(fixture.get::<u32>(Buf::LABEL_KEYS, count).iter().all(|&key| key == 0), "votes start over");
     }
 }
@@ -36,7 +35,12 @@ fn label_loss_of_a_step_equals_its_mirror() {
     let (splats, size, labels, slots) = (fixture.splats(), fixture.size(), fixture.model().labels, fixture.slots());
     let target = fixture.scene.target.clone();
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
-    let actual = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
+    let actual = step_input::label_loss(
+        &fixture.input,
+        fixture.view.of_step(&fixture.scene),
+        &fixture.config,
+        counters.loss_label,
+    );
     assert!(target.slots.iter().any(|slot| slot.weight != 1.0), "objects of different sizes weigh differently");
     prove("label loss", &["label_weight", "label_alpha", "alpha_slack"], |rules| {
         let layers = blend_layers_forward(rules, &splats, &labels, &slots, size, target.background);
@@ -67,26 +71,13 @@ fn the_label_loss_does_not_drive_densification() {
 
 /// Colours are those of `sh0`; labels are given.
 fn drawn(rows: &[Row], labels: Vec<u32>, width: u32, height: u32, label_map: Vec<u32>) -> Scene {
-    let narrow = |v: f64| v as f32;
     let pixels = (width * height) as usize;
     let objects: std::collections::BTreeSet<u32> =
         label_map.iter().chain(&labels).copied().filter(|&id| id > 0).collect();
     Scene {
         frozen: 0,
         camera: plain_camera(width, height),
-        gaussians: Gaussians {
-            antialiased: false,
-            origin: glam::DVec3::ZERO,
-            means: rows.iter().map(|r| r.mean.map(narrow)).collect(),
-            quats: rows.iter().map(|r| r.quat.map(narrow)).collect(),
-            scales: rows.iter().map(|r| r.scale.map(narrow)).collect(),
-            opacities: rows.iter().map(|r| narrow(r.opacity)).collect(),
-            sh0: rows.iter().map(|r| r.sh[0].map(narrow)).collect(),
-            sh_rest: Vec::new(),
-            sh_degree: 0,
-            labels: Some(labels),
-            label_confidence: None,
-        },
+        gaussians: Model { rows: rows.to_vec(), labels, sh_degree: 0 }.gaussians(),
         target: Target {
             photo: Photo {
                 size: (width as usize, height as usize),
@@ -203,7 +194,12 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     fixture.config.label_alpha = 0.0;
     let counters = fixture.train().counters;
     assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
-    let loss = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
+    let loss = step_input::label_loss(
+        &fixture.input,
+        fixture.view.of_step(&fixture.scene),
+        &fixture.config,
+        counters.loss_label,
+    );
     check("loss", close(&[loss], &[expected], Tolerance { absolute: 1e-7, relative: 0.0 }));
     let with: Vec<u32> = fixture.get(Buf::V_SPLATS, 12);
     fixture.config.label_weight = 1e6;
@@ -223,7 +219,12 @@ fn label_loss_of_a_correct_object_is_0() {
     let mut fixture = Fixture::new(turn, drawn(&[row], vec![7], SIDE, SIDE, vec![7; 289]), true);
     fixture.config.label_alpha = 0.0; // it is half transparent
     let counters = fixture.train().counters;
-    let loss = step_input::label_loss(&fixture.input, fixture.view.of_step(), &fixture.config, counters.loss_label);
+    let loss = step_input::label_loss(
+        &fixture.input,
+        fixture.view.of_step(&fixture.scene),
+        &fixture.config,
+        counters.loss_label,
+    );
     check("loss", close(&[loss], &[0.0], Tolerance { absolute: 1e-5, relative: 0.0 }));
 }
 

@@ -1,27 +1,17 @@
 //! The optimiser, densification and the opacity reset.
 
-use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove};
+use super::fixture::{Fixture, PARAMETERS, prove};
 use crate::reference::Rules;
-use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::densify::absolute_gradient2d;
 use crate::reference::random::normal_draw;
 use crate::reference::step::{Target, splats_of, step};
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
-use crate::support::scenes::{Scene, Shape, population, scene};
+use crate::support::scenes::{Scene, Shape, population, scene, scene_of};
 use labelgs::run::StrategyKind;
 use labelgs::scheduler::plan::Buf;
 use labelgs::train::input::step_input::SceneScale;
-use labelgs::verify::selftest::judge;
-use labelgs::verify::selftest::model::{Densified, Fog, Reset, large, scene_of};
-
-/// Parameters and moments of the trained Gaussians.
-fn states(fixture: &mut Fixture) -> Vec<Optimised> {
-    let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
-    let (rows, m, u) =
-        (fixture.rows(PARAMETERS, count), fixture.rows(MOMENTS_1, count), fixture.rows(MOMENTS_2, count));
-    (0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect()
-}
+use labelgs::verify::selftest::model::{adam, densification, fog, large, reset};
 
 /// Five steps, each from the previous state of the device.
 #[test]
@@ -32,28 +22,10 @@ fn adam_of_every_attribute_equals_its_mirror() {
     let frozen = |fixture: &mut Fixture| fixture.rows(PARAMETERS, 60)[40..].to_vec();
     let stays = frozen(&mut fixture);
     fixture.fixed = SceneScale { extent: 4.0 };
-    fixture.input.update = true;
-    let mut steps = Vec::new();
-    for step in 1..=5 {
-        (fixture.input.step, fixture.input.updates) = (step, step);
-        let before = states(&mut fixture);
-        fixture.train();
-        steps.push((step, fixture.uniforms(), before, fixture.gradient_rows(), states(&mut fixture)));
-    }
-    let gradients = &steps[4].3[40..];
-    assert!(gradients.iter().any(|row| row.mean != [0.0; 3]), "frozen Gaussians are seen");
+    let judge = adam(&mut fixture, 5).expect("it runs");
+    assert!(fixture.gradient_rows()[40..].iter().any(|row| row.mean != [0.0; 3]), "frozen Gaussians are seen");
     assert_eq!(frozen(&mut fixture), stays);
-    prove("adam", &["adam_beta1", "adam_beta2", "adam_eps"], |rules| {
-        judge::all(steps.iter().map(|(step, u, before, gradients, after)| {
-            let [means, opacity] = [u.rate_means[0], u.rate_means[3]];
-            let rest = u.rate_sh_rest;
-            let rates =
-                Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
-            let mirror = |(state, gradient)| adam(rules, &rates, *step, state, gradient);
-            let expected: Vec<Optimised> = before.iter().zip(gradients).map(mirror).collect();
-            judge::updates(after, &expected, &rates)
-        }))
-    });
+    prove("adam", &["adam_beta1", "adam_beta2", "adam_eps"], judge);
 }
 
 #[test]
@@ -75,13 +47,11 @@ fn densify_case(step: u32, splits_long: bool, bearing: &[&str]) {
         row.quat = row.quat.map(|value| f64::from((value * length) as f32));
     }
     let mut fixture = Fixture::new(turn, scene_of(&before), true);
-    let ran = Densified::new(&mut fixture, before, step, splits_long).expect("it runs");
-    prove(&format!("densify at {step}"), bearing, |rules| {
-        // 0.23 of (1e-6, 1e-7) seen. The logits of opacities after long splits reach -7.5, where numbers are 4.8e-7
-        // apart; 3.9e-7 seen.
-        let absolute = if splits_long { 1e-6 } else { 3.5e-7 };
-        ran.verdict(rules, Tolerance { absolute, relative: 3.5e-8 })
-    });
+    // 0.23 of (1e-6, 1e-7) seen. The logits of opacities after long splits reach -7.5, where numbers are 4.8e-7 apart;
+    // 3.9e-7 seen.
+    let tolerance = Tolerance { absolute: if splits_long { 1e-6 } else { 3.5e-7 }, relative: 3.5e-8 };
+    let judge = densification(&mut fixture, before, (step, splits_long), tolerance).expect("it runs");
+    prove(&format!("densify at {step}"), bearing, judge);
 }
 
 #[test]
@@ -125,10 +95,10 @@ fn absolute_gradients_of_tiles_equal_their_mirror() {
 fn marks_of_fog_equal_their_mirror() {
     let Some(turn) = device() else { return };
     let mut fixture = Fixture::new(turn, large(63), false);
-    let ran = Fog::new(&mut fixture).expect("it runs");
-    prove("fog", &["free_size"], |rules| ran.verdict(rules));
+    let judge = fog(&mut fixture).expect("it runs");
+    prove("fog", &["free_size"], &judge);
     let narrow = Rules { jacobian_margin: 0.1, ..Rules::default() };
-    assert!(ran.verdict(&narrow).is_err(), "the margin beyond the image matters");
+    assert!(judge(&narrow).is_err(), "the margin beyond the image matters");
 }
 
 #[test]
@@ -141,9 +111,6 @@ fn opacity_reset_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let before = population(120, 300);
     let mut fixture = Fixture::new(turn, scene_of(&before), true);
-    let ran = Reset::new(&mut fixture, before).expect("it runs");
-    prove("opacity reset", &["reset_opacity"], |rules| {
-        // The constant is the logit of 0.01, not of the nearest f32; 8e-8 seen.
-        ran.verdict(rules, Tolerance { absolute: 1.2e-7, relative: 0.0 })
-    });
+    let judge = reset(&mut fixture, before, 1.0).expect("it runs");
+    prove("opacity reset", &["reset_opacity"], judge);
 }

@@ -6,12 +6,11 @@ use crate::reference::relocate::regularised;
 use crate::support::compare::{Tolerance, close};
 use crate::support::device;
 use crate::support::device::Turn;
-use crate::support::scenes::{Scene, Shape, population, scene};
+use crate::support::scenes::{Scene, Shape, population, scene, scene_of};
 use crate::verify::gradient::differences;
 use labelgs::pass::KernelShape;
 use labelgs::verify::selftest::fixture::Fixture;
-use labelgs::verify::selftest::model::scene_of;
-use labelgs::verify::selftest::relocation::{COPIES, Explored, MOVES, Relocated, TERMS};
+use labelgs::verify::selftest::relocation::{exploration, relocation};
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
     Fixture::new(turn.gpu(), scene, true, KernelShape::of(turn.capabilities()), readable())
@@ -28,8 +27,8 @@ fn relocation_equals_its_mirror() {
     ] {
         let before = population(712, count);
         let mut fixture = rig(&turn, scene_of(&before)).expect("the engine starts");
-        let ran = Relocated::new(&mut fixture, before, draws).expect("it runs");
-        prove(&format!("{draws} draws"), bearing, |rules| ran.verdict(rules, COPIES));
+        let judge = relocation(&mut fixture, before, draws, 1.0).expect("it runs");
+        prove(&format!("{draws} draws"), bearing, judge);
     }
 }
 
@@ -37,9 +36,9 @@ fn relocation_equals_its_mirror() {
 fn random_moves_and_regularisation_equal_their_mirrors() {
     let Some(turn) = device() else { return };
     let scene = scene(66, &Shape { gaussians: 150, opacities: (-7.0, 3.0), ..Shape::default() });
-    let ran = Explored::new(|| rig(&turn, scene.clone())).expect("it runs");
-    prove("random moves", &["noise_steep", "noise_opacity"], |rules| ran.moved(rules, MOVES));
-    prove("regularisation", &[], |_| ran.regularised(&scene.model().rows, TERMS));
+    let [moves, terms] = exploration(|| rig(&turn, scene.clone()), 1.0).expect("it runs");
+    prove("random moves", &["noise_steep", "noise_opacity"], moves);
+    prove("regularisation", &[], terms);
 }
 
 #[test]

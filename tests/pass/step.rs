@@ -1,11 +1,11 @@
 //! A whole step: losses and the gradient of every parameter against the mirror, from the model to the gradient.
 
 use super::fixture::{Fixture, prove};
-use crate::reference::rules::{Family, mutants};
 use crate::reference::step::step;
 use crate::reference::{Row, Rules};
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
 use crate::support::device;
+use crate::support::mutants::{Family, mutants};
 use crate::support::scenes::{Shape, scene};
 use labelgs::verify::selftest::judge;
 
@@ -44,7 +44,7 @@ fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
 }
 
 fn named(families: &[Family], without: &[&str]) -> Vec<&'static str> {
-    let bears = |m: &crate::reference::rules::Mutant| families.contains(&m.family) && !without.contains(&m.name);
+    let bears = |m: &crate::support::mutants::Mutant| families.contains(&m.family) && !without.contains(&m.name);
     mutants().iter().filter(|m| bears(m)).map(|m| m.name).collect()
 }
 

@@ -3,6 +3,7 @@
 pub mod compare;
 pub mod device;
 pub mod memory;
+pub mod mutants;
 pub mod runs;
 pub mod toy;
 

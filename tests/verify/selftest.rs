@@ -1,8 +1,8 @@
 //! The self-test passes on this device and detects every kind of fault.
 
 use crate::reference::Rules;
-use crate::reference::rules::mutants;
 use crate::support::device;
+use crate::support::mutants::mutants;
 use labelgs::verify::selftest;
 use std::sync::Arc;
 

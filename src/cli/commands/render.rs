@@ -9,8 +9,8 @@ use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{nothing_left, remove};
 use crate::formats::ModelRef;
 use crate::render::large::{Index, fits};
-use crate::render::pictures::{Format, Pictures, What, write_pictures};
-use crate::render::{Parts, RenderOptions, Rendered};
+use crate::render::pictures::{Format, What, write_pictures};
+use crate::render::{Parts, RenderOptions};
 use crate::run::models;
 use crate::scene::{Camera, Dataset, Gaussians, LABEL_MAX, stems};
 use crate::scenes::camera_json::read_camera;
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     let stage = Stage::new("rendering", cameras.len());
     for (stem, camera) in &cameras {
         let rendered = drawer.render(camera, &options)?;
-        files.extend(write(args, stem, &rendered, wide)?);
+        files.extend(write_pictures(&args.output, stem, &rendered, &args.what, (args.format, wide))?);
         stage.count();
     }
     drop(stage);
@@ -188,20 +188,4 @@ fn cameras(args: &RenderArgs) -> Result<(Vec<(String, Camera)>, Option<Dataset>)
     let views = pick_views(&dataset, &args.views)?;
     let cameras = stems(&views).into_iter().zip(&views).map(|(stem, view)| (stem, view.camera.clone())).collect();
     Ok((cameras, Some(dataset)))
-}
-
-fn write(args: &RenderArgs, stem: &str, rendered: &Rendered, wide: bool) -> Result<Vec<PathBuf>> {
-    let asked = |what| args.what.contains(&what);
-    let pictures = Pictures {
-        width: rendered.width,
-        height: rendered.height,
-        rgb: asked(What::Rgb).then_some(&rendered.rgb),
-        depth: asked(What::Depth).then_some(&rendered.depth),
-        alpha: asked(What::Alpha).then_some(&rendered.alpha),
-        labels: asked(What::Labels).then_some(&rendered.labels),
-        wide_labels: wide,
-        top_id: asked(What::TopId).then_some(&rendered.top_id),
-        top_weight: asked(What::TopWeight).then_some(&rendered.top_weight),
-    };
-    write_pictures(&args.output, stem, &pictures, args.format)
 }

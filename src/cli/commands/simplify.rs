@@ -6,6 +6,7 @@ use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::edit::simplify::Simplifier;
 use crate::engine::{Engine, EngineSize};
 use crate::eval::evaluate::{Rendering, evaluate};
+use crate::eval::subject::Whole;
 use crate::render::RenderOptions;
 use crate::scene::{Gaussians, View};
 use crate::scheduler::SchedulerOptions;
@@ -165,14 +166,8 @@ impl Row {
 
 impl Scorer<'_> {
     fn score(&mut self, model: &Gaussians) -> Result<Row> {
-        let how = Rendering {
-            options: self.options,
-            min_confidence: MIN_LABEL_CONFIDENCE,
-            train: &[],
-            by_main: false,
-            lpips: None,
-        };
-        let mean = evaluate(&mut self.engine, model, &self.views, how, &(), &mut ())?.mean;
+        let mut whole = Whole { engine: &mut self.engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
+        let mean = evaluate(&mut whole, &self.views, Rendering::new(self.options), &(), &mut ())?.mean;
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Ok(Row {
             gaussians: model.len(),

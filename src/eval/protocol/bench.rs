@@ -13,8 +13,10 @@ use std::path::Path;
 pub struct Bench<'a> {
     /// The benchmark.
     pub protocol: Protocol,
-    /// Follows the published scorer instead of our rules.
+    /// Follows the published scorer instead of our rules; the label of a pixel is that of its main Gaussian.
     pub compat: bool,
+    /// Near plane, world units.
+    pub near: f32,
     /// All views, with their photos.
     pub views: &'a [&'a View],
     /// Test views sorted by name, for benchmarks that number them.

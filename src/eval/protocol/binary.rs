@@ -26,7 +26,7 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
     // The first frame differs between objects.
     let mut layout = Layout { tasks: Vec::new(), left_out };
     for (object, truths) in objects {
-        let one = tasks(BTreeMap::from([(object, truths)]), ask);
+        let one = tasks(BTreeMap::from([(object, truths)]), Vec::new(), ask);
         layout.tasks.extend(one.tasks);
         layout.left_out.extend(one.left_out);
     }

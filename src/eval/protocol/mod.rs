@@ -6,20 +6,16 @@
 
 pub(crate) mod bench;
 mod binary;
-mod labelgs;
-mod lerf_mask;
+mod by_frame;
 mod nvos;
-pub(crate) mod paint;
 pub(crate) mod report;
 pub(crate) mod run;
 pub mod score;
 mod select;
 
 pub use bench::Bench;
-pub use paint::{EnginePainter, Painter};
 pub use report::Report;
 pub use run::run;
-mod three_d_ovs;
 
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
@@ -155,9 +151,9 @@ impl Protocol {
     /// exists.
     pub fn layout(self, files: &[PathBuf], classes: Option<&str>, ask: Ask) -> Result<Layout> {
         let layout = match self {
-            Self::Labelgs => labelgs::layout(files, ask),
-            Self::LerfMask => lerf_mask::layout(files, ask),
-            Self::ThreeDOvs => three_d_ovs::layout(files, classes, ask),
+            Self::Labelgs => by_frame::labelgs(files, ask),
+            Self::LerfMask => by_frame::lerf_mask(files, ask),
+            Self::ThreeDOvs => by_frame::three_d_ovs(files, classes, ask),
             Self::Nvos => nvos::layout(files, ask),
             Self::Binary => binary::layout(files, ask),
         };
@@ -186,23 +182,9 @@ fn folders(path: &Path) -> Vec<String> {
     parent.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect()
 }
 
-/// Returns the masks of each object from files FRAME/OBJECT.png. Other files are left out.
-fn by_frame_and_object(files: &[PathBuf], left_out: &mut Vec<String>) -> BTreeMap<String, Vec<Truth>> {
-    let mut objects: BTreeMap<String, Vec<Truth>> = BTreeMap::new();
-    for file in files.iter().filter(|file| is_png(file)) {
-        match &folders(file)[..] {
-            [frame] => {
-                objects.entry(stem(file)).or_default().push(Truth { frame: frame.clone(), file: file.clone() });
-            }
-            _ => left_out.push(format!("{} is not FRAME/OBJECT.png", file.display())),
-        }
-    }
-    objects
-}
-
 /// Makes one task per object: by name in all frames, or by the mask in the first frame in all others. An object that is
 /// not in the first frame then has no prompt and is left out.
-fn tasks(objects: BTreeMap<String, Vec<Truth>>, ask: Ask) -> Layout {
+fn tasks(objects: BTreeMap<String, Vec<Truth>>, left_out: Vec<String>, ask: Ask) -> Layout {
     let first = objects.values().flatten().map(|truth| truth.frame.clone()).min().unwrap_or_default();
     let mut layout = Layout::default();
     for (object, mut truths) in objects {
@@ -219,5 +201,6 @@ fn tasks(objects: BTreeMap<String, Vec<Truth>>, ask: Ask) -> Layout {
             None => layout.left_out.push(format!("{object} is not in the prompt's frame {first}")),
         }
     }
+    layout.left_out.extend(left_out);
     layout
 }

@@ -2,7 +2,8 @@
 
 use super::Protocol;
 use super::score::PairScores;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::eval::metrics::check_means;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -127,13 +128,13 @@ impl Report {
         for (name, row) in &mut self.objects {
             let own: Vec<&PairScores> = self.views.values().filter_map(|view| view.get(name)).collect();
             row.frames = own.len() as u64;
-            row.mean = PairScores::average(own.into_iter());
+            row.mean = PairScores::mean(own.into_iter());
         }
         let counted = || self.objects.values().filter(|row| row.frames > 0);
         let pairs = || self.views.values().flat_map(BTreeMap::values);
         self.mean = Means {
-            pairs: PairScores::average(pairs()),
-            objects: PairScores::average(counted().map(|row| &row.mean)),
+            pairs: PairScores::mean(pairs()),
+            objects: PairScores::mean(counted().map(|row| &row.mean)),
             pair_count: pairs().count() as u64,
             object_count: counted().count() as u64,
         };
@@ -150,15 +151,6 @@ impl Report {
 
     /// Compares the headline with the bounds of `--min-psnr` and `--min-iou`.
     pub fn check(&self, min_psnr: Option<f64>, min_iou: Option<f64>) -> Result<()> {
-        let rows = [("PSNR", self.headline.psnr, min_psnr), ("IoU", self.headline.iou, min_iou)];
-        for (what, found, least) in rows {
-            let Some(least) = least else { continue };
-            // A NaN fails too.
-            if !found.is_some_and(|found| found >= least) {
-                let found = found.map_or("nothing".to_owned(), |found| format!("{found:.4}"));
-                return Err(Error::Check(format!("mean {what} is {found}, less than {least}")));
-            }
-        }
-        Ok(())
+        check_means([self.headline.psnr, self.headline.iou], [min_psnr, min_iou])
     }
 }

@@ -1,10 +1,10 @@
 //! Chooses the labels of a benchmark's object in the model.
 
 use super::bench::Bench;
-use super::paint::Painter;
 use super::{Prompt, Task};
 use crate::edit::choose::{candidates, choose_labels};
 use crate::error::Result;
+use crate::eval::subject::Subject;
 use crate::scene::{LabelMap, View};
 use crate::scenes::truth::TruthMask;
 use std::path::Path;
@@ -22,13 +22,13 @@ pub(super) enum Choice {
 /// Least share of the strokes on an object for a label, against strokes that slip onto a neighbour.
 const STROKES: f64 = 0.05;
 
-pub(super) fn choose(task: &Task, bench: &Bench, painter: &mut dyn Painter) -> Result<Choice> {
+pub(super) fn choose(task: &Task, bench: &Bench, subject: &mut dyn Subject) -> Result<Choice> {
     match &task.prompt {
         Prompt::Name => Ok(by_name(&task.object, bench)),
         Prompt::Mask(prompt) => {
             let Some(view) = bench.view(&prompt.frame) else { return Ok(no_view(&prompt.frame)) };
             let mask = (bench.truth)(&prompt.file, view)?;
-            let map = painter.label_map(&view.camera.resized(mask.width, mask.height))?;
+            let map = subject.label_map(&view.camera.resized(mask.width, mask.height), bench.near, bench.compat)?;
             let labels = choose_labels(&map, &mask.inside);
             Ok(if labels.is_empty() { Choice::Empty(why_empty(&map, &mask)) } else { Choice::Labels(labels) })
         }
@@ -37,7 +37,7 @@ pub(super) fn choose(task: &Task, bench: &Bench, painter: &mut dyn Painter) -> R
             let strokes = |files: &[std::path::PathBuf]| -> Result<Vec<TruthMask>> {
                 files.iter().map(|file| (bench.truth)(Path::new(file), view)).collect()
             };
-            under_strokes(&strokes(on)?, &strokes(off)?, view, painter)
+            under_strokes(&strokes(on)?, &strokes(off)?, view, (bench, subject))
         }
     }
 }
@@ -72,10 +72,15 @@ fn why_empty(map: &LabelMap, mask: &TruthMask) -> String {
 
 /// Chooses labels with more pixels under the strokes on the object than under the other strokes, and a least share of
 /// the strokes.
-fn under_strokes(on: &[TruthMask], off: &[TruthMask], view: &View, painter: &mut dyn Painter) -> Result<Choice> {
+fn under_strokes(
+    on: &[TruthMask],
+    off: &[TruthMask],
+    view: &View,
+    (bench, subject): (&Bench, &mut dyn Subject),
+) -> Result<Choice> {
     let mut counts = std::collections::BTreeMap::<u32, (u64, u64)>::new();
     for (stroke, wanted) in on.iter().map(|mask| (mask, true)).chain(off.iter().map(|mask| (mask, false))) {
-        let map = painter.label_map(&view.camera.resized(stroke.width, stroke.height))?;
+        let map = subject.label_map(&view.camera.resized(stroke.width, stroke.height), bench.near, bench.compat)?;
         for candidate in candidates(&map, &stroke.inside) {
             let (yes, no) = counts.entry(candidate.label).or_default();
             *(if wanted { yes } else { no }) += candidate.inside;

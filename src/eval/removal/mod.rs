@@ -8,13 +8,12 @@ use super::compared::{Compared, Watch};
 use crate::edit::fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep, weight};
-use crate::label::vote::model::label_by_lift;
+use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep};
+use crate::label::vote::model::{label_by_lift, objects_of};
 use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Gaussians, Photo, Pixels, View};
-use score::{Compare, Holes, Region, Tally};
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use crate::scene::{Gaussians, Photo, View};
+use score::{Holes, Place, Tally};
+use std::collections::BTreeMap;
 
 /// Photos of the scene without an object.
 pub trait RemovalTruth {
@@ -63,25 +62,23 @@ pub fn removals(
     let light = Light::of(model, &sights)?;
     let mut paper = model.clone();
     label_by_lift(engine, &mut paper, train, options.near)?;
-    let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
-    let ballot = sweep(engine, &voters, Sweep::new(options.near, 0))?;
-    let ids: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect();
+    let ballot = sweep(engine, &Voter::of_views(views), Sweep::new(options.near, 0))?;
     let mut objects = BTreeMap::new();
-    for id in ids {
-        let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
+    for id in objects_of(views) {
+        let places = views.iter().map(|view| Place::new(id, view, truth).transpose());
+        let places: Vec<Place> = places.flatten().collect::<Result<_>>()?;
         let id = u32::from(id);
-        let places = places(id, views, truth)?;
+        let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
         let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
         let mut draw = |part: &Gaussians, tally: &mut Tally, what: &'static str, watch: &mut dyn Watch| {
             for place in &places {
                 let rendered = drawn(engine, part, place.view, options)?;
-                let compare = place.compare(&rendered);
-                tally.add(&place.region, &compare);
-                let Some(without) = place.without.as_ref().filter(|_| what != MAIN) else { continue };
+                tally.add(place, &rendered);
+                let Some(without) = place.truths[0].as_ref().filter(|_| what != MAIN) else { continue };
                 watch.see(&Compared {
                     object: Some(format!("{id} {what}")),
-                    numbers: vec![("PSNR", compare.psnr(&place.region))],
+                    numbers: vec![("PSNR", place.psnr(&rendered))],
                     ..Compared::new(&place.view.name, without, &rendered.rgb)
                 })?;
             }
@@ -119,46 +116,12 @@ pub fn removals(
 }
 
 /// Returns the share of the votes for a label that Gaussians of other labels have.
-fn weight_left(ballot: &Ballot, id: u16, labels: &[u32]) -> Option<f64> {
-    let column = ballot.labels.iter().position(|&label| label == id);
-    let of = |row: usize| ballot.row(row).iter().filter(|cell| Some(usize::from(cell.0)) == column);
-    let sum = |rows: &dyn Fn(usize) -> bool| -> f64 {
-        (0..ballot.len()).filter(|&row| rows(row)).flat_map(of).map(|&(_, votes)| weight(votes)).sum()
+fn weight_left(ballot: &Ballot, id: u32, labels: &[u32]) -> Option<f64> {
+    let sum = |rows: &dyn Fn(&usize) -> bool| -> f64 {
+        (0..ballot.len()).filter(rows).map(|row| ballot.weight_on(row, id)).sum()
     };
     let all = sum(&|_| true);
-    (all > 0.0).then(|| sum(&|row| labels[row] != u32::from(id)) / all)
-}
-
-/// Where a view shows an object, with the photos to compare a removal with.
-struct Place<'a> {
-    view: &'a View,
-    photo: Arc<Photo>,
-    region: Region,
-    without: Option<Photo>,
-    shadowed: Option<Photo>,
-}
-
-impl Place<'_> {
-    fn compare<'b>(&'b self, rendered: &'b Rendered) -> Compare<'b> {
-        Compare { rendered, photo: &self.photo, truth: self.without.as_ref(), shadowed: self.shadowed.as_ref() }
-    }
-}
-
-/// Returns the places of an object in all views that show it.
-fn places<'a>(id: u32, views: &[&'a View], truth: &dyn RemovalTruth) -> Result<Vec<Place<'a>>> {
-    let mut found = Vec::new();
-    for &view in views {
-        // Masks are asked for their pixels only where they show the object.
-        let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { continue };
-        if !mask.objects().contains(&(id as u16)) {
-            continue;
-        }
-        let (mask, photo) = (mask.get()?, photo.get()?);
-        let Some(region) = Region::new(&mask, id as u16, &photo) else { continue };
-        let (without, shadowed) = (truth.without(id, view)?, truth.shadowed(id, view)?);
-        found.push(Place { view, photo, region, without, shadowed });
-    }
-    Ok(found)
+    (all > 0.0).then(|| sum(&|&row| labels[row] != id) / all)
 }
 
 /// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
@@ -169,7 +132,7 @@ fn holes(engine: &mut Engine, closed: &Filled, places: &[Place], options: Render
     for place in places {
         let bare = drawn(engine, &bare, place.view, options)?;
         let rendered = drawn(engine, &closed.model, place.view, options)?;
-        holes.add(&place.region, &bare, &place.compare(&rendered));
+        holes.add(place, &bare, &rendered);
     }
     Ok(holes)
 }

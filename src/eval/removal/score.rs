@@ -1,10 +1,13 @@
 //! The scores themselves.
 
-use crate::eval::metrics::{byte_value, mean, psnr_of};
+use super::RemovalTruth;
+use crate::error::Result;
+use crate::eval::metrics::{clamped, colour_of, mean, psnr_of, scores, square};
 use crate::render::Rendered;
-use crate::scene::{LabelMap, Photo};
+use crate::scene::{LabelMap, Photo, View};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Width of the band around the mask that counts as the object's place, px: its pixels are partly the object's.
 const BAND: u32 = 2;
@@ -15,34 +18,36 @@ const HOLE: f32 = 0.5;
 /// Distance of two colours (r, g, b, 0 to 1) from which photo and truth differ enough to tell whose colour is shown.
 const DIFFERENT: f64 = 0.1;
 
-/// What one way of removing an object leaves; `None` where there is nothing to compare with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct RuleScores {
-    /// PSNR against the photos without the object, over its pixels and 2 px around them in all views together, dB.
-    pub psnr: Option<f64>,
-    /// The same against photos in which its shadow stays: no photo shows the colours outside of that shadow.
-    pub psnr_shadowed: Option<f64>,
-    /// Of the object's pixels where photos with and without it differ and the model shows anything, the share whose colour
-    /// is nearer to the photo with it. Its shadow stays in both, if such photos are given.
-    pub leftover: Option<f64>,
-    /// Of the blending weight in the object's pixels before the removal, the share of Gaussians that stay. It needs no photo
-    /// without the object.
-    pub leftover_weight: Option<f64>,
+scores! {
+    /// What one way of removing an object leaves; `None` where there is nothing to compare with.
+    RuleScores {
+        /// PSNR against the photos without the object, over its pixels and 2 px around them in all views together, dB.
+        psnr,
+        /// The same against photos in which its shadow stays: no photo shows the colours outside of that shadow.
+        psnr_shadowed,
+        /// Of the object's pixels where photos with and without it differ and the model shows anything, the share whose colour
+        /// is nearer to the photo with it. Its shadow stays in both, if such photos are given.
+        leftover,
+        /// Of the blending weight in the object's pixels before the removal, the share of Gaussians that stay. It needs no photo
+        /// without the object.
+        leftover_weight,
+    }
 }
 
-/// What closes the pixels that no photo shows: those where neither another object nor a Gaussian that was seen is left.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct HoleScores {
-    /// Share of the object's place.
-    pub share: Option<f64>,
-    /// PSNR of the filled model there against the photos without the object, dB.
-    pub filled: Option<f64>,
-    /// The same against photos in which its shadow stays.
-    pub filled_shadowed: Option<f64>,
-    /// PSNR of the mean colour of a ring around the object in the picture.
-    pub mean_colour: Option<f64>,
-    /// The same against photos in which its shadow stays.
-    pub mean_colour_shadowed: Option<f64>,
+scores! {
+    /// What closes the pixels that no photo shows: those where neither another object nor a Gaussian that was seen is left.
+    HoleScores {
+        /// Share of the object's place.
+        share,
+        /// PSNR of the filled model there against the photos without the object, dB.
+        filled,
+        /// The same against photos in which its shadow stays.
+        filled_shadowed,
+        /// PSNR of the mean colour of a ring around the object in the picture.
+        mean_colour,
+        /// The same against photos in which its shadow stays.
+        mean_colour_shadowed,
+    }
 }
 
 /// What removals of an object leave.
@@ -79,108 +84,95 @@ pub struct RemovalScores {
 impl RemovalScores {
     /// Computes the means.
     pub fn new(objects: BTreeMap<u32, ObjectRemoval>) -> Self {
-        let over = |field: &dyn Fn(&ObjectRemoval) -> Option<f64>| mean(objects.values().filter_map(field));
-        let rule = |of: fn(&ObjectRemoval) -> &RuleScores| RuleScores {
-            psnr: over(&|row| of(row).psnr),
-            psnr_shadowed: over(&|row| of(row).psnr_shadowed),
-            leftover: over(&|row| of(row).leftover),
-            leftover_weight: over(&|row| of(row).leftover_weight),
-        };
+        let rows = || objects.values();
         let mean = ObjectRemoval {
-            votes: rule(|row| &row.votes),
-            main: rule(|row| &row.main),
-            filled: rule(|row| &row.filled),
-            mean_colour: rule(|row| &row.mean_colour),
-            holes: HoleScores {
-                share: over(&|row| row.holes.share),
-                filled: over(&|row| row.holes.filled),
-                filled_shadowed: over(&|row| row.holes.filled_shadowed),
-                mean_colour: over(&|row| row.holes.mean_colour),
-                mean_colour_shadowed: over(&|row| row.holes.mean_colour_shadowed),
-            },
-            hole: over(&|row| row.hole),
-            hole_filled: over(&|row| row.hole_filled),
-            added: objects.values().map(|row| row.added).sum(),
+            votes: RuleScores::mean(rows().map(|row| &row.votes)),
+            main: RuleScores::mean(rows().map(|row| &row.main)),
+            filled: RuleScores::mean(rows().map(|row| &row.filled)),
+            mean_colour: RuleScores::mean(rows().map(|row| &row.mean_colour)),
+            holes: HoleScores::mean(rows().map(|row| &row.holes)),
+            hole: mean(rows().filter_map(|row| row.hole)),
+            hole_filled: mean(rows().filter_map(|row| row.hole_filled)),
+            added: rows().map(|row| row.added).sum(),
         };
         Self { mean, objects }
     }
 }
 
-/// The pixels of an object in a view.
-pub(super) struct Region {
+/// Where a view shows an object, with the photos to compare a removal with.
+pub(super) struct Place<'a> {
+    pub(super) view: &'a View,
+    photo: Arc<Photo>,
+    /// The photo without the object, and the same with its shadow, if there are such.
+    pub(super) truths: [Option<Photo>; 2],
     /// Its pixels in the mask.
     inside: Vec<usize>,
     /// These and those within `BAND` of them.
-    place: Vec<usize>,
-    /// Those within `RING` of the place.
+    around: Vec<usize>,
+    /// Those within `RING` of these.
     ring: Vec<usize>,
 }
 
-impl Region {
+impl<'a> Place<'a> {
     /// Finds the valid pixels of object `id`; `None` without any.
-    pub(super) fn new(mask: &LabelMap, id: u16, photo: &Photo) -> Option<Self> {
-        let valid = |index: &usize| photo.rgba[*index][3] > 0;
-        let ids = mask.ids.iter().map(|&found| u16::from(found == id)).collect();
-        let own = LabelMap { ids, ..mask.clone() };
+    pub(super) fn new(id: u16, view: &'a View, truth: &dyn RemovalTruth) -> Result<Option<Self>> {
+        // Masks are asked for their pixels only where they show the object.
+        let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { return Ok(None) };
+        if !mask.objects().contains(&id) {
+            return Ok(None);
+        }
+        let (mask, photo) = (mask.get()?, photo.get()?);
+        let own = LabelMap { ids: mask.ids.iter().map(|&found| u16::from(found == id)).collect(), ..*mask };
         let (near, far) = (own.near_contour(BAND), own.near_contour(BAND + RING));
         let pick = |counts: &dyn Fn(usize) -> bool| -> Vec<usize> {
-            (0..own.ids.len()).filter(valid).filter(|&index| counts(index)).collect()
+            (0..own.ids.len()).filter(|&index| photo.rgba[index][3] > 0 && counts(index)).collect()
         };
         let inside = pick(&|index| own.ids[index] == 1);
-        let place = pick(&|index| own.ids[index] == 1 || near[index]);
+        let around = pick(&|index| own.ids[index] == 1 || near[index]);
         let ring = pick(&|index| own.ids[index] == 0 && far[index] && !near[index]);
-        (!inside.is_empty()).then_some(Self { inside, place, ring })
+        if inside.is_empty() {
+            return Ok(None);
+        }
+        let truths = [truth.without(id.into(), view)?, truth.shadowed(id.into(), view)?];
+        Ok(Some(Self { view, photo, truths, inside, around, ring }))
+    }
+
+    /// Returns the mean colour of a picture in the ring around the object.
+    fn mean_colour(&self, rendered: &Rendered) -> [f64; 3] {
+        let shown = |channel: usize| self.ring.iter().map(move |&index| clamped(rendered.rgb[index])[channel]);
+        [0, 1, 2].map(|channel| mean(shown(channel)).unwrap_or(0.0))
+    }
+
+    /// Returns the PSNR of a picture without the object, dB.
+    pub(super) fn psnr(&self, rendered: &Rendered) -> Option<f64> {
+        let truth = self.truths[0].as_ref()?;
+        let error = |&index: &usize| square(clamped(rendered.rgb[index]), colour_of(truth.rgba[index]));
+        mean(self.around.iter().map(error)).map(psnr_of)
     }
 }
 
-/// A removal in a view.
-#[derive(Clone, Copy)]
-pub(super) struct Compare<'a> {
-    /// What is left.
-    pub rendered: &'a Rendered,
-    /// The photo with the object.
-    pub photo: &'a Photo,
-    /// The photo without it, if there is one.
-    pub truth: Option<&'a Photo>,
-    /// The same with its shadow.
-    pub shadowed: Option<&'a Photo>,
-}
-
-impl Compare<'_> {
-    fn shown(&self, index: usize) -> [f64; 3] {
-        self.rendered.rgb[index].map(|value| f64::from(value.clamp(0.0, 1.0)))
-    }
-
-    /// Returns the mean colour of the ring around the object.
-    fn around(&self, region: &Region) -> [f64; 3] {
-        [0, 1, 2].map(|channel| mean(region.ring.iter().map(|&index| self.shown(index)[channel])).unwrap_or(0.0))
-    }
-
-    /// Returns the PSNR over the object's place, dB.
-    pub(super) fn psnr(&self, region: &Region) -> Option<f64> {
-        let truth = self.truth?;
-        mean(region.place.iter().map(|&index| square(self.shown(index), bytes(truth, index)))).map(psnr_of)
-    }
-}
-
-/// A sum of squared errors.
+/// Sums of squared errors, and their numbers, against both truths.
 #[derive(Clone, Copy, Debug, Default)]
-struct Squares {
-    sum: f64,
-    count: u64,
-}
+struct Squares([(f64, u64); 2]);
 
 impl Squares {
-    fn add(&mut self, shown: [f64; 3], truth: Option<&Photo>, index: usize) {
-        if let Some(truth) = truth {
-            self.sum += square(shown, bytes(truth, index));
-            self.count += 1;
+    fn add(&mut self, shown: [f64; 3], place: &Place, index: usize) {
+        for ((sum, count), truth) in self.0.iter_mut().zip(&place.truths) {
+            if let Some(truth) = truth {
+                *sum += square(shown, colour_of(truth.rgba[index]));
+                *count += 1;
+            }
         }
     }
 
-    fn psnr(&self) -> Option<f64> {
-        (self.count > 0).then(|| psnr_of(self.sum / self.count as f64))
+    fn psnr(&self) -> [Option<f64>; 2] {
+        self.0.map(|(sum, count)| (count > 0).then(|| psnr_of(sum / count as f64)))
     }
+}
+
+/// Returns a share; `None` of nothing.
+fn share(part: u64, all: u64) -> Option<f64> {
+    (all > 0).then(|| part as f64 / all as f64)
 }
 
 /// Sums over the views of an object.
@@ -188,31 +180,31 @@ impl Squares {
 pub(super) struct Tally {
     pixels: u64,
     holes: u64,
-    /// As rendered, against both truths, and with holes painted.
-    squares: [Squares; 2],
-    painted: [Squares; 2],
+    /// As rendered, and with holes painted in the mean colour around the object.
+    rendered: Squares,
+    painted: Squares,
     different: u64,
     leftover: u64,
 }
 
 impl Tally {
-    pub(super) fn add(&mut self, region: &Region, compare: &Compare) {
-        let is_hole = |index: usize| is_hole(compare.rendered, index);
-        self.pixels += region.place.len() as u64;
-        self.holes += region.place.iter().filter(|&&index| is_hole(index)).count() as u64;
-        let around = compare.around(region);
-        for &index in &region.place {
-            let shown = compare.shown(index);
-            let painted = if is_hole(index) { around } else { shown };
-            for (at, truth) in [compare.truth, compare.shadowed].into_iter().enumerate() {
-                self.squares[at].add(shown, truth, index);
-                self.painted[at].add(painted, truth, index);
-            }
+    /// Adds a picture of what is left.
+    pub(super) fn add(&mut self, place: &Place, rendered: &Rendered) {
+        self.pixels += place.around.len() as u64;
+        let colour = place.mean_colour(rendered);
+        for &index in &place.around {
+            let shown = clamped(rendered.rgb[index]);
+            let is_hole = is_hole(rendered, index);
+            self.holes += u64::from(is_hole);
+            self.rendered.add(shown, place, index);
+            self.painted.add(if is_hole { colour } else { shown }, place, index);
         }
         // A shadow that stays is nothing of the object.
-        let Some(truth) = compare.shadowed.or(compare.truth) else { return };
-        for &index in region.inside.iter().filter(|&&index| !is_hole(index)) {
-            let (shown, with, goal) = (compare.shown(index), bytes(compare.photo, index), bytes(truth, index));
+        let [without, shadowed] = &place.truths;
+        let Some(truth) = shadowed.as_ref().or(without.as_ref()) else { return };
+        for &index in place.inside.iter().filter(|&&index| !is_hole(rendered, index)) {
+            let shown = clamped(rendered.rgb[index]);
+            let (with, goal) = (colour_of(place.photo.rgba[index]), colour_of(truth.rgba[index]));
             if 3.0 * square(with, goal) > DIFFERENT * DIFFERENT {
                 self.different += 1;
                 self.leftover += u64::from(square(shown, with) < square(shown, goal));
@@ -221,19 +213,18 @@ impl Tally {
     }
 
     pub(super) fn scores(&self, leftover_weight: Option<f64>) -> RuleScores {
-        let leftover = (self.different > 0).then(|| self.leftover as f64 / self.different as f64);
-        let [psnr, psnr_shadowed] = self.squares.map(|squares| squares.psnr());
-        RuleScores { psnr, psnr_shadowed, leftover, leftover_weight }
+        let [psnr, psnr_shadowed] = self.rendered.psnr();
+        RuleScores { psnr, psnr_shadowed, leftover: share(self.leftover, self.different), leftover_weight }
     }
 
-    /// Returns the PSNRs with holes painted in the mean colour around the object.
+    /// Returns the PSNRs with holes painted.
     pub(super) fn mean_colour(&self) -> RuleScores {
-        let [psnr, psnr_shadowed] = self.painted.map(|squares| squares.psnr());
+        let [psnr, psnr_shadowed] = self.painted.psnr();
         RuleScores { psnr, psnr_shadowed, ..RuleScores::default() }
     }
 
     pub(super) fn hole(&self) -> Option<f64> {
-        (self.pixels > 0).then(|| self.holes as f64 / self.pixels as f64)
+        share(self.holes, self.pixels)
     }
 }
 
@@ -242,42 +233,29 @@ impl Tally {
 pub(super) struct Holes {
     pixels: u64,
     holes: u64,
-    filled: [Squares; 2],
-    mean_colour: [Squares; 2],
+    filled: Squares,
+    mean_colour: Squares,
 }
 
 impl Holes {
-    /// Adds a view: `bare` is the filled model without its new Gaussians, `compare` has the filled one.
-    pub(super) fn add(&mut self, region: &Region, bare: &Rendered, compare: &Compare) {
-        let around = Compare { rendered: bare, ..*compare }.around(region);
-        self.pixels += region.place.len() as u64;
-        for &index in region.place.iter().filter(|&&index| is_hole(bare, index)) {
+    /// Adds a picture of the filled model, and of that without its new Gaussians.
+    pub(super) fn add(&mut self, place: &Place, bare: &Rendered, filled: &Rendered) {
+        let colour = place.mean_colour(bare);
+        self.pixels += place.around.len() as u64;
+        for &index in place.around.iter().filter(|&&index| is_hole(bare, index)) {
             self.holes += 1;
-            for (at, truth) in [compare.truth, compare.shadowed].into_iter().enumerate() {
-                self.filled[at].add(compare.shown(index), truth, index);
-                self.mean_colour[at].add(around, truth, index);
-            }
+            self.filled.add(clamped(filled.rgb[index]), place, index);
+            self.mean_colour.add(colour, place, index);
         }
     }
 
     pub(super) fn scores(&self) -> HoleScores {
-        let [filled, filled_shadowed] = self.filled.map(|squares| squares.psnr());
-        let [mean_colour, mean_colour_shadowed] = self.mean_colour.map(|squares| squares.psnr());
-        let share = (self.pixels > 0).then(|| self.holes as f64 / self.pixels as f64);
-        HoleScores { share, filled, filled_shadowed, mean_colour, mean_colour_shadowed }
+        let ([filled, filled_shadowed], [mean_colour, mean_colour_shadowed]) =
+            (self.filled.psnr(), self.mean_colour.psnr());
+        HoleScores { share: share(self.holes, self.pixels), filled, filled_shadowed, mean_colour, mean_colour_shadowed }
     }
 }
 
 fn is_hole(rendered: &Rendered, index: usize) -> bool {
     rendered.alpha[index] < HOLE
-}
-
-fn bytes(photo: &Photo, index: usize) -> [f64; 3] {
-    let [r, g, b, _] = photo.rgba[index];
-    [r, g, b].map(byte_value)
-}
-
-/// Returns the mean squared difference of two colours.
-fn square(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|channel| (a[channel] - b[channel]).powi(2)).sum::<f64>() / 3.0
 }

@@ -5,7 +5,7 @@
 //! here with exact counts instead of the front-most layer).
 
 use crate::label::vote::ballot::{Ballot, weight};
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 /// Weight in a view above which a Gaussian counts as visible there, px.
@@ -59,27 +59,6 @@ impl Overlap {
     }
 }
 
-/// A pair of groups to join, ordered by overlap, then by number, so that the order is the same everywhere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Candidate {
-    ratio: f64,
-    pair: (usize, usize),
-}
-
-impl Eq for Candidate {}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.ratio.total_cmp(&other.ratio).then(other.pair.cmp(&self.pair))
-    }
-}
-
 /// Groups the masks of all views, without 0, into objects. It joins the two groups with the largest overlap until no
 /// overlap exceeds `SAME_OBJECT`. Two masks of one view never join. Returns the groups, each sorted, in the order of
 /// their first masks.
@@ -130,16 +109,18 @@ fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
 fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>) -> Vec<Vec<Segment>> {
     let mut groups: Vec<Vec<Segment>> = segments.iter().map(|&segment| vec![segment]).collect();
     let mut seen_in: Vec<BTreeSet<usize>> = segments.iter().map(|&(view, _)| [view].into()).collect();
+    // Pairs to join by overlap, whose bits are in its order because it is positive, then by number, so that the order is the
+    // same everywhere.
     let candidate = |a: usize, b: usize, overlap: Overlap| {
         let ratio = overlap.ratio();
-        (ratio >= SAME_OBJECT).then_some(Candidate { ratio, pair: (a.min(b), a.max(b)) })
+        (ratio >= SAME_OBJECT).then_some((ratio.to_bits(), Reverse((a.min(b), a.max(b)))))
     };
     let pairs = links.iter().enumerate().flat_map(|(a, row)| row.iter().map(move |(&b, &overlap)| (a, b, overlap)));
-    let mut heap: BinaryHeap<Candidate> =
+    let mut heap: BinaryHeap<(u64, Reverse<(usize, usize)>)> =
         pairs.filter(|(a, b, _)| a < b).filter_map(|(a, b, overlap)| candidate(a, b, overlap)).collect();
-    while let Some(Candidate { ratio, pair: (a, b) }) = heap.pop() {
+    while let Some((ratio, Reverse((a, b)))) = heap.pop() {
         // An entry is stale if one of its groups has changed.
-        let current = links[a].get(&b).is_some_and(|overlap| overlap.ratio() == ratio);
+        let current = links[a].get(&b).is_some_and(|overlap| overlap.ratio().to_bits() == ratio);
         if !current || groups[a].is_empty() || groups[b].is_empty() || !seen_in[a].is_disjoint(&seen_in[b]) {
             continue;
         }

@@ -2,6 +2,7 @@
 
 use super::associate::{SAME_OBJECT, Segment};
 use crate::scene::LabelMap;
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of one object in a mask above which the whole mask becomes that object. Otherwise the mask covers several
@@ -58,7 +59,7 @@ impl Repairs {
 pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, naming: Naming) -> BTreeMap<Segment, u16> {
     let area = |group: &[Segment]| group.iter().map(|segment| pixels.get(segment).copied().unwrap_or(0)).sum::<u64>();
     let mut by_size: Vec<usize> = (0..groups.len()).collect();
-    by_size.sort_by_key(|&group| (std::cmp::Reverse(area(&groups[group])), groups[group][0]));
+    by_size.sort_by_key(|&group| (Reverse(area(&groups[group])), groups[group][0]));
     let mut names: BTreeMap<usize, u16> = BTreeMap::new();
     let mut taken: BTreeSet<u16> = BTreeSet::new();
     if naming == Naming::Majority {
@@ -69,7 +70,7 @@ pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, nam
             }
         }
         let mut claims: Vec<((usize, u16), u64)> = claims.into_iter().collect();
-        claims.sort_by_key(|&(claim, pixels)| (std::cmp::Reverse(pixels), claim));
+        claims.sort_by_key(|&(claim, pixels)| (Reverse(pixels), claim));
         for ((group, id), _) in claims {
             if !names.contains_key(&group) && taken.insert(id) {
                 names.insert(group, id);
@@ -99,24 +100,38 @@ pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> L
     LabelMap { ids, ..mask.clone() }
 }
 
+/// For each id of a mask, its pixels by the object that the model shows there; 0 where it shows none.
+fn shown_by_id(mask: &LabelMap, shown: &LabelMap) -> BTreeMap<u16, BTreeMap<u16, u64>> {
+    let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
+    for (&id, &object) in mask.ids.iter().zip(&shown.ids) {
+        *counts.entry(id).or_default().entry(object).or_default() += 1;
+    }
+    counts
+}
+
+/// Returns the pixels of an object that the model shows.
+fn area(counts: &BTreeMap<u16, BTreeMap<u16, u64>>, object: u16) -> u64 {
+    counts.values().filter_map(|seen| seen.get(&object)).sum()
+}
+
+/// Returns the object with the most pixels, the smaller id of equals, and these pixels.
+fn most(objects: &BTreeMap<u16, u64>) -> Option<(u16, u64)> {
+    let objects = objects.iter().map(|(&object, &pixels)| (object, pixels)).filter(|(object, _)| *object != 0);
+    objects.max_by_key(|&(object, pixels)| (pixels, Reverse(object)))
+}
+
 /// Repairs a renamed mask by the rendered labels of its view. Divides masks that cover several objects, corrects the
 /// ids of others, and fills in missing objects.
 pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repairs) -> LabelMap {
     let smallest = (SMALLEST * mask.ids.len() as f64).max(4.0) as u64;
-    let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
-    let mut shows: BTreeMap<u16, u64> = BTreeMap::new();
-    for (&id, &seen) in mask.ids.iter().zip(&shown.ids) {
-        *counts.entry(id).or_default().entry(seen).or_default() += 1;
-        *shows.entry(seen).or_default() += 1;
-    }
+    let counts = shown_by_id(mask, shown);
     let mut out = mask.clone();
     for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
         let total: u64 = seen.iter().filter(|(object, _)| **object != 0).map(|(_, &pixels)| pixels).sum();
         let least = smallest.max((PART * total as f64) as u64);
-        let part = |(&object, &pixels): (&u16, &u64)| (object != 0 && pixels >= least).then_some((object, pixels));
-        let objects: BTreeMap<u16, u64> = seen.iter().filter_map(part).collect();
-        let most = objects.iter().max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
-        let Some((&most, &pixels)) = most else { continue };
+        let objects: BTreeMap<u16, u64> =
+            seen.iter().map(|(&object, &pixels)| (object, pixels)).filter(|at| at.0 != 0 && at.1 >= least).collect();
+        let Some((most, pixels)) = most(&objects) else { continue };
         if pixels as f64 >= ONE_OBJECT * total as f64 {
             if most != id {
                 repairs.renamed.push(((view, id), most));
@@ -127,9 +142,9 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
         repairs.divided.push(((view, id), objects.keys().copied().collect()));
         recolour(&mut out, mask, id, |at| if objects.contains_key(&shown.ids[at]) { shown.ids[at] } else { most });
     }
-    let nothing = counts.get(&0).cloned().unwrap_or_default();
-    for (&object, &pixels) in nothing.iter().filter(|(object, _)| **object != 0) {
-        if pixels >= smallest && pixels as f64 >= MISSED * shows[&object] as f64 {
+    let nothing = counts.get(&0).into_iter().flatten();
+    for (&object, &pixels) in nothing.filter(|(object, _)| **object != 0) {
+        if pixels >= smallest && pixels as f64 >= MISSED * area(&counts, object) as f64 {
             repairs.filled.push((view, object));
             for (at, to) in out.ids.iter_mut().enumerate() {
                 if mask.ids[at] == 0 && shown.ids[at] == object {
@@ -150,19 +165,12 @@ pub fn adopt(
     objects: &BTreeSet<u16>,
     repairs: &mut Repairs,
 ) -> LabelMap {
-    let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
-    for (&id, &seen) in mask.ids.iter().zip(&shown.ids).filter(|(id, _)| **id != 0) {
-        *counts.entry(id).or_default().entry(seen).or_default() += 1;
-    }
-    let mut areas: BTreeMap<u16, u64> = BTreeMap::new();
-    shown.ids.iter().for_each(|&object| *areas.entry(object).or_default() += 1);
+    let counts = shown_by_id(mask, shown);
     let mut out = mask.clone();
-    for (&id, seen) in &counts {
+    for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
         let total: u64 = seen.values().sum();
-        let seen = seen.iter().filter(|(object, _)| **object != 0);
-        let most = seen.max_by_key(|&(&object, &pixels)| (pixels, std::cmp::Reverse(object)));
-        let new = match most {
-            Some((object, &pixels)) if pixels as f64 >= SAME_OBJECT * total.min(areas[object]) as f64 => *object,
+        let new = match most(seen) {
+            Some((object, pixels)) if pixels as f64 >= SAME_OBJECT * total.min(area(&counts, object)) as f64 => object,
             _ if objects.contains(&id) => id,
             _ => 0,
         };

@@ -20,34 +20,20 @@ pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
     }
 }
 
-/// Sum and number of the distances along a contour.
-#[derive(Clone, Copy, Default)]
-struct Band {
-    sum: f64,
-    count: u64,
-}
-
-impl Band {
-    fn mean(&self) -> Option<f64> {
-        (self.count > 0).then(|| self.sum / self.count as f64)
-    }
-}
-
 /// Returns the occluders of each object (LabelGS, occlusion analysis). k' hides k if they touch and the mean distance
 /// of the contour of k' with k is smaller than that of k with k'. What has no label hides nothing. There is no margin,
 /// because the scale of the distances is unknown.
 pub fn by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
-    let mut bands: BTreeMap<(u16, u16), Band> = BTreeMap::new();
+    // Sum and number of the distances along each contour.
+    let mut bands: BTreeMap<(u16, u16), (f64, u64)> = BTreeMap::new();
     walk(labels, |own, other, pixel, _| {
-        if own == 0 || other == 0 {
-            return;
-        }
-        let (band, z) = (bands.entry((own, other)).or_default(), distance[pixel]);
-        if z.is_finite() && z > 0.0 {
-            *band = Band { sum: band.sum + z, count: band.count + 1 };
+        let z = distance[pixel];
+        if own != 0 && other != 0 && z.is_finite() && z > 0.0 {
+            let (sum, count) = bands.entry((own, other)).or_default();
+            (*sum, *count) = (*sum + z, *count + 1);
         }
     });
-    let mean = |own: u16, other: u16| bands.get(&(own, other)).and_then(Band::mean);
+    let mean = |own: u16, other: u16| bands.get(&(own, other)).map(|&(sum, count)| sum / count as f64);
     let mut hidden_by: Occluders = labels.objects().into_iter().map(|label| (label, Vec::new())).collect();
     for &(label, other) in bands.keys() {
         if let (Some(own), Some(theirs)) = (mean(label, other), mean(other, label))

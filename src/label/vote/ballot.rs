@@ -35,6 +35,11 @@ impl<'a> Voter<'a> {
     pub fn of(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
         Self { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
     }
+
+    /// Makes voters of the views that have masks.
+    pub fn of_views(views: &[&'a View]) -> Vec<Self> {
+        views.iter().filter_map(|view| Some(Self::of(view, view.mask.as_ref()?))).collect()
+    }
 }
 
 /// The options of a sweep.
@@ -92,6 +97,12 @@ impl Ballot {
     /// Returns the votes for Gaussian `row`.
     pub fn row(&self, row: usize) -> &Row {
         &self.cells[self.starts[row]..self.starts[row + 1]]
+    }
+
+    /// Returns the weight of Gaussian `row` on a label, px.
+    pub fn weight_on(&self, row: usize, label: u32) -> f64 {
+        let on = |cell: &&(u16, u64)| u32::from(self.labels[usize::from(cell.0)]) == label;
+        self.row(row).iter().find(on).map_or(0.0, |&(_, votes)| weight(votes))
     }
 
     /// Returns the weight of Gaussian `row` on all labels, and on other ones than its main one, px.

@@ -78,12 +78,7 @@ pub(crate) fn lower_outside(engine: &mut Engine, voters: &[Voter], how: Sweep, d
     let ballot = sweep(engine, voters, Sweep { alone: true, ..how })?;
     let rows = decision.labels.iter().zip(&mut decision.confidence).enumerate();
     for (row, (&label, confidence)) in rows.filter(|(_, (label, _))| **label != UNLABELLED) {
-        let of = |wanted: u32| {
-            let cells = ballot.row(row).iter();
-            let found = cells.filter(|(column, _)| u32::from(ballot.labels[usize::from(*column)]) == wanted);
-            found.map(|&(_, votes)| weight(votes)).sum::<f64>()
-        };
-        let (inside, outside) = (of(label), of(UNLABELLED));
+        let (inside, outside) = (ballot.weight_on(row, label), ballot.weight_on(row, UNLABELLED));
         if inside + outside > 0.0 {
             *confidence = confidence.min((inside / (inside + outside)) as f32);
         }

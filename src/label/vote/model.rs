@@ -7,7 +7,7 @@ use crate::engine::{Engine, EngineSize, LabelSize};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::render::{RenderOptions, render};
-use crate::scene::{Gaussians, UNLABELLED, View};
+use crate::scene::{Gaussians, Pixels, UNLABELLED, View};
 use crate::scheduler::SchedulerOptions;
 use crate::stage::Stage;
 use rand::SeedableRng;
@@ -53,10 +53,14 @@ pub(crate) fn limited_vote_engine(
     Ok(engine)
 }
 
+/// Returns the objects in the masks of some views.
+pub(crate) fn objects_of(views: &[&View]) -> BTreeSet<u16> {
+    views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect()
+}
+
 /// Returns the number of vote columns for the objects in the masks of some views.
 pub fn columns_of(views: &[&View]) -> u32 {
-    let objects: BTreeSet<u16> = views.iter().filter_map(|view| view.mask.as_ref()).flat_map(|m| m.objects()).collect();
-    columns_for(objects.len())
+    columns_for(objects_of(views).len())
 }
 
 /// Labels a model by votes. `engine` holds the model; `tick` is called in each round.
@@ -67,7 +71,7 @@ pub fn label_by_votes(
     how: &Counting,
     tick: &mut dyn FnMut(u32),
 ) -> Result<()> {
-    let voters: Vec<Voter> = views.iter().filter_map(|view| Some(Voter::of(view, view.mask.as_ref()?))).collect();
+    let voters = Voter::of_views(views);
     let sweep = Sweep::new(how.near, how.mask_border);
     for round in 0..ROUNDS {
         let mut decision = count(engine, &voters, round > 0, &model.means, sweep)?;

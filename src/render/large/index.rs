@@ -75,17 +75,17 @@ impl Index {
         self.labels.as_deref()
     }
 
-    /// Returns true if an object has a Gaussian to be shown alone.
-    pub(super) fn has_object(&self, label: u32) -> bool {
-        self.labels.iter().flatten().zip(&self.sure).any(|(&own, &sure)| own == label && sure)
+    /// Returns true if some objects have a Gaussian to be shown alone.
+    pub(super) fn has_objects(&self, labels: &[u32]) -> bool {
+        self.labels.iter().flatten().zip(&self.sure).any(|(own, &sure)| sure && labels.contains(own))
     }
 
-    /// Returns the places in the index of the Gaussians that a picture may show, sorted; of all, or of one object alone.
-    pub(super) fn seen(&self, uniforms: &StepUniforms, only: Option<u32>) -> Vec<u32> {
+    /// Returns the places in the index of the Gaussians that a picture may show, sorted; of all, or of some objects alone.
+    pub(super) fn seen(&self, uniforms: &StepUniforms, only: Option<&[u32]>) -> Vec<u32> {
         let sight = Sight::new(uniforms);
         let shows = |at: usize| match (only, &self.labels) {
             (None, _) => true,
-            (Some(label), Some(labels)) => self.sure[at] && labels[at] == label,
+            (Some(only), Some(labels)) => self.sure[at] && only.contains(&labels[at]),
             (Some(_), None) => false,
         };
         let all = 0..self.means.len() as u32;

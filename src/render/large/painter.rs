@@ -35,7 +35,7 @@ pub struct Painter<'a> {
     gpu: Arc<Gpu>,
     model: ModelRef<'a>,
     index: Index,
-    only: Option<u32>,
+    only: Option<Vec<u32>>,
     engine: Option<Engine>,
     shape: KernelShape,
     options: SchedulerOptions,
@@ -53,10 +53,10 @@ impl<'a> Painter<'a> {
         self.index.labels()
     }
 
-    /// Draws an object alone from now on, or everything. Returns false if there is no such object.
-    pub fn show(&mut self, only: Option<u32>) -> bool {
-        self.only = only;
-        only.is_none_or(|label| self.index.has_object(label))
+    /// Draws some objects alone from now on, or everything. Returns false if there are no such objects.
+    pub fn show(&mut self, only: Option<&[u32]>) -> bool {
+        self.only = only.map(<[u32]>::to_vec);
+        only.is_none_or(|labels| self.index.has_objects(labels))
     }
 
     /// Draws a picture like [`render`](crate::render::render()). Main Gaussians have their places in the index.
@@ -86,7 +86,8 @@ impl<'a> Painter<'a> {
     fn band(&mut self, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Drawn> {
         let of =
             |part: &Camera| uniforms::view_uniforms(part, self.index.origin, &self.shape, options.near, [0.0; 3], 0);
-        let seen = self.index.seen(&uniforms::with_slopes_of(of(&band.camera(camera)), &of(camera)), self.only);
+        let seen =
+            self.index.seen(&uniforms::with_slopes_of(of(&band.camera(camera)), &of(camera)), self.only.as_deref());
         let part = |error| Drawn::TooLarge(of_part(error, (camera.width, band.rows), seen.len()));
         if let Some(error) = self.labels().and_then(|labels| tell_apart(seen.iter().map(|&at| labels[at as usize]))) {
             return Ok(part(error));

@@ -37,9 +37,3 @@ pub fn adam_value(rules: &Rules, rate: f64, step: u32, [value, m, u]: [f64; 3], 
     let (m_hat, u_hat) = (m / (1.0 - beta1.powf(exponent)), u / (1.0 - beta2.powf(exponent)));
     [value - rate * m_hat / (u_hat.sqrt() + rules.adam_eps), m, u]
 }
-
-/// Learning rate that falls exponentially from `first` to `last` over `steps`.
-pub fn falling_rate(first: f64, last: f64, steps: u32, step: u32) -> f64 {
-    let t = (f64::from(step) / f64::from(steps)).clamp(0.0, 1.0);
-    ((1.0 - t) * first.ln() + t * last.ln()).exp()
-}

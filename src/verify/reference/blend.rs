@@ -102,35 +102,25 @@ impl<'a> Boxed<'a> {
 pub fn trace<'a>(rules: &Rules, splats: impl Iterator<Item = (usize, &'a Splat)>, at: [f64; 2]) -> Trace {
     let mut ray = Trace { transmittance: 1.0, ..Trace::default() };
     for (place, splat) in splats {
-        if !ray.blend(rules, place, splat, at) {
-            break;
-        }
-    }
-    ray
-}
-
-impl Trace {
-    /// Adds one splat; returns false if the ray ends before it.
-    fn blend(&mut self, rules: &Rules, place: usize, splat: &Splat, at: [f64; 2]) -> bool {
         let above = exponent(splat, at) - rules.exponent_min();
-        self.margins.cut = self.margins.cut.min(above.abs());
+        ray.margins.cut = ray.margins.cut.min(above.abs());
         if above < 0.0 {
-            return true;
+            continue;
         }
         let raw = exponent(splat, at).exp2();
         let alpha = raw.min(rules.alpha_max);
-        self.margins.clamp = self.margins.clamp.min((raw / rules.alpha_max - 1.0).abs());
-        let after = self.transmittance * (1.0 - alpha);
-        self.margins.stop = self.margins.stop.min((after / rules.transmittance_min - 1.0).abs());
+        ray.margins.clamp = ray.margins.clamp.min((raw / rules.alpha_max - 1.0).abs());
+        let after = ray.transmittance * (1.0 - alpha);
+        ray.margins.stop = ray.margins.stop.min((after / rules.transmittance_min - 1.0).abs());
         if after < rules.transmittance_min {
-            self.stopped = true;
-            return false;
+            ray.stopped = true;
+            break;
         }
-        let (transmittance, clamped) = (self.transmittance, raw > rules.alpha_max);
-        self.contributions.push(Contribution { splat: place, alpha, transmittance, clamped });
-        self.transmittance = after;
-        true
+        let (transmittance, clamped) = (ray.transmittance, raw > rules.alpha_max);
+        ray.contributions.push(Contribution { splat: place, alpha, transmittance, clamped });
+        ray.transmittance = after;
     }
+    ray
 }
 
 /// Result of blending at a pixel.
@@ -212,10 +202,21 @@ pub fn centre(index: usize, width: usize) -> [f64; 2] {
 
 /// Blends depth-ordered splats over a background.
 pub fn blend_forward(rules: &Rules, splats: &[Splat], size: (usize, usize), background: [f64; 3]) -> Blended {
-    let boxed = Boxed::new(rules, splats);
+    layer_forward(rules, &Boxed::new(rules, splats), |_| true, size, background)
+}
+
+/// Blends the splats of `member`.
+fn layer_forward(
+    rules: &Rules,
+    boxed: &Boxed,
+    member: impl Fn(&Splat) -> bool,
+    size: (usize, usize),
+    background: [f64; 3],
+) -> Blended {
     let pixel = |index: usize| {
         let at = centre(index, size.0);
-        shade(splats, &trace(rules, boxed.near(at), at), background)
+        let members = boxed.near(at).filter(|(_, splat)| member(splat));
+        shade(boxed.splats, &trace(rules, members, at), background)
     };
     Blended { size, pixels: (0..size.0 * size.1).map(pixel).collect() }
 }
@@ -227,6 +228,12 @@ pub struct SplatGradients {
     pub values: Vec<SplatGradient>,
     /// Smallest gradient margin of all pixels in which each splat counts.
     pub margins: Vec<f64>,
+}
+
+impl SplatGradients {
+    fn none(count: usize) -> Self {
+        Self { values: vec![SplatGradient::default(); count], margins: vec![f64::INFINITY; count] }
+    }
 }
 
 /// Gradient of a loss with respect to an image.
@@ -265,8 +272,7 @@ fn layer_backward(
     background: [f64; 3],
     v_image: &Upstream,
 ) -> SplatGradients {
-    let count = boxed.splats.len();
-    let mut out = SplatGradients { values: vec![SplatGradient::default(); count], margins: vec![f64::INFINITY; count] };
+    let mut out = SplatGradients::none(boxed.splats.len());
     for (index, (&v_colour, &v_alpha)) in v_image.colours.iter().zip(&v_image.alphas).enumerate() {
         let at = centre(index, size.0);
         let near = || boxed.near(at).filter(|(_, splat)| member(splat));
@@ -335,8 +341,8 @@ fn ray_backward(
     }
 }
 
-/// Walks each ray once for the scene and the objects: layer 0 blends every splat over `background`, layer 1 + j only
-/// the splats of `slots[j]` over black, each layer with its own transmittance.
+/// The scene and its objects: layer 0 blends every splat over `background`, layer 1 + j only the splats of `slots[j]` over
+/// black, each layer with its own transmittance.
 pub fn blend_layers_forward(
     rules: &Rules,
     splats: &[Splat],
@@ -346,24 +352,9 @@ pub fn blend_layers_forward(
     background: [f64; 3],
 ) -> Vec<Blended> {
     let boxed = Boxed::new(rules, splats);
-    let mut layers = vec![Blended { size, pixels: Vec::new() }; slots.len() + 1];
-    for index in 0..size.0 * size.1 {
-        let at = centre(index, size.0);
-        let mut rays = vec![Trace { transmittance: 1.0, ..Trace::default() }; layers.len()];
-        for (place, splat) in boxed.near(at) {
-            let label = labels[splat.gaussian];
-            for (layer, ray) in rays.iter_mut().enumerate() {
-                if !ray.stopped && (layer == 0 || slots[layer - 1] == label) {
-                    ray.blend(rules, place, splat, at);
-                }
-            }
-        }
-        for (layer, ray) in rays.iter().enumerate() {
-            let behind = if layer == 0 { background } else { [0.0; 3] };
-            layers[layer].pixels.push(shade(splats, ray, behind));
-        }
-    }
-    layers
+    let object = |&slot: &u32| layer_forward(rules, &boxed, |splat| labels[splat.gaussian] == slot, size, [0.0; 3]);
+    let scene = layer_forward(rules, &boxed, |_| true, size, background);
+    std::iter::once(scene).chain(slots.iter().map(object)).collect()
 }
 
 /// Gradients of all layers: the scene's share, and the sum over the object layers.
@@ -378,10 +369,7 @@ pub fn blend_layers_backward(
 ) -> (SplatGradients, SplatGradients) {
     let boxed = Boxed::new(rules, splats);
     let scene = layer_backward(rules, &boxed, |_| true, size, background, &v_layers[0]);
-    let mut objects = SplatGradients {
-        values: vec![SplatGradient::default(); splats.len()],
-        margins: vec![f64::INFINITY; splats.len()],
-    };
+    let mut objects = SplatGradients::none(splats.len());
     for (slot, &label) in slots.iter().enumerate() {
         let member = |splat: &Splat| labels[splat.gaussian] == label;
         let layer = layer_backward(rules, &boxed, member, size, [0.0; 3], &v_layers[slot + 1]);

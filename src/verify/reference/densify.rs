@@ -216,7 +216,7 @@ pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bo
 }
 
 impl Densified {
-    fn push(&mut self, before: &Population, index: usize, (row, (m, u), origin): (Row, (Row, Row), Origin)) {
+    pub(super) fn push(&mut self, before: &Population, index: usize, (row, (m, u), origin): (Row, (Row, Row), Origin)) {
         self.model.rows.push(row);
         self.model.labels.push(before.model.labels[index]);
         self.m.push(m);

@@ -92,6 +92,11 @@ impl Row {
     }
 }
 
+/// All floats of all rows, `[N, ROW_FLOATS]`.
+pub fn floats(rows: &[Row]) -> Vec<f64> {
+    rows.iter().flat_map(Row::floats).collect()
+}
+
 /// One group of all rows, `[N, group]`.
 pub fn flatten(rows: &[Row], group: Group) -> Vec<f64> {
     rows.iter().flat_map(|row| row.floats()[group.range()].to_vec()).collect()
@@ -130,6 +135,23 @@ impl Model {
             rows: (0..gaussians.len()).map(row).collect(),
             labels: gaussians.labels.clone().unwrap_or_else(|| vec![0; gaussians.len()]),
             sh_degree: gaussians.sh_degree,
+        }
+    }
+
+    /// The inverse of [`from_gaussians`](Self::from_gaussians).
+    pub fn gaussians(&self) -> Gaussians {
+        let narrow = |v: f64| v as f32;
+        let rest = 1..super::sh::coefficients(self.sh_degree);
+        Gaussians {
+            means: self.rows.iter().map(|row| row.mean.map(narrow)).collect(),
+            quats: self.rows.iter().map(|row| row.quat.map(narrow)).collect(),
+            scales: self.rows.iter().map(|row| row.scale.map(narrow)).collect(),
+            opacities: self.rows.iter().map(|row| narrow(row.opacity)).collect(),
+            sh0: self.rows.iter().map(|row| row.sh[0].map(narrow)).collect(),
+            sh_rest: self.rows.iter().flat_map(|row| row.sh[rest.clone()].iter().map(|sh| sh.map(narrow))).collect(),
+            sh_degree: self.sh_degree,
+            labels: Some(self.labels.clone()),
+            ..Gaussians::default()
         }
     }
 

@@ -65,14 +65,10 @@ pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> D
     out.model.sh_degree = before.model.sh_degree;
     for (index, row) in before.model.rows.iter().enumerate() {
         let count = counts[index].0;
+        let (zero, moments) = (Row::default(), (before.m[index], before.u[index]));
+        let (stacked, moments) = if count == 1 { (*row, moments) } else { (stacked(rules, row, count), (zero, zero)) };
         for copy in 0..count {
-            let alone = count == 1;
-            let zero = Row::default();
-            out.model.rows.push(if alone { *row } else { stacked(rules, row, count) });
-            out.model.labels.push(before.model.labels[index]);
-            out.m.push(if alone { before.m[index] } else { zero });
-            out.u.push(if alone { before.u[index] } else { zero });
-            out.origins.push((index, if copy == 0 { Origin::Kept } else { Origin::Clone }));
+            out.push(before, index, (stacked, moments, if copy == 0 { Origin::Kept } else { Origin::Clone }));
         }
     }
     out

@@ -30,6 +30,12 @@ impl TileGrid {
         self.size.1.div_ceil(self.tile.1)
     }
 
+    /// Columns and rows of pixels `[start, end)` of each tile, in row-major order.
+    fn spans(&self) -> impl Iterator<Item = ((usize, usize), (usize, usize))> {
+        let all = (0..self.rows()).flat_map(|row| (0..self.columns()).map(move |column| (column, row)));
+        all.map(|(column, row)| (self.span_x(column), self.span_y(row)))
+    }
+
     /// Number of tiles.
     pub fn count(&self) -> usize {
         self.columns() * self.rows()
@@ -89,13 +95,11 @@ pub fn cull(rules: &Rules, splat: &Splat, size: (usize, usize)) -> Touch {
 pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>, f64) {
     let mut tiles = Vec::new();
     let mut margin = f64::INFINITY;
-    for row in 0..grid.rows() {
-        for column in 0..grid.columns() {
-            let touch = touch(rules, splat, grid.span_x(column), grid.span_y(row));
-            margin = margin.min(touch.margin);
-            if touch.touches {
-                tiles.push((row * grid.columns() + column) as u32);
-            }
+    for (tile, (columns, rows)) in (0..).zip(grid.spans()) {
+        let touch = touch(rules, splat, columns, rows);
+        margin = margin.min(touch.margin);
+        if touch.touches {
+            tiles.push(tile);
         }
     }
     (tiles, margin)
@@ -111,16 +115,9 @@ pub fn tiles_within(rules: &Rules, splat: &Splat, grid: &TileGrid, slack: f64) -
 /// Tiles in which at least one pixel counts, by testing each pixel; always a subset of `touched_tiles`.
 pub fn counted_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> Vec<u32> {
     let counts = |x: usize, y: usize| exponent(splat, [x as f64 + 0.5, y as f64 + 0.5]) >= rules.exponent_min();
-    let mut tiles = Vec::new();
-    for row in 0..grid.rows() {
-        for column in 0..grid.columns() {
-            let ((x0, x1), (y0, y1)) = (grid.span_x(column), grid.span_y(row));
-            if (y0..y1).any(|y| (x0..x1).any(|x| counts(x, y))) {
-                tiles.push((row * grid.columns() + column) as u32);
-            }
-        }
-    }
-    tiles
+    let tiles = (0..).zip(grid.spans());
+    let counted = tiles.filter(|&(_, ((x0, x1), (y0, y1)))| (y0..y1).any(|y| (x0..x1).any(|x| counts(x, y))));
+    counted.map(|(tile, _)| tile).collect()
 }
 
 /// A splat in a tile of a layer.

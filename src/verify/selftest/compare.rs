@@ -45,6 +45,22 @@ fn same_length<A, B>(actual: &[A], expected: &[B]) -> Result<(), String> {
     Err(format!("{} elements where {} are expected", actual.len(), expected.len()))
 }
 
+/// Returns the places with a margin above `least`; an error unless they are more than a share of all. Decisions at the other
+/// places may go either way.
+pub fn sure(margins: impl IntoIterator<Item = f64>, least: f64, share: f64) -> Result<Vec<usize>, String> {
+    let is_sure: Vec<bool> = margins.into_iter().map(|margin| margin > least).collect();
+    let sure: Vec<usize> = (0..is_sure.len()).filter(|&place| is_sure[place]).collect();
+    if sure.len() as f64 > share * is_sure.len() as f64 {
+        return Ok(sure);
+    }
+    Err(format!("only {} of {} are away from all decisions", sure.len(), is_sure.len()))
+}
+
+/// Returns the values at some places.
+pub fn pick<T: Copy>(values: &[T], places: &[usize]) -> Vec<T> {
+    places.iter().map(|&place| values[place]).collect()
+}
+
 /// Every element is equal.
 pub fn exact<T: PartialEq + Debug>(actual: &[T], expected: &[T]) -> Verdict {
     same_length(actual, expected)?;
@@ -108,7 +124,6 @@ pub fn close_with_band(
     same_length(actual, expected)?;
     same_length(margins, expected)?;
     let inner: Vec<usize> = (0..actual.len()).filter(|&i| margins[i] >= band.width).collect();
-    let pick = |values: &[f64], places: &[usize]| -> Vec<f64> { places.iter().map(|&i| values[i]).collect() };
     let mut summary = close(&pick(actual, &inner), &pick(expected, &inner), tolerance)
         .map_err(|text| format!("outside the band ({} of {} elements): {text}", inner.len(), actual.len()))?;
     summary.place = inner.get(summary.place).copied().unwrap_or(0);

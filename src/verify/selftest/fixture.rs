@@ -74,7 +74,7 @@ pub fn readable() -> SchedulerOptions {
     SchedulerOptions { plan, poison_step: true, ..SchedulerOptions::default() }
 }
 
-/// A view with its pixels, as a step uses it.
+/// What a step uses of a scene's only view besides camera and masks.
 pub struct OwnView {
     /// Near plane, world units.
     pub near: f32,
@@ -82,44 +82,36 @@ pub struct OwnView {
     pub photo: Photo,
     /// Occluders of each object.
     pub occluders: Occluders,
-    camera: Camera,
-    valid_pixels: u64,
-    view_labels: Vec<u32>,
     /// 1 / known depth of each pixel; empty without.
     pub depths: Vec<f32>,
     shown: BTreeMap<u16, Shown>,
 }
 
 impl OwnView {
-    /// Returns the view for a step.
-    pub fn of_step(&self) -> StepView<'_> {
-        let Self { near, photo, occluders, camera, valid_pixels, view_labels, depths, shown } = self;
-        let (near, finest, valid_pixels) = (*near, step_input::finest(camera), *valid_pixels);
-        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, depths, shown, occluders }
+    fn new(Scene { camera, target, .. }: &Scene) -> Self {
+        let rgba = (target.photo.colours.iter().zip(&target.photo.valid))
+            .map(|(c, &valid)| {
+                let [r, g, b] = c.map(|v| (v * 255.0).round() as u8);
+                [r, g, b, if valid { 255 } else { 0 }]
+            })
+            .collect();
+        let occluders = |slot: &ObjectPixel| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
+        let photo = Photo { width: camera.width, height: camera.height, rgba };
+        Self {
+            near: NEAR,
+            shown: step_input::shown_objects(&photo.rgba, &target.label_map),
+            photo,
+            occluders: target.slots.iter().map(occluders).collect(),
+            depths: Vec::new(),
+        }
     }
-}
 
-/// The trainer's data of a scene's only view.
-fn own_view(scene: &Scene) -> OwnView {
-    let (target, camera) = (&scene.target, scene.camera.clone());
-    let rgba = (target.photo.colours.iter().zip(&target.photo.valid))
-        .map(|(c, &valid)| {
-            let [r, g, b] = c.map(|v| (v * 255.0).round() as u8);
-            [r, g, b, if valid { 255 } else { 0 }]
-        })
-        .collect();
-    let (width, height) = (camera.width, camera.height);
-    let occluders = |slot: &ObjectPixel| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
-    let photo = Photo { width, height, rgba };
-    OwnView {
-        near: NEAR,
-        shown: step_input::shown_objects(&photo.rgba, &target.label_map),
-        view_labels: target.label_map.clone(),
-        depths: Vec::new(),
-        photo,
-        valid_pixels: target.photo.valid.iter().filter(|&&valid| valid).count() as u64,
-        occluders: target.slots.iter().map(occluders).collect(),
-        camera,
+    /// Returns the view of its scene for a step.
+    pub fn of_step<'a>(&'a self, scene: &'a Scene) -> StepView<'a> {
+        let Self { near, photo, occluders, depths, shown } = self;
+        let (camera, near, valid_pixels) = (&scene.camera, *near, step_input::valid_pixels(&photo.rgba));
+        let (finest, view_labels) = (step_input::finest(camera), &scene.target.label_map[..]);
+        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, depths, shown, occluders }
     }
 }
 
@@ -172,10 +164,10 @@ impl Fixture {
         let layers =
             if labels { scene.target.slots.iter().map(|slot| slot.label as u16).collect() } else { Vec::new() };
         let input = StepInput { step: 1, part: 0, layers, labels, update: false, updates: 1 };
-        let view = own_view(&scene);
+        let view = OwnView::new(&scene);
         let fixed = SceneScale { extent: 1.0 };
         let mut fixture = Self { view, engine, scene, input, config, fixed, free_space: None, shared: Vec::new() };
-        let weights = step_input::layer_weights(&fixture.input, fixture.view.of_step(), &fixture.config);
+        let weights = step_input::layer_weights(&fixture.input, fixture.view.of_step(&fixture.scene), &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
     }
@@ -183,7 +175,7 @@ impl Fixture {
     /// The uniforms of the step.
     pub fn uniforms(&self) -> StepUniforms {
         let mut uniforms =
-            step_input::uniforms(&self.input, self.view.of_step(), &self.config, self.fixed, &self.engine);
+            step_input::uniforms(&self.input, self.view.of_step(&self.scene), &self.config, self.fixed, &self.engine);
         if let Some((camera, near)) = &self.free_space {
             uniforms = self.engine.with_free_space(uniforms, camera, *near);
         }
@@ -247,14 +239,16 @@ impl Fixture {
     /// Same as [`Fixture::train`], with another list.
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
-        let data = step_input::train_input(&self.input, self.view.of_step(), &self.config, uniforms, &self.engine);
+        let data =
+            step_input::train_input(&self.input, self.view.of_step(&self.scene), &self.config, uniforms, &self.engine);
         self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
     }
 
     /// Writes the host inputs of a step, for the caller's own lists.
     pub fn write(&mut self) -> Result<()> {
         let uniforms = self.uniforms();
-        let data = step_input::train_input(&self.input, self.view.of_step(), &self.config, uniforms, &self.engine);
+        let view = self.view.of_step(&self.scene);
+        let data = step_input::train_input(&self.input, view, &self.config, uniforms, &self.engine);
         self.engine.write(0, Input::Train(&data))
     }
 
@@ -311,10 +305,9 @@ impl Fixture {
     /// `count` rows of a set of planes (parameters, moments or gradients).
     pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Result<Vec<Row>> {
         let mut floats = vec![[0.0; ROW_FLOATS]; count];
-        let bands = [true, true, true, true].into_iter().chain((1..=3).map(|band| band <= self.config.sh_degree));
-        for ((plane, (stride, runs)), _) in
-            planes.into_iter().zip(LAYOUT).zip(bands.collect::<Vec<_>>()).filter(|p| p.1)
-        {
+        // Bands of colour above the degree have no plane.
+        let there = 4 + self.config.sh_degree as usize;
+        for (plane, (stride, runs)) in planes.into_iter().zip(LAYOUT).take(there) {
             let values = self.get::<f32>(plane, count * stride)?;
             for (row, values) in floats.iter_mut().zip(values.chunks_exact(stride)) {
                 for &(from, to, length) in runs {
@@ -338,6 +331,11 @@ impl Fixture {
             self.engine.raw_mut().upload(plane, 0, 0, &values)?;
         }
         Ok(())
+    }
+
+    /// Parameters of `count` Gaussians, and both moments of `trained` ones.
+    pub fn planes(&mut self, count: usize, trained: usize) -> Result<[Vec<Row>; 3]> {
+        Ok([self.rows(PARAMETERS, count)?, self.rows(MOMENTS_1, trained)?, self.rows(MOMENTS_2, trained)?])
     }
 
     /// Gradients of the last step by Gaussian; 0 without a splat.

@@ -1,14 +1,16 @@
 //! Compares the buffers of the device with the reference, pass by pass.
 
 use super::compare::{
-    Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients as compare_gradients,
+    Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients, pick, sure,
 };
+use crate::scene::Camera;
 use crate::verify::reference::adam::{Optimised, Rates};
 use crate::verify::reference::blend::Blended;
 use crate::verify::reference::lift::Labelled;
 use crate::verify::reference::model::flatten;
+use crate::verify::reference::project::project_forward;
 use crate::verify::reference::splat::{Splat, SplatGradient};
-use crate::verify::reference::{Group, Row};
+use crate::verify::reference::{Group, Model, Row, Rules};
 
 /// Combines several verdicts.
 pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
@@ -20,6 +22,21 @@ pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
         (worst.flips, worst.whole) = (flips, whole);
     }
     Ok(worst)
+}
+
+/// Compares the device's splats with those of the reference for the same Gaussians.
+pub fn projection(
+    rules: &Rules,
+    (camera, model): (&Camera, &Model),
+    actual: &[Splat],
+    tolerance: Tolerance,
+) -> Verdict {
+    let projected = |s: &Splat| project_forward(rules, camera, model, s.gaussian).map(|found| found.splat);
+    let expected: Vec<Splat> = actual.iter().filter_map(projected).collect();
+    if expected.len() < actual.len() {
+        return Err(format!("{} splats count at no pixel", actual.len() - expected.len()));
+    }
+    splats(actual, &expected, tolerance)
 }
 
 /// Compares splats one by one. Shapes are compared relative to their size.
@@ -50,44 +67,36 @@ pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tole
     close_with_band(&actual, &wanted, &margins, (tolerance, band), |_, _| true)
 }
 
-/// Compares label and weight of each pixel with a margin above `sure` (at least 95 % of all).
+/// Compares label and weight of each pixel with a margin above `margin` (more than 95 % of all).
 pub fn label_map(
     (ids, weights): (&[u16], &[f32]),
     expected: &[Labelled],
-    (tolerance, sure): (Tolerance, f64),
+    (tolerance, margin): (Tolerance, f64),
 ) -> Verdict {
-    let all = expected.len();
-    let sure: Vec<usize> = (0..all).filter(|&i| expected[i].margin > sure).collect();
-    if sure.len() * 100 < all * 95 {
-        return Err(format!("only {} of {all} pixels are away from all decisions", sure.len()));
-    }
+    let sure = sure(expected.iter().map(|pixel| pixel.margin), margin, 0.95)?;
     let labels: (Vec<u32>, Vec<u32>) = sure.iter().map(|&i| (u32::from(ids[i]), expected[i].label)).unzip();
     let sums: (Vec<f64>, Vec<f64>) = sure.iter().map(|&i| (f64::from(weights[i]), expected[i].weight)).unzip();
-    self::all([exact(&labels.0, &labels.1), close(&sums.0, &sums.1, tolerance)])
+    all([exact(&labels.0, &labels.1), close(&sums.0, &sums.1, tolerance)])
 }
 
-/// Compares gradients of splats with a margin above `sure` (at least 70 % of all), each kind of float separately.
+/// Compares gradients of splats with a margin above `margin` (more than 70 % of all), each kind of float separately.
 pub fn splat_gradients(
     actual: &[SplatGradient],
     expected: &[SplatGradient],
-    (margins, sure): (&[f64], f64),
+    (margins, margin): (&[f64], f64),
     bounds: GradientBounds,
 ) -> Verdict {
-    let sure: Vec<usize> = (0..actual.len().min(margins.len())).filter(|&i| margins[i] > sure).collect();
-    if sure.len() * 10 <= actual.len() * 7 {
-        return Err(format!("only {} of {} splats are away from all thresholds", sure.len(), actual.len()));
-    }
-    let pick = |of: &[SplatGradient], kind: usize| -> Vec<f64> {
-        let floats = |v: &SplatGradient| match kind {
-            0 => v.mean2d.to_vec(),
-            1 => v.conic.to_vec(),
-            2 => vec![v.opacity],
-            _ => v.colour.to_vec(),
-        };
-        sure.iter().flat_map(|&i| floats(&of[i])).collect()
-    };
-    all(["mean2d", "conic", "opacity", "colour"].into_iter().enumerate().map(|(kind, name)| {
-        compare_gradients(&pick(actual, kind), &pick(expected, kind), bounds).map_err(|text| format!("{name}: {text}"))
+    let sure = sure(margins.iter().copied(), margin, 0.7)?;
+    let (actual, expected) = (pick(actual, &sure), pick(expected, &sure));
+    let kinds: [(&str, fn(&SplatGradient) -> Vec<f64>); 4] = [
+        ("mean2d", |v| v.mean2d.to_vec()),
+        ("conic", |v| v.conic.to_vec()),
+        ("opacity", |v| vec![v.opacity]),
+        ("colour", |v| v.colour.to_vec()),
+    ];
+    all(kinds.into_iter().map(|(name, floats)| {
+        let of = |list: &[SplatGradient]| list.iter().flat_map(floats).collect::<Vec<f64>>();
+        gradients(&of(&actual), &of(&expected), bounds).map_err(|text| format!("{name}: {text}"))
     }))
 }
 
@@ -95,7 +104,7 @@ pub fn splat_gradients(
 pub fn rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
     let active = Group::ALL.into_iter().take(5 + degree as usize);
     all(active.map(|group| {
-        compare_gradients(&flatten(actual, group), &flatten(expected, group), bounds)
+        gradients(&flatten(actual, group), &flatten(expected, group), bounds)
             .map_err(|text| format!("{group:?}: {text}"))
     }))
 }

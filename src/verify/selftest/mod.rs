@@ -3,11 +3,11 @@
 pub mod antialias;
 mod checks;
 pub mod compare;
-pub mod exposure;
+mod exposure;
 pub mod fixture;
 pub mod judge;
 pub mod model;
-pub mod pose;
+mod pose;
 pub mod relocation;
 pub mod scenes;
 mod training;
@@ -16,10 +16,19 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::verify::reference::Rules;
-use checks::Ran;
-use compare::Verdict;
+use checks::FinishedStep;
+use compare::{Tolerance, Verdict};
+use fixture::{Fixture, readable};
+use scenes::{Scene, population, scene_of};
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Vulkan allows `exp2`, division, square roots and similar functions an error of several units in the last place;
+/// lavapipe's error is about one. Bounds are this many times those of the tests on lavapipe.
+const LEEWAY: f64 = 8.0;
+
+/// Compares what a device did with the reference under some rules.
+pub type Judge = Box<dyn Fn(&Rules) -> Verdict>;
 
 /// One check of the self-test.
 #[derive(Clone, Debug)]
@@ -55,16 +64,29 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
     wholes(gpu, kernels, &mut done)
 }
 
-/// Runs the checks of a long list and of a training.
-pub fn wholes(gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
-    type Whole = fn(&Arc<Gpu>, KernelShape) -> Result<Verdict>;
-    let wholes: [(&str, Whole); 2] =
-        [("70,000 splats in a tile", checks::long_list), ("training twice, bit by bit", training::twice)];
-    for (name, whole) in wholes {
-        let start = Instant::now();
-        let verdict = whole(gpu, kernels)?;
-        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
+/// Passes checks on as they end.
+struct Clock<F> {
+    /// End of the check before.
+    last: Instant,
+    done: F,
+}
+
+impl<F: FnMut(Check)> Clock<F> {
+    fn new(done: F) -> Self {
+        Self { last: Instant::now(), done }
     }
+
+    fn ended(&mut self, name: String, verdict: Verdict) {
+        (self.done)(Check { name, verdict, seconds: self.last.elapsed().as_secs_f64() });
+        self.last = Instant::now();
+    }
+}
+
+/// Runs the checks of a long list and of a training.
+pub fn wholes(gpu: &Arc<Gpu>, kernels: KernelShape, done: impl FnMut(Check)) -> Result<()> {
+    let mut clock = Clock::new(done);
+    clock.ended("70,000 splats in a tile".to_owned(), checks::long_list(gpu, kernels)?);
+    clock.ended("training twice, bit by bit".to_owned(), training::twice(gpu, kernels)?);
     Ok(())
 }
 
@@ -74,57 +96,80 @@ pub fn passes(
     gpu: &Arc<Gpu>,
     kernels: KernelShape,
     suffix: &str,
-    mut done: impl FnMut(Check),
+    done: impl FnMut(Check),
 ) -> Result<()> {
-    let start = Instant::now();
-    let mut ran = Ran::new(rules, gpu, kernels)?;
-    let prepared = start.elapsed().as_secs_f64();
-    type Pass = fn(&mut Ran) -> Result<Verdict>;
+    let mut clock = Clock::new(done);
+    let mut step = FinishedStep::new(rules, gpu, kernels)?;
+    type Pass = fn(&mut FinishedStep) -> Result<Verdict>;
     let passes: [(&str, Pass); 14] = [
-        ("depth order", Ran::order),
-        ("projection", Ran::projection),
-        ("tile lists", Ran::tiles),
-        ("blend forward", Ran::blend),
-        ("photo loss and its gradient", Ran::loss),
-        ("votes", Ran::votes),
-        ("votes of Gaussians alone", Ran::votes_alone),
-        ("label map", Ran::label_map),
-        ("blend backward", Ran::blend_backward),
-        ("disagreement of labels", Ran::disagreement),
-        ("weights of Gaussians", Ran::weights),
-        ("gradient of a step with labels", Ran::gradient),
-        ("the same step twice, bit by bit", Ran::repeated),
-        ("Adam", Ran::adam),
+        ("depth order", FinishedStep::order),
+        ("projection", FinishedStep::projection),
+        ("tile lists", FinishedStep::tiles),
+        ("blend forward", FinishedStep::blend),
+        ("photo loss and its gradient", FinishedStep::loss),
+        ("votes", |step| step.votes(false)),
+        ("votes of Gaussians alone", |step| step.votes(true)),
+        ("label map", FinishedStep::label_map),
+        ("blend backward", FinishedStep::blend_backward),
+        ("disagreement of labels", FinishedStep::disagreement),
+        ("weights of Gaussians", FinishedStep::weights),
+        ("gradient of a step with labels", FinishedStep::gradient),
+        ("the same step twice, bit by bit", FinishedStep::repeated),
+        ("Adam", FinishedStep::adam),
     ];
-    for (index, (name, pass)) in passes.into_iter().enumerate() {
-        let start = Instant::now();
-        let verdict = pass(&mut ran)?;
-        let before = if index == 0 { prepared } else { 0.0 };
-        done(Check { name: format!("{name}{suffix}"), verdict, seconds: start.elapsed().as_secs_f64() + before });
+    for (name, pass) in passes {
+        let verdict = pass(&mut step)?;
+        clock.ended(format!("{name}{suffix}"), verdict);
     }
     Ok(())
 }
 
+/// A device, and the shape of its kernels.
+struct Rig<'a> {
+    gpu: &'a Arc<Gpu>,
+    kernels: KernelShape,
+}
+
+impl Rig<'_> {
+    fn fixture(&self, scene: Scene) -> Result<Fixture> {
+        Fixture::new(Arc::clone(self.gpu), scene, true, self.kernels, readable())
+    }
+}
+
 /// Runs the checks of passes that change the model.
-pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, mut done: impl FnMut(Check)) -> Result<()> {
-    type Change = fn(&Rules, &Arc<Gpu>, KernelShape, f64) -> Result<Verdict>;
+pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl FnMut(Check)) -> Result<()> {
+    /// A densification of Gaussians below and above each threshold.
+    fn densified(rig: &Rig, splits_long: bool) -> Result<Judge> {
+        let before = population(710, 500);
+        let tolerance = Tolerance { absolute: 3.5e-7, relative: 3.5e-8 }.times(LEEWAY);
+        model::densification(&mut rig.fixture(scene_of(&before))?, before, (600, splits_long), tolerance)
+    }
+    type Change = fn(&Rig) -> Result<Judge>;
     let changes: [(&str, Change); 11] = [
-        ("densification", model::densification),
-        ("densification along the longest axis", model::long_splits),
-        ("marks of fog", model::fog_of_a_step),
-        ("relocation", relocation::relocation),
-        ("random moves", relocation::exploration),
-        ("reset of opacities", model::reset),
-        ("exposure of a photo", exposure::exposure_of_a_step),
-        ("pose of a photo", pose::pose_of_a_step),
-        ("antialiased splats and their gradient", antialias::splats_of_a_step),
-        ("least sizes of Gaussians", antialias::sizes_of_a_step),
-        ("lift of labels by the paper's rule", model::lift_of_a_step),
+        ("densification", |rig| densified(rig, false)),
+        ("densification along the longest axis", |rig| densified(rig, true)),
+        ("marks of fog", |rig| model::fog(&mut rig.fixture(model::large(63))?)),
+        ("relocation", |rig| {
+            let before = population(711, 200);
+            relocation::relocation(&mut rig.fixture(scene_of(&before))?, before, 300, LEEWAY)
+        }),
+        ("random moves", relocation::random_moves),
+        ("reset of opacities", |rig| {
+            let before = population(120, 300);
+            model::reset(&mut rig.fixture(scene_of(&before))?, before, LEEWAY)
+        }),
+        ("exposure of a photo", exposure::step),
+        ("pose of a photo", pose::step),
+        ("antialiased splats and their gradient", |rig| {
+            antialias::step(&mut rig.fixture(antialias::fine(93))?, LEEWAY)
+        }),
+        ("least sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), LEEWAY)),
+        ("lift of labels by the paper's rule", |rig| model::lift(&mut rig.fixture(model::dominant(131))?)),
     ];
+    let (mut clock, rig) = (Clock::new(done), Rig { gpu, kernels });
     for (name, change) in changes {
-        let start = Instant::now();
-        let verdict = change(rules, gpu, kernels, checks::LEEWAY)?;
-        done(Check { name: name.to_owned(), verdict, seconds: start.elapsed().as_secs_f64() });
+        let judge = change(&rig)?;
+        clock.ended(name.to_owned(), judge(rules));
     }
     Ok(())
 }

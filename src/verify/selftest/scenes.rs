@@ -209,3 +209,9 @@ pub fn population(seed: u64, count: usize) -> Population {
     let model = Model::from_gaussians(&gaussians(&mut random, &shape));
     Population { model, m, u, gradient_sum, gradient_count, frozen: count / 10 }
 }
+
+/// A scene for a population; its picture does not matter.
+pub fn scene_of(population: &Population) -> Scene {
+    let template = scene(1, &Shape { gaussians: 1, ..Shape::default() });
+    Scene { gaussians: population.model.gaussians(), frozen: population.frozen as u32, ..template }
+}

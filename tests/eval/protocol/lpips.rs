@@ -4,7 +4,7 @@ use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
 use labelgs::eval::lpips::convolution::{Layer, Planes, convolve, halve};
 use labelgs::eval::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::eval::{Distance, Rendering, evaluate};
+use labelgs::eval::{Distance, Rendering, Whole, evaluate};
 use labelgs::render::RenderOptions;
 use labelgs::scene::Photo;
 use labelgs::scenes::init::initial_gaussians;
@@ -134,8 +134,8 @@ fn held_out_views_have_a_perceptual_distance() {
     let mut engine = Engine::of_model(std::sync::Arc::clone(&gpu), &model, [(32, 24)]).expect("an engine");
     let options = RenderOptions { background: [0.25; 3], ..RenderOptions::default() };
     let mut scores = |lpips: Option<&dyn Distance>| {
-        let how = Rendering { options, min_confidence: 0.0, train: &[], by_main: false, lpips };
-        evaluate(&mut engine, &model, &views, how, &(), &mut ()).expect("scores")
+        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: 0.0 };
+        evaluate(&mut whole, &views, Rendering { lpips, ..Rendering::new(options) }, &(), &mut ()).expect("scores")
     };
     let found = scores(Some(&Red));
     let own: Vec<f64> = views.iter().map(|view| found.views[&view.name].lpips.expect("a distance")).collect();

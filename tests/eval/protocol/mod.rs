@@ -6,11 +6,12 @@ mod refusals;
 mod rules;
 
 use labelgs::cli::support::exit_status::exit_status;
-use labelgs::eval::protocol::score::Drawn;
-use labelgs::eval::protocol::{Ask, Bench, By, Layout, Painter, Protocol, Report, run};
+use labelgs::eval::Subject;
+use labelgs::eval::protocol::{Ask, Bench, By, Layout, Protocol, Report, run};
 use labelgs::files::image::write_png_grey8;
 use labelgs::files::{LabelEntry, LabelTable};
-use labelgs::scene::{Camera, LabelMap, Photo, View};
+use labelgs::render::{RenderOptions, Rendered};
+use labelgs::scene::{Camera, Photo, View};
 use labelgs::scenes::truth::{files_below, read_truth};
 use labelgs::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,33 +24,48 @@ const SIDE: usize = 8;
 /// the photo, which is 0.8 grey; a label of `dark` is opaque and black.
 pub struct Columns {
     /// Label of each column.
-    pub labels: [u16; SIDE],
+    pub labels: [u32; SIDE],
     /// Labels that are drawn black.
     pub dark: Vec<u32>,
+    /// Labels that are drawn, if not all.
+    pub shown: Option<Vec<u32>>,
 }
 
 /// The grey of photos and objects.
 const GREY: u8 = 204;
 
-impl Painter for Columns {
-    fn label_map(&mut self, camera: &Camera) -> Result<LabelMap> {
-        assert_eq!((camera.width, camera.height), (SIDE as u32, SIDE as u32));
-        Ok(LabelMap { width: SIDE as u32, height: SIDE as u32, ids: self.labels.repeat(SIDE) })
+impl Subject for Columns {
+    fn labels(&self) -> Option<&[u32]> {
+        Some(&self.labels)
     }
 
-    fn draw(&mut self, labels: Option<&[u32]>, camera: &Camera) -> Result<Drawn> {
-        let map = self.label_map(camera)?;
-        let shown = |&id: &u16| labels.is_none_or(|labels| labels.contains(&u32::from(id)));
-        let grey = |id: &u16| if self.dark.contains(&u32::from(*id)) { 0.0 } else { f32::from(GREY) / 255.0 };
-        let rgb = map.ids.iter().map(|id| if shown(id) { [grey(id); 3] } else { [0.0; 3] }).collect();
-        Ok(Drawn { rgb, alpha: map.ids.iter().map(|id| if shown(id) { 1.0 } else { 0.0 }).collect() })
+    fn show(&mut self, only: Option<&[u32]>) -> Result<bool> {
+        self.shown = only.map(<[u32]>::to_vec);
+        Ok(true)
+    }
+
+    fn render(&mut self, camera: &Camera, _: &RenderOptions) -> Result<Rendered> {
+        assert_eq!((camera.width, camera.height), (SIDE as u32, SIDE as u32));
+        let labels = self.labels.repeat(SIDE);
+        let shown = |id: &u32| self.shown.as_ref().is_none_or(|shown| shown.contains(id));
+        let grey = |id: &u32| if self.dark.contains(id) { 0.0 } else { f32::from(GREY) / 255.0 };
+        Ok(Rendered {
+            width: camera.width,
+            height: camera.height,
+            rgb: labels.iter().map(|id| if shown(id) { [grey(id); 3] } else { [0.0; 3] }).collect(),
+            alpha: labels.iter().map(|id| if shown(id) { 1.0 } else { 0.0 }).collect(),
+            depth: Vec::new(),
+            top_id: (0..SIDE as i32).cycle().take(SIDE * SIDE).collect(),
+            top_weight: Vec::new(),
+            labels,
+        })
     }
 }
 
 impl Columns {
     /// Columns of bright labels.
-    pub fn new(labels: [u16; SIDE]) -> Self {
-        Self { labels, dark: Vec::new() }
+    pub fn new(labels: [u32; SIDE]) -> Self {
+        Self { labels, dark: Vec::new(), shown: None }
     }
 }
 
@@ -95,11 +111,12 @@ pub fn run_on(
     let views: Vec<&View> = views.iter().collect();
     let entry = |&(id, name): &(u32, &str)| LabelEntry { name: Some(name.to_owned()), ..LabelEntry::new(id) };
     let names = LabelTable::new(names.iter().map(entry).collect());
-    let labels: BTreeSet<u32> = columns.labels.iter().map(|&id| u32::from(id)).filter(|&id| id != 0).collect();
+    let labels: BTreeSet<u32> = columns.labels.into_iter().filter(|&id| id != 0).collect();
     let lenses = BTreeMap::new();
     let bench = Bench {
         protocol,
         compat,
+        near: 0.2,
         views: &views,
         test: &views[test..],
         names: Some(&names),

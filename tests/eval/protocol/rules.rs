@@ -70,7 +70,7 @@ fn dark_objects_are_lost_by_the_colour_rule_only() {
         columns_file(&folder.path().join(frame).join("cup.png"), 0..2);
     }
     let run = |compat| {
-        let columns = Columns { labels: [1, 2, 0, 0, 0, 0, 0, 0], dark: vec![2] };
+        let columns = Columns { dark: vec![2], ..Columns::new([1, 2, 0, 0, 0, 0, 0, 0]) };
         run_on((Protocol::Labelgs, compat, By::Prompt), folder.path(), VIEWS, &[], columns).expect("scored")
     };
     let (strict, compat) = (run(false), run(true));

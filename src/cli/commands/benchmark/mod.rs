@@ -8,10 +8,10 @@ use crate::cli::support::{
 use crate::engine::{Engine, EngineSize};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::bench::Bench;
-use crate::eval::protocol::paint::EnginePainter;
 use crate::eval::protocol::run::{picture_count, run as run_bench};
 use crate::eval::protocol::score::Distance;
 use crate::eval::protocol::{Ask, By, Layout, Prompt, Protocol};
+use crate::eval::subject::Whole;
 use crate::files::label_table::LabelTable;
 use crate::files::read;
 use crate::scene::{Dataset, UNLABELLED, View};
@@ -78,6 +78,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let bench = Bench {
         protocol,
         compat: args.compat,
+        near: near_plane(&args.model, args.scoring.near)?,
         views: &views,
         test: &test,
         names: names.as_ref(),
@@ -90,14 +91,9 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let size = EngineSize::of_model(&model, sizes);
     let mut engine = Engine::new(open_gpu(context)?, size, args.scoring.memory.options())?;
-    let mut painter = EnginePainter::new(
-        &mut engine,
-        &model,
-        near_plane(&args.model, args.scoring.near)?,
-        args.scoring.sure.min_confidence,
-        args.compat,
-    );
-    let report = run_bench(&layout, &bench, &mut painter, &mut watcher)?;
+    let min_confidence = args.scoring.sure.min_confidence;
+    let mut whole = Whole { engine: &mut engine, model: &model, min_confidence };
+    let report = run_bench(&layout, &bench, &mut whole, &mut watcher)?;
     let table = table(&report);
     watcher.finish(&table)?;
     args.scoring.json.put_out(&report, &table, context)?;

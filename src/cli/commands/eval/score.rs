@@ -8,7 +8,7 @@ use crate::cli::support::{
 };
 use crate::engine::{Engine, EngineSize};
 use crate::eval::by_place;
-use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate_subject, picture_count};
+use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::score::Distance;
 use crate::eval::removal::{self, RemovalTruth, removals};
@@ -46,7 +46,6 @@ pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
     let how = Rendering {
         options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
-        min_confidence: args.scoring.sure.min_confidence,
         train: &dataset.train,
         by_main: args.compat,
         lpips: weights.as_ref().map(|weights| weights as &dyn Distance),
@@ -95,7 +94,7 @@ impl Job<'_> {
         let views = if args.refine_poses { refined.iter().collect() } else { views };
         let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
         let mut engine = Engine::new(gpu.clone(), EngineSize::of_model(&model, sizes), memory)?;
-        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: how.min_confidence };
+        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: args.scoring.sure.min_confidence };
         let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
         if args.removal {
             drop(engine);
@@ -118,7 +117,7 @@ impl Job<'_> {
             }
         }
         let mut watcher = Watcher::new(picture_count(views), args.scoring.page.as_deref(), self.context)?;
-        let (index, notes) = Index::of(model, self.how.min_confidence, |_, _| true)?;
+        let (index, notes) = Index::of(model, args.scoring.sure.min_confidence, |_, _| true)?;
         models::log_notes(&args.model, &notes);
         let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
         let scores = self.of(&mut painter, views, &mut watcher)?;
@@ -127,7 +126,7 @@ impl Job<'_> {
     }
 
     fn of(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
-        let mut scores = evaluate_subject(subject, views, self.how, &self.wholes, watcher)?;
+        let mut scores = evaluate(subject, views, self.how, &self.wholes, watcher)?;
         if let Some(seams) = Seams::of_model(&self.args.model)? {
             subject.show(None)?;
             let draw = &mut |camera: &Camera, options: &RenderOptions| subject.render(camera, options);

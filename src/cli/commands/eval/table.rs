@@ -103,7 +103,7 @@ fn regions(scores: &Scores) -> String {
         "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
         psnr(mean.psnr_seen),
         psnr(mean.psnr_seen_corrected),
-        100.0 * mean.seen_share,
+        100.0 * mean.seen_share.unwrap_or(0.0),
         psnr(mean.psnr_unseen)
     );
     if mean.psnr_objects.is_some() {
