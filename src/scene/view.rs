@@ -3,6 +3,7 @@
 use super::spread::Spread;
 use super::{Camera, LabelMap, Pixels};
 use crate::error::{Error, Result};
+use crate::words::unique;
 use glam::DVec3;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -95,14 +96,7 @@ impl View {
 /// has the same one (`a/1.jpg` and `a_1.png`).
 pub fn stems(views: &[&View]) -> Vec<String> {
     let mut taken = BTreeSet::new();
-    let mut name = |view: &&View| {
-        let stem = view.stem();
-        let free = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}_{n}") });
-        let name = free.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
-        taken.insert(name.clone());
-        name
-    };
-    views.iter().map(&mut name).collect()
+    views.iter().map(|view| unique(view.stem(), "_", &mut taken)).collect()
 }
 
 /// A coloured 3D point.

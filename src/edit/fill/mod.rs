@@ -235,19 +235,16 @@ fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3,
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
     let quat = [turn.w, turn.x, turn.y, turn.z].map(|value| value as f32);
     let scale = [SPREAD.0, SPREAD.0, SPREAD.1].map(|share| (share * cell).ln() as f32);
-    let rest = model.rest_per_gaussian();
-    for (world, colour) in places {
-        model.means.push((*world - model.origin).to_array().map(|value| value as f32));
-        model.quats.push(quat);
-        model.scales.push(scale);
-        model.opacities.push(OPACITY);
-        model.sh0.push(colour.to_array().map(sh0_of));
-        model.sh_rest.extend(std::iter::repeat_n([0.0; 3], rest));
-        if let Some(labels) = &mut model.labels {
-            labels.push(label);
-        }
-        if let Some(shares) = &mut model.label_confidence {
-            shares.push(1.0);
-        }
-    }
+    let count = places.len();
+    model.append(Gaussians {
+        means: places.iter().map(|(world, _)| (*world - model.origin).as_vec3().to_array()).collect(),
+        quats: vec![quat; count],
+        scales: vec![scale; count],
+        opacities: vec![OPACITY; count],
+        sh0: places.iter().map(|(_, colour)| colour.to_array().map(sh0_of)).collect(),
+        sh_rest: vec![[0.0; 3]; count * model.rest_per_gaussian()],
+        labels: Some(vec![label; count]),
+        label_confidence: Some(vec![1.0; count]),
+        ..Gaussians::default()
+    });
 }

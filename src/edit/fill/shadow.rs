@@ -90,7 +90,6 @@ impl Shadows {
 
     /// Brings Gaussians of the surface out of the shadow of the removed, each at most once.
     pub(super) fn lift(&self, sheet: &Sheet, model: &mut Gaussians, is_lit: &mut [bool]) {
-        let rest = model.rest_per_gaussian();
         for row in 0..is_lit.len() {
             let world = model.world(row);
             let is_on = model.label(row) == sheet.label && sheet.plane.height(world).abs() <= on_surface(sheet.cell);
@@ -103,9 +102,7 @@ impl Shadows {
             for (channel, gain) in gain.to_array().into_iter().enumerate() {
                 let sh0 = &mut model.sh0[row][channel];
                 *sh0 = sh0_of(gain * value_of(*sh0));
-                for band in &mut model.sh_rest[row * rest..][..rest] {
-                    band[channel] *= gain as f32;
-                }
+                model.rest_mut(row).iter_mut().for_each(|band| band[channel] *= gain as f32);
             }
         }
     }

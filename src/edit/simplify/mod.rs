@@ -31,7 +31,6 @@ impl<'a> Simplifier<'a> {
     ///
     /// If there are fewer weights than Gaussians.
     pub fn new(model: &'a Gaussians, weights: &[f32]) -> Self {
-        let rest = model.rest_per_gaussian();
         let blob = |row: usize| Blob {
             mean: DVec3::from_array(model.means[row].map(f64::from)),
             covariance: covariance(model.quats[row], model.scales[row]),
@@ -39,7 +38,7 @@ impl<'a> Simplifier<'a> {
             weight: weights[row].into(),
             label: model.label(row),
             confidence: model.label_confidence.as_ref().map_or(1.0, |shares| shares[row]),
-            harmonics: [&[model.sh0[row]], &model.sh_rest[row * rest..(row + 1) * rest]].concat(),
+            harmonics: [&[model.sh0[row]], model.rest(row)].concat(),
             row: Some(row),
         };
         Self { model, blobs: (0..model.len()).map(blob).collect() }
