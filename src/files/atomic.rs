@@ -28,6 +28,11 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
+/// Removes a file, if it is there.
+pub fn remove(path: &Path) -> Result<()> {
+    if path.is_file() { fs::remove_file(path).map_err(Error::write(path)) } else { Ok(()) }
+}
+
 /// Refuses a folder that is not empty: a reader would take old and new files for one set. A missing folder is fine.
 /// `argument` is the flag that named it.
 pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
