@@ -16,6 +16,10 @@ const COLOURS: [[&str; 3]; 3] =
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
+    if table.has("packed_position") {
+        let cure = "a compressed PLY, which is read as a model only; convert it to a plain PLY first";
+        return Err(Error::data(path, "header", cure));
+    }
     let has = |colours: &&[&str; 3]| colours.iter().all(|colour| table.names().any(|name| name == *colour));
     let colours = COLOURS.iter().find(has);
     let largest = colours.and_then(|colours| table.integer_max(colours[0]));
