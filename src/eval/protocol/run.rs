@@ -9,8 +9,8 @@ use super::{Layout, Protocol, Task, Truth};
 use crate::error::Result;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::COVERED;
+use crate::files::resize::shrink_photo;
 use crate::scene::View;
-use crate::scenes::truth::photo_at;
 
 /// Returns the largest number of pictures that [`run`] renders, without prompts.
 #[cfg(feature = "cli")]
@@ -85,7 +85,7 @@ fn score_one(
 ) -> Result<PairScores> {
     let mask = (bench.truth)(&truth.file, view)?;
     let photo = view.photo()?;
-    let photo = photo_at(&photo, mask.width, mask.height);
+    let photo = shrink_photo(&photo, mask.width, mask.height);
     let drawn = painter.draw(labels, &view.camera.resized(mask.width, mask.height))?;
     let scores = score(&drawn, &mask, &photo, bench.compat, bench.lpips)?;
     let found: Vec<bool> = drawn.alpha.iter().map(|&alpha| alpha > COVERED).collect();
@@ -109,7 +109,7 @@ fn show_absent(
     let mask = (bench.truth)(&truth.file, view)?;
     let Some(photo) = &view.photo else { return watch.skip() };
     let photo = photo.get()?;
-    let photo = photo_at(&photo, mask.width, mask.height);
+    let photo = shrink_photo(&photo, mask.width, mask.height);
     let pixels = mask.inside.len();
     watch.see(&Compared {
         object: Some(task.object.clone()),
