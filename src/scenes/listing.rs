@@ -4,6 +4,7 @@ use super::lens::Lens;
 use super::photo_finder::EXTENSIONS;
 use super::pose_convention::Native;
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::words::counted;
 use labelgs_scene::{Camera, Error, Flaw, Point, Result};
 use std::path::{Path, PathBuf};
 
@@ -27,7 +28,7 @@ pub struct Listed {
     /// Camera at the size in the data set.
     pub camera: Camera,
     pub lens: Lens,
-    /// Split of the data set itself: true for held-out.
+    /// True for held-out, false for trained on; `None` until something says it.
     pub test: Option<bool>,
 }
 
@@ -64,6 +65,13 @@ impl Listing {
             notes: Vec::new(),
             flaws: Vec::new(),
             hint: String::new(),
+        }
+    }
+
+    /// Notes what holds for how many of the things called `noun` in a file, where it is any.
+    pub fn note_counts(&mut self, path: &Path, noun: &str, counts: &[(usize, &str)]) {
+        for (count, what) in counts.iter().filter(|(count, _)| *count > 0) {
+            self.notes.push(format!("{} of {} {what}", counted(count, noun), path.display()));
         }
     }
 
