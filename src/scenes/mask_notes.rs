@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Most masks whose edges are looked at.
-const SAMPLE: usize = 16;
+const SAMPLE_MAX: usize = 16;
 
 /// Returns notes on masks that mark no object, belong to no training photo, or have soft edges.
 pub(super) fn notes(masks: &PhotoFiles, dataset: &Dataset) -> Vec<String> {
@@ -35,7 +35,7 @@ fn unused(dataset: &Dataset) -> Option<String> {
 
 fn soft(masks: &PhotoFiles) -> Option<String> {
     let files: Vec<(&str, &Path)> = masks.files().collect();
-    let chosen: Vec<_> = files.iter().step_by(files.len().div_ceil(SAMPLE).max(1)).collect();
+    let chosen: Vec<_> = files.iter().step_by(files.len().div_ceil(SAMPLE_MAX).max(1)).collect();
     let edges = |&&(name, path): &&(&'_ str, &Path)| {
         let map = read_mask(path).ok()?;
         Some((name.to_owned(), Edges::of(&map.ids, map.width, map.height)))

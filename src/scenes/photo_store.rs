@@ -22,7 +22,7 @@ const MASK_BYTES: u64 = 6;
 const MAKING_BYTES: u64 = 16;
 
 /// What happens without space for the file.
-const AGAIN: &str = "photos are decoded again each time, which takes longer";
+const WITHOUT_FILE: &str = "photos are decoded again each time, which takes longer";
 
 /// Size in a photo's file, if there is one.
 type Size = Option<(u32, u32)>;
@@ -98,7 +98,7 @@ impl PhotoStore {
             return picture.into();
         }
         let (facts, size) = (picture.facts(), picture.size());
-        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), AGAIN));
+        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), WITHOUT_FILE));
         let files = Arc::clone(&self.files);
         Pixels::made(Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }), facts)
     }

@@ -33,7 +33,7 @@ pub const SIGHT_SIDE: u32 = 640;
 /// least width, in cells.
 const RING: (f64, f64) = (0.25, 8.0);
 /// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
-const LARGE: f64 = 0.25;
+const BLOCKER_SHARE_MAX: f64 = 0.25;
 /// Most points that one surface is looked for among.
 const POINTS_MAX: usize = 20_000;
 /// Standard deviation of a new Gaussian in and across its surface, in cells: neighbours overlap without gaps.
@@ -171,7 +171,7 @@ impl Place {
     /// Returns true for what is within a margin of the object and not larger than a part of it: haze and sky throw no
     /// shadow.
     fn has(&self, disc: &Disc, margin: f64) -> bool {
-        self.is_near(disc.middle, margin) && disc.radius < LARGE * self.size()
+        self.is_near(disc.middle, margin) && disc.radius < BLOCKER_SHARE_MAX * self.size()
     }
 
     /// Returns the diagonal of the object.

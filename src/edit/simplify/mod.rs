@@ -15,7 +15,7 @@ use std::num::NonZero;
 /// Neighbours that a Gaussian may merge with.
 const NEIGHBOURS: usize = 10;
 /// Share of the Gaussians that may vanish in one round; merged ones find new neighbours in the next.
-const ROUND: f64 = 0.1;
+const ROUND_SHARE_MAX: f64 = 0.1;
 
 /// A model on its way to fewer Gaussians.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl<'a> Simplifier<'a> {
     /// Positions that are not finite.
     pub fn reduce_to(&mut self, count: usize) -> Result<()> {
         while self.blobs.len() > count {
-            let most = (self.blobs.len() - count).min((ROUND * self.blobs.len() as f64).ceil() as usize);
+            let most = (self.blobs.len() - count).min((ROUND_SHARE_MAX * self.blobs.len() as f64).ceil() as usize);
             if self.round(most)? == 0 {
                 break;
             }

@@ -9,7 +9,7 @@ mod text;
 pub mod write;
 
 use super::listed_path::Place;
-use super::listing::{FAR, Listed, Listing, check_camera, require_some};
+use super::listing::{DISTANCE_MAX, Listed, Listing, check_camera, require_some};
 use super::pose_convention::Native;
 use crate::points;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -167,10 +167,10 @@ pub fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Li
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     let before = points.len();
-    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= FAR);
+    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= DISTANCE_MAX);
     if points.len() < before {
         notes.push(format!(
-            "left out {} of {before} points whose position is not finite or beyond {FAR:e}",
+            "left out {} of {before} points whose position is not finite or beyond {DISTANCE_MAX:e}",
             before - points.len()
         ));
     }
