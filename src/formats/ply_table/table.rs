@@ -137,7 +137,7 @@ impl Table {
         let needed = u128::from(self.header_bytes) + skip + stride as u128 * u128::from(count);
         if needed > u128::from(self.file_bytes) {
             let problem = format!(
-                "the header promises {count} rows of `{}` of {stride} bytes, which takes {needed} bytes; the file has {}; \
+                "the header promises {count} rows of {stride} bytes of `{}`, which ends at byte {needed}; the file has {}; \
                  it was cut short or its header is wrong",
                 self.element.name, self.file_bytes
             );
