@@ -27,13 +27,12 @@ fn labels_of(model: &Gaussians) -> Vec<u32> {
 /// direction, 0 keeps it.
 pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix: f32) -> Gaussians {
     let mut out = model.clone();
-    let rest = model.rest_per_gaussian();
     let target = colour.map(|value| sh0_of(f64::from(value)));
     for (row, label) in labels_of(model).into_iter().enumerate() {
         if labels.contains(&label) {
             let old = model.sh0[row];
             out.sh0[row] = [0, 1, 2].map(|c| old[c] * (1.0 - mix) + target[c] * mix);
-            out.sh_rest[row * rest..(row + 1) * rest].iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
+            out.rest_mut(row).iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
         }
     }
     out

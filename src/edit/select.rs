@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub const MIN_LABEL_CONFIDENCE: f32 = 0.6;
 
 /// The Gaussians of a label in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LabelSummary {
     /// The label; 0 is unlabelled.
     pub label: u32,
@@ -27,32 +27,24 @@ pub struct LabelSummary {
     pub centre: [f64; 3],
 }
 
-/// The Gaussians of a label so far.
-#[derive(Clone, Debug)]
-struct Sum {
-    count: u64,
-    mass: f64,
-    min: DVec3,
-    max: DVec3,
-    weighted: DVec3,
-}
-
 /// Adds up the Gaussians of each label, one after the other.
 #[derive(Clone, Debug, Default)]
-pub struct Tally(BTreeMap<u32, Sum>);
+pub struct Tally(BTreeMap<u32, LabelSummary>);
 
 impl Tally {
     /// Adds a Gaussian: its label, its place in the world, and its opacity after the sigmoid.
     pub fn add(&mut self, label: u32, mean: DVec3, opacity: f64) {
-        let start = Sum { count: 0, mass: 0.0, min: DVec3::INFINITY, max: DVec3::NEG_INFINITY, weighted: DVec3::ZERO };
+        let (min, max, centre) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
+        let start = LabelSummary { label, count: 0, opacity_mass: 0.0, min, max, centre };
         let sum = self.0.entry(label).or_insert(start);
         // Never 0, so that invisible Gaussians have a centre too.
         let opacity = opacity.max(1e-200);
         sum.count += 1;
-        sum.mass += opacity;
-        sum.min = sum.min.min(mean);
-        sum.max = sum.max.max(mean);
-        sum.weighted += mean * opacity;
+        sum.opacity_mass += opacity;
+        sum.min = DVec3::from(sum.min).min(mean).to_array();
+        sum.max = DVec3::from(sum.max).max(mean).to_array();
+        // Weighted until the end.
+        sum.centre = (DVec3::from(sum.centre) + mean * opacity).to_array();
     }
 
     /// Returns the number of Gaussians per label.
@@ -62,15 +54,8 @@ impl Tally {
 
     /// Returns one row per label, sorted.
     pub fn summaries(&self) -> Vec<LabelSummary> {
-        let row = |(&label, sum): (&u32, &Sum)| LabelSummary {
-            label,
-            count: sum.count,
-            opacity_mass: sum.mass,
-            min: sum.min.to_array(),
-            max: sum.max.to_array(),
-            centre: (sum.weighted / sum.mass).to_array(),
-        };
-        self.0.iter().map(row).collect()
+        let row = |sum: &LabelSummary| LabelSummary { centre: sum.centre.map(|at| at / sum.opacity_mass), ..*sum };
+        self.0.values().map(row).collect()
     }
 }
 

@@ -28,6 +28,11 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
+/// Removes a file, if it is there.
+pub fn remove(path: &Path) -> Result<()> {
+    if path.is_file() { fs::remove_file(path).map_err(Error::write(path)) } else { Ok(()) }
+}
+
 /// Refuses a folder that is not empty: a reader would take old and new files for one set. A missing folder is fine.
 /// `argument` is the flag that named it.
 pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
@@ -150,14 +155,14 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
 
 /// Least age of a temporary file before a command that has not locked the folder removes it. On a shared disk, its
 /// process may run on another computer.
-const STALE: Duration = Duration::from_secs(3600);
+const STALE_AGE: Duration = Duration::from_secs(3600);
 
 /// Removes temporary files of killed commands from a folder, at the first write of this process there.
 fn clean_once(folder: &Path) {
     static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let is_new = CLEANED.lock().is_ok_and(|mut cleaned| cleaned.insert(folder.to_owned()));
     if is_new {
-        remove_stale(folder, STALE);
+        remove_stale(folder, STALE_AGE);
     }
 }
 

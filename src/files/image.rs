@@ -5,7 +5,8 @@ use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer,
 use image::{ImageDecoder, ImageReader};
 use labelgs_scene::view::alpha_of;
 use labelgs_scene::{Error, Photo, Result};
-use std::io::{BufRead, Cursor, ErrorKind, Seek};
+use png::{BitDepth, ColorType, Compression, EncodingError};
+use std::io::{BufRead, Cursor, ErrorKind, Seek, Write};
 use std::path::Path;
 
 /// Most pixels of an image. Larger ones are refused before decoding.
@@ -159,76 +160,77 @@ fn over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {
     [blend(r, background[0]), blend(g, background[1]), blend(b, background[2]), 255]
 }
 
+/// Channels and bits of a PNG.
+type Layout = (ColorType, BitDepth);
+
+const RGB8: Layout = (ColorType::Rgb, BitDepth::Eight);
+const RGBA8: Layout = (ColorType::Rgba, BitDepth::Eight);
+const GREY8: Layout = (ColorType::Grayscale, BitDepth::Eight);
+const GREY16: Layout = (ColorType::Grayscale, BitDepth::Sixteen);
+
 /// Writes an 8-bit RGB PNG; `pixels` is row-major.
 pub fn write_png_rgb8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
-    write_png(path.as_ref(), (width, height), png::ColorType::Rgb, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
+    write_png(path.as_ref(), (width, height), RGB8, pixels.as_flattened())
 }
 
 /// Writes an 8-bit RGBA PNG with straight alpha; `pixels` is row-major.
 pub fn write_png_rgba8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
-    write_png(path.as_ref(), (width, height), png::ColorType::Rgba, png::BitDepth::Eight, bytemuck::cast_slice(pixels))
+    write_png(path.as_ref(), (width, height), RGBA8, pixels.as_flattened())
 }
 
 /// Writes an 8-bit grey PNG; `pixels` is row-major.
 pub fn write_png_grey8(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u8]) -> Result<()> {
-    write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Eight, pixels)
+    write_png(path.as_ref(), (width, height), GREY8, pixels)
 }
 
 /// Writes a 16-bit grey PNG, such as an id map; `pixels` is row-major.
 pub fn write_png_grey16(path: impl AsRef<Path>, width: u32, height: u32, pixels: &[u16]) -> Result<()> {
-    let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
-    write_png(path.as_ref(), (width, height), png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+    write_png(path.as_ref(), (width, height), GREY16, &big_endian(pixels))
 }
 
-fn write_png(
-    path: &Path,
-    (width, height): (u32, u32),
-    colour: png::ColorType,
-    depth: png::BitDepth,
-    bytes: &[u8],
-) -> Result<()> {
-    atomic::write(path, |out| {
-        let mut encoder = png::Encoder::new(out, width, height);
-        encoder.set_color(colour);
-        encoder.set_depth(depth);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(bytes)?;
-        Ok(writer.finish()?)
-    })
+fn write_png(path: &Path, size: (u32, u32), layout: Layout, bytes: &[u8]) -> Result<()> {
+    atomic::write(path, |out| Ok(encode_png(out, size, layout, Compression::default(), bytes)?))
 }
 
 /// Returns 8-bit RGB as the bytes of a PNG, compressed as fast as possible.
 pub fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
-    fast_png(size, png::ColorType::Rgb, png::BitDepth::Eight, pixels.as_flattened())
+    fast_png(size, RGB8, pixels.as_flattened())
 }
 
 /// Returns 8-bit RGB with opacity as the bytes of a PNG, compressed as fast as possible.
 pub fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
-    fast_png(size, png::ColorType::Rgba, png::BitDepth::Eight, pixels.as_flattened())
+    fast_png(size, RGBA8, pixels.as_flattened())
 }
 
 /// Returns 16-bit grey as the bytes of a PNG, compressed as fast as possible.
 pub fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
-    let bytes: Vec<u8> = pixels.iter().flat_map(|value| value.to_be_bytes()).collect();
-    fast_png(size, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
+    fast_png(size, GREY16, &big_endian(pixels))
 }
 
-fn fast_png(
-    (width, height): (u32, u32),
-    colour: png::ColorType,
-    depth: png::BitDepth,
-    bytes: &[u8],
-) -> Result<Vec<u8>> {
+fn fast_png(size: (u32, u32), layout: Layout, bytes: &[u8]) -> Result<Vec<u8>> {
     let mut out = Vec::with_capacity(bytes.len() / 2 + 256);
-    let mut encoder = png::Encoder::new(&mut out, width, height);
+    let written = encode_png(&mut out, size, layout, Compression::Fastest, bytes);
+    written.map(|()| out).map_err(|error| Error::Bug(format!("PNG in memory: {error}")))
+}
+
+fn encode_png(
+    out: &mut dyn Write,
+    (width, height): (u32, u32),
+    (colour, depth): Layout,
+    compression: Compression,
+    bytes: &[u8],
+) -> Result<(), EncodingError> {
+    let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(colour);
     encoder.set_depth(depth);
-    encoder.set_compression(png::Compression::Fastest);
-    let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(bytes)?;
-        writer.finish()
-    });
-    written.map(|()| out).map_err(|error| Error::Bug(format!("PNG in memory: {error}")))
+    encoder.set_compression(compression);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(bytes)?;
+    writer.finish()
+}
+
+fn big_endian(pixels: &[u16]) -> Vec<u8> {
+    pixels.iter().flat_map(|value| value.to_be_bytes()).collect()
 }
 
 /// Returns 8-bit RGB as the bytes of a JPEG, for slow lines.

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// First bytes that tell what a file is.
-const FIRST: u64 = 512;
+const FIRST_BYTES: u64 = 512;
 
 /// What a file is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +129,7 @@ pub fn name_of_content(first: &[u8]) -> Option<Content> {
 /// Returns what the file at `path` is, if its first bytes tell.
 pub fn of_file(path: &Path) -> Result<Option<Content>> {
     let mut first = Vec::new();
-    read::open(path)?.take(FIRST).read_to_end(&mut first).map_err(Error::read(path))?;
+    read::open(path)?.take(FIRST_BYTES).read_to_end(&mut first).map_err(Error::read(path))?;
     Ok(name_of_content(&first))
 }
 

@@ -4,6 +4,7 @@
 
 use super::{atomic, read, run_folder};
 use labelgs_scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
+use labelgs_scene::words::unique;
 use labelgs_scene::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -21,10 +22,7 @@ fn schema_version() -> u32 {
 
 /// Returns `name`, with the first number appended that makes it unique.
 pub fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
-    let numbered = (2..).map(|number| format!("{name} {number}"));
-    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
-    taken.insert(free.clone());
-    free
+    unique(name, " ", taken)
 }
 
 /// One object. A file needs the id only; the colour of an entry without one is that of [`LabelEntry::new`].
@@ -114,10 +112,7 @@ impl LabelTable {
 
     /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.
     pub fn checked(&self, path: &Path) -> Result<Self> {
-        if self.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", self.schema_version);
-            return Err(Error::data(path, "schema_version", problem));
-        }
+        read::require_version(path, self.schema_version, SCHEMA_VERSION)?;
         let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
         for entry in &self.labels {
             let place = format!("label {}", entry.id);
@@ -165,8 +160,7 @@ impl LabelTable {
 
     /// Writes the table, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-        atomic::write(path, |out| out.write_all(text.as_bytes()))
+        atomic::write_json(path, self)
     }
 
     /// Returns the entry of an id.
@@ -196,8 +190,7 @@ impl LabelTable {
     pub fn put(table: Option<&Self>, path: &Path) -> Result<()> {
         match table {
             Some(table) => table.write(path),
-            None if path.is_file() => std::fs::remove_file(path).map_err(Error::write(path)),
-            None => Ok(()),
+            None => atomic::remove(path),
         }
     }
 

@@ -12,6 +12,7 @@ pub mod kind;
 pub mod label_table;
 pub mod names;
 pub mod npy;
+pub mod photo_files;
 pub mod read;
 pub mod resize;
 pub mod run_folder;

@@ -57,7 +57,11 @@ pub fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>
     if found.iter().all(Option::is_some) {
         return found;
     }
-    let names: Names = there.iter().map(|&name| name.to_owned()).collect();
+    // The name of each key; `None` if several names share it.
+    let mut by_key: HashMap<String, Option<&str>> = HashMap::new();
+    for &name in there {
+        by_key.entry(folded(name)).and_modify(|only| *only = None).or_insert(Some(name));
+    }
     let mut owners: HashMap<String, usize> = HashMap::new();
     for keys in keys {
         let own: BTreeSet<String> = keys.iter().map(|key| folded(key)).collect();
@@ -65,33 +69,9 @@ pub fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>
     }
     for (found, keys) in found.iter_mut().zip(keys).filter(|(found, _)| found.is_none()) {
         let mut own = keys.iter().filter(|key| owners.get(&folded(key)) == Some(&1));
-        *found = own.find_map(|key| names.only(key)).map(str::to_owned);
+        *found = own.find_map(|key| *by_key.get(&folded(key))?).map(str::to_owned);
     }
     found
-}
-
-/// The files of a folder, found by their name or, if no file has it, by the only name that matches.
-#[derive(Debug, Default)]
-pub struct Names {
-    /// The name of each key; `None` if several files share the key.
-    by_key: HashMap<String, Option<String>>,
-}
-
-impl Names {
-    /// Returns the file that matches `name` alone.
-    pub fn only(&self, name: &str) -> Option<&str> {
-        self.by_key.get(&folded(name))?.as_deref()
-    }
-}
-
-impl FromIterator<String> for Names {
-    fn from_iter<T: IntoIterator<Item = String>>(names: T) -> Self {
-        let mut by_key = HashMap::new();
-        for name in names {
-            by_key.entry(folded(&name)).and_modify(|only| *only = None).or_insert(Some(name));
-        }
-        Self { by_key }
-    }
 }
 
 #[cfg(test)]
@@ -99,13 +79,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_match_across_case_and_composition_where_one_file_has_them() {
+    fn names_match_across_case_and_composition() {
         assert_eq!(folded("Cafe\u{301}.PNG"), folded("caf\u{e9}.png"));
         assert_ne!(folded("cafe.png"), folded("caf\u{e9}.png"));
-        let names: Names = ["u\u{308}ber/A.PNG", "b.png", "B.png"].map(str::to_owned).into_iter().collect();
-        assert_eq!(names.only("\u{dc}ber/a.png"), Some("u\u{308}ber/A.PNG"));
-        assert_eq!(names.only("b.png"), None, "two files share the key");
-        assert_eq!(names.only("c.png"), None);
     }
 
     #[test]
@@ -118,6 +94,7 @@ mod tests {
         assert_eq!(claimed(&["A", "b"], &["a", "b"]), ["a", "b"]);
         assert_eq!(claimed(&["A", "a"], &["a"]), ["", "a"], "the other owner has its mask");
         assert_eq!(claimed(&["A", "\u{e9}"], &["a", "e\u{301}"]), ["a", "e\u{301}"]);
+        assert_eq!(claimed(&["\u{dc}ber/a.png", "c.png"], &["u\u{308}ber/A.PNG"]), ["u\u{308}ber/A.PNG", ""]);
         assert_eq!(claimed(&["IMG"], &["Img", "img"]), [""], "two files match");
     }
 }

@@ -108,6 +108,14 @@ pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str)
     })
 }
 
+/// Refuses a file whose layout has another version than the known one.
+pub fn require_version(path: &Path, found: u32, known: u32) -> Result<()> {
+    if found == known {
+        return Ok(());
+    }
+    Err(Error::data(path, "schema_version", format!("has version {found}, labelgs reads {known}")))
+}
+
 /// Lists the paths in a folder, in no particular order.
 pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let all = || {

@@ -23,6 +23,15 @@ pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     if smaller_first { along(b, a) } else { along(a, b) }
 }
 
+/// Says what is wrong if no scale brings a picture to the size of another. Each comes with its name.
+pub fn aspect_problem((what, size): (&str, (u32, u32)), (of, other): (&str, (u32, u32))) -> Option<String> {
+    let text = || {
+        let ((width, height), (other_width, other_height)) = (size, other);
+        format!("{what} has {width} x {height} px and {of} {other_width} x {other_height} px, which no scale explains")
+    };
+    (size.0 == 0 || size.1 == 0 || !same_aspect(size, other)).then(text)
+}
+
 /// Returns the first source pixel of each target pixel along one side, and the weights from there on, which sum to 1.
 fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     let ratio = f64::from(from) / f64::from(to);

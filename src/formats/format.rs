@@ -97,12 +97,6 @@ impl<'a> Export<'a> {
         if self.origin == DVec3::ZERO { self.model.world(row).as_vec3().to_array() } else { self.model.means[row] }
     }
 
-    /// Returns the coefficients of a row above degree 0, as triples (r, g, b).
-    pub fn rest(&self, row: usize) -> &'a [[f32; 3]] {
-        let rest = self.model.rest_per_gaussian();
-        &self.model.sh_rest[row * rest..(row + 1) * rest]
-    }
-
     /// Returns the labels, unless none are to be written.
     pub fn labels(&self) -> Option<&'a [u32]> {
         self.model.labels.as_deref().filter(|_| self.options.label_type != LabelType::None)
@@ -121,6 +115,8 @@ pub struct ModelFormat {
     pub name: &'static str,
     /// Extensions of its files: lower case, with the dot.
     pub endings: &'static [&'static str],
+    /// What the first bytes of its files may say that they are.
+    pub contents: &'static [&'static str],
     /// Reads a file, through `labelgs_files::read`.
     pub read: fn(&Path) -> Result<ReadModel>,
     /// Writes a file; `None` if the format is only read.

@@ -62,7 +62,7 @@ impl<'a> ModelRef<'a> {
     /// Reads all of it.
     pub fn read(self) -> Result<Cow<'a, Gaussians>> {
         match self {
-            Self::Stored(stored) => Ok(Cow::Owned(read_model(stored.path())?.gaussians)),
+            Self::Stored(stored) => Ok(Cow::Owned(read_model(&stored.path)?.gaussians)),
             Self::Whole(model) => Ok(Cow::Borrowed(model)),
         }
     }
@@ -70,7 +70,7 @@ impl<'a> ModelRef<'a> {
     /// Number of rows; of a file, those included that cannot be rendered.
     pub fn count(self) -> u64 {
         match self {
-            Self::Stored(stored) => stored.count(),
+            Self::Stored(stored) => stored.count,
             Self::Whole(model) => model.len() as u64,
         }
     }
@@ -78,7 +78,7 @@ impl<'a> ModelRef<'a> {
     /// Degree of the spherical harmonics.
     pub fn sh_degree(self) -> u32 {
         match self {
-            Self::Stored(stored) => stored.sh_degree(),
+            Self::Stored(stored) => stored.sh_degree,
             Self::Whole(model) => model.sh_degree,
         }
     }
@@ -86,7 +86,7 @@ impl<'a> ModelRef<'a> {
     /// Returns true if Gaussians have labels.
     pub fn has_labels(self) -> bool {
         match self {
-            Self::Stored(stored) => stored.has_labels(),
+            Self::Stored(stored) => stored.has_labels,
             Self::Whole(model) => model.labels.is_some(),
         }
     }
@@ -94,7 +94,7 @@ impl<'a> ModelRef<'a> {
     /// World position to which positions are relative.
     pub fn origin(self) -> DVec3 {
         match self {
-            Self::Stored(stored) => stored.origin(),
+            Self::Stored(stored) => stored.origin,
             Self::Whole(model) => model.origin,
         }
     }
@@ -102,29 +102,21 @@ impl<'a> ModelRef<'a> {
     /// Calls `see` with number and values of each row that can be rendered, in order. Returns notes for the user.
     pub fn scan(self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
         let model = match self {
-            Self::Stored(stored) => {
-                return stored.scan(|number, row| {
-                    see(number, row);
-                    Ok(())
-                });
-            }
+            Self::Stored(stored) => return stored.scan(see),
             Self::Whole(model) => model,
         };
-        let rest = model.rest_per_gaussian();
         for row in 0..model.len() {
-            see(
-                row as u64,
-                &Row {
-                    position: model.means[row].map(f64::from),
-                    quat: model.quats[row].map(f64::from),
-                    scale: model.scales[row],
-                    opacity: model.opacities[row],
-                    sh0: model.sh0[row],
-                    rest: &model.sh_rest[row * rest..(row + 1) * rest],
-                    label: model.labels.as_ref().map(|labels| labels[row]),
-                    confidence: model.label_confidence.as_ref().map(|shares| shares[row]),
-                },
-            );
+            let values = Row {
+                position: model.means[row].map(f64::from),
+                quat: model.quats[row].map(f64::from),
+                scale: model.scales[row],
+                opacity: model.opacities[row],
+                sh0: model.sh0[row],
+                rest: model.rest(row),
+                label: model.labels.as_ref().map(|labels| labels[row]),
+                confidence: model.label_confidence.as_ref().map(|shares| shares[row]),
+            };
+            see(row as u64, &values);
         }
         Ok(Vec::new())
     }

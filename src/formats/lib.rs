@@ -73,7 +73,7 @@ fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
         return Ok(FORMATS[0]);
     }
     let content = kind::of_file(path)?;
-    let own = |format: &&'static ModelFormat| content.is_some_and(|content| contents(format).contains(&content.what));
+    let own = |format: &&'static ModelFormat| content.is_some_and(|content| format.contents.contains(&content.what));
     if let Some(format) = FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
         return Ok(format);
     }
@@ -83,22 +83,10 @@ fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
     Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", endings(|_| true))))
 }
 
-/// What the first bytes of a format say that it is.
-fn contents(format: &ModelFormat) -> &'static [&'static str] {
-    match format.name {
-        "PLY" => &["a PLY"],
-        "SPZ" => &["an SPZ", "a file packed by gzip"],
-        "GLB" => &["a GLB"],
-        "SOG" => &["a zip archive"],
-        "HTML" => &["a web page", "a page of HTML or XML"],
-        _ => &[],
-    }
-}
-
 /// Returns the error of a reader, or what the file is instead if its first bytes tell.
 fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
     let content = if path.is_file() { kind::of_file(path).ok().flatten() } else { None };
-    match content.filter(|content| !contents(format).contains(&content.what)) {
+    match content.filter(|content| !format.contents.contains(&content.what)) {
         Some(content) => Error::data(path, "byte 0", content.told(&format!("a file of the format {}", format.name))),
         None => error,
     }

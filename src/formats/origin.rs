@@ -36,10 +36,7 @@ pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<
     }
     let expected = r#"expected {"schema_version": 1, "world_origin": [x, y, z], "gaussians": N}; correct or delete it"#;
     let file: File = read::json(&path, expected)?;
-    if file.schema_version != SCHEMA_VERSION {
-        let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", file.schema_version);
-        return Err(Error::data(&path, "schema_version", problem));
-    }
+    read::require_version(&path, file.schema_version, SCHEMA_VERSION)?;
     let origin = DVec3::from_array(file.world_origin);
     if !origin.as_vec3().is_finite() {
         return Err(Error::data(&path, "world_origin", format!("is beyond the range of 32-bit floats; {expected}")));
@@ -62,5 +59,5 @@ pub(super) fn write(model: &Path, origin: DVec3, gaussians: u64) -> Result<()> {
         let file = File { schema_version: SCHEMA_VERSION, world_origin: origin.to_array(), gaussians };
         return atomic::write_json(&path, &file);
     }
-    if path.is_file() { std::fs::remove_file(&path).map_err(Error::write(&path)) } else { Ok(()) }
+    atomic::remove(&path)
 }

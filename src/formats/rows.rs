@@ -95,7 +95,7 @@ impl Sieve {
 pub(super) struct Rows {
     to: Gaussians,
     positions: Vec<DVec3>,
-    sieve: Sieve,
+    pub(super) sieve: Sieve,
 }
 
 impl Rows {
@@ -125,11 +125,6 @@ impl Rows {
             shares.push(row.confidence.unwrap_or_default());
         }
         self.positions.push(DVec3::from_array(row.position));
-    }
-
-    /// Returns true if the values look activated.
-    pub(super) fn look_activated(&self) -> bool {
-        self.sieve.looks_activated()
     }
 
     /// Returns the model, with a note on the rows left out. Its positions are relative to `origin`; without one in the

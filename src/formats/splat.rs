@@ -10,7 +10,8 @@ use labelgs_scene::{Error, Result};
 use std::path::Path;
 
 /// The format by its ending.
-pub(super) const FORMAT: ModelFormat = ModelFormat { name: ".splat", endings: &[".splat"], read, write: None };
+pub(super) const FORMAT: ModelFormat =
+    ModelFormat { name: ".splat", endings: &[".splat"], contents: &[], read, write: None };
 
 /// Bytes of a Gaussian: position and size as floats, red, green, blue, opacity, and the rotation w, x, y, z as bytes.
 const BYTES: usize = 32;

@@ -19,6 +19,27 @@ pub(super) fn log_scale(scale: f32) -> f32 {
     if (0.0..SCALE_MIN).contains(&scale) { SCALE_MIN.ln() } else { scale.ln() }
 }
 
+/// The quaternion of unit length.
+pub(super) fn unit(quat: [f32; 4]) -> [f32; 4] {
+    let length = quat.iter().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt();
+    quat.map(|value| (f64::from(value) / length) as f32)
+}
+
+/// The place of the component that is farthest from 0, the first of equal ones.
+pub(super) fn place_of_largest(quat: [f32; 4]) -> usize {
+    (0..4).fold(0, |best, at| if quat[at].abs() > quat[best].abs() { at } else { best })
+}
+
+/// The quaternion of its largest component, the place of that, and the others in order.
+pub(super) fn with_largest(largest: f64, place: u32, [a, b, c]: [f64; 3]) -> [f64; 4] {
+    match place {
+        0 => [largest, a, b, c],
+        1 => [a, largest, b, c],
+        2 => [a, b, largest, c],
+        _ => [a, b, c, largest],
+    }
+}
+
 /// The value from 0 to 255 that is nearest.
 pub(super) fn byte(value: f32) -> u8 {
     value.round().clamp(0.0, 255.0) as u8

@@ -3,7 +3,8 @@
 use super::shortened;
 use super::soft_edges::{self, Edges};
 use labelgs_scene::median::median;
-use labelgs_scene::{Camera, LabelMap, Point, Setting};
+use labelgs_scene::words::name_of;
+use labelgs_scene::{Camera, Dataset, LabelMap, Point, Setting, View};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,21 +58,8 @@ pub enum Problem {
 
 impl Problem {
     /// Returns the display name.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::Missing => "missing",
-            Self::Misnamed => "misnamed",
-            Self::Missized => "missized",
-            Self::Unreadable => "unreadable",
-            Self::HeldOut => "held-out",
-            Self::NoObject => "no-object",
-            Self::OneArea => "one-area",
-            Self::SoftEdges => "soft-edges",
-            Self::Inverted => "inverted",
-            Self::NearlyEmpty => "nearly-empty",
-            Self::SingleView => "single-view",
-            Self::Blink => "blink",
-        }
+    pub fn text(self) -> String {
+        name_of(&self)
     }
 }
 
@@ -86,6 +74,13 @@ pub struct Finding {
     pub id: Option<u32>,
     /// Description.
     pub text: String,
+}
+
+impl Finding {
+    /// Makes one about no photo and no object.
+    pub(super) fn of_scene(problem: Problem, text: String) -> Self {
+        Self { problem, view: None, id: None, text }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -159,7 +154,7 @@ impl Look {
 /// makes many others.
 pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
     if let Some((problem, text)) = problem_of_all(masks) {
-        return vec![Finding { problem, view: None, id: None, text }];
+        return vec![Finding::of_scene(problem, text)];
     }
     let ids: BTreeSet<u16> = masks.iter().flat_map(|(_, look)| look.objects.keys().copied()).collect();
     let mut found = nearly_empty_masks(masks);
@@ -203,18 +198,25 @@ pub fn one_area(masks: usize, id: u16) -> String {
     )
 }
 
-/// What is wrong with masks of photos that are held out.
-pub fn held_out(photos: &[&str]) -> String {
-    format!(
-        "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
-         photos, or hold out others by {} of the training",
-        shortened(photos),
-        Setting("test_every")
-    )
+/// What is wrong if only photos that are held out have masks. `has_mask` tells of a photo to train on or held out.
+pub fn held_out(dataset: &Dataset, has_mask: impl Fn(&View) -> bool) -> Option<String> {
+    if dataset.train.iter().any(&has_mask) {
+        return None;
+    }
+    let photos: Vec<&str> = dataset.test.iter().filter(|view| has_mask(view)).map(|view| view.name.as_str()).collect();
+    let text = || {
+        format!(
+            "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
+             photos, or hold out others by {} of the training",
+            shortened(&photos),
+            Setting("test_every")
+        )
+    };
+    (!photos.is_empty()).then(text)
 }
 
 fn finding(problem: Problem, view: &str, id: Option<u16>, text: String) -> Finding {
-    Finding { problem, view: Some(view.to_owned()), id: id.map(u32::from), text }
+    Finding { view: Some(view.to_owned()), id: id.map(u32::from), ..Finding::of_scene(problem, text) }
 }
 
 fn percent(share: f64) -> String {

@@ -1,6 +1,7 @@
 //! Instances of COCO: one JSON with all photos. CVAT and Label Studio export it too.
 
 use super::marks::{Found, Mark, Shape, require_aspect};
+use super::names;
 use super::photos::PhotoIndex;
 use super::polygon::Polygons;
 use super::rle::Rle;
@@ -95,7 +96,7 @@ pub(super) fn file(path: &Path) -> Result<PathBuf> {
 /// Reads the file.
 pub(super) fn read(path: &Path, views: &[&View]) -> Result<Found> {
     let file: File = read::json(path, EXPECTED)?;
-    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let photos = names(views);
     let images = images(path, &photos, &file.images)?;
     let names: HashMap<String, &str> =
         file.categories.iter().map(|category| (category.id.to_string(), category.name.as_str())).collect();
@@ -182,7 +183,7 @@ fn mark(annotation: &Annotation, names: &HashMap<String, &str>, shape: Shape) ->
 
 /// Returns the pixels, or none for a box; an error is what is wrong.
 fn shape(annotation: &Annotation, image: &Image, view: &View) -> Result<Option<Shape>, String> {
-    let photo = (view.camera.width, view.camera.height);
+    let photo = view.camera.size();
     match &annotation.segmentation {
         Value::Null => Ok(None),
         Value::Array(lists) if lists.is_empty() => Ok(None),

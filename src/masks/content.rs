@@ -49,24 +49,17 @@ impl Kind {
     }
 }
 
-/// Ids of the source, one per pixel.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct SourceIds {
-    pub(super) size: (u32, u32),
-    pub(super) ids: Vec<u32>,
-}
-
 /// Returns true if the picture has one value per pixel, in whatever channels.
 pub(super) fn is_grey(path: &Path) -> Result<bool> {
     Ok(read_raw(path, |_| Ok(()))?.values(path)?.is_some())
 }
 
-/// Reads ids from a PNG of the kind `expected`: value, index, or R + 256 G + 65536 B.
+/// Reads size and ids of a PNG of the kind `expected`, one per pixel: value, index, or R + 256 G + 65536 B.
 pub(super) fn read_ids(
     path: &Path,
     expected: Kind,
     accept: impl FnOnce((u32, u32)) -> Result<()>,
-) -> Result<SourceIds> {
+) -> Result<((u32, u32), Vec<u32>)> {
     let wrong = |found: Kind| {
         let problem = format!(
             "is a {} picture where {} is expected; set {} to what the folder holds",
@@ -87,7 +80,7 @@ pub(super) fn read_ids(
         let values = raw.values(path)?.ok_or_else(|| wrong(Kind::of(&raw.header)))?;
         values.into_iter().map(u32::from).collect()
     };
-    Ok(SourceIds { size: raw.header.size, ids })
+    Ok((raw.header.size, ids))
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,8 +88,6 @@ pub(super) struct Binary {
     pub(super) size: (u32, u32),
     /// True for pixels of the object, row-major.
     pub(super) inside: Vec<bool>,
-    /// Number of distinct values, 0 included if present.
-    pub(super) values: usize,
     /// True if the pixels have only one value besides 0, so that no threshold was needed.
     pub(super) sharp: bool,
 }
@@ -115,7 +106,7 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
     }
     let half = (1_u32 << (raw.header.depth as u32)) / 2;
     let inside = |&value: &u16| if sharp { value != 0 } else { u32::from(value) >= half };
-    Ok(Binary { size, inside: values.iter().map(inside).collect(), values: distinct.len(), sharp })
+    Ok(Binary { size, inside: values.iter().map(inside).collect(), sharp })
 }
 
 /// Returns the value of each pixel: grey, index, or the largest of its colours.

@@ -30,8 +30,8 @@ pub(super) fn decode(reading: &Reading, photo: usize, view: &View) -> Result<Dec
     match &reading.content {
         Content::Ids { kind, of_photo, .. } => {
             let path = reading.root.join(of_photo[photo].as_deref().unwrap_or_default());
-            let read = read_ids(&path, *kind, |found| fits(&path, found, view))?;
-            Ok(Decoded { size: read.size, ids: read.ids, shared: Shared::new(), shared_pixels: 0, cut: 0 })
+            let (size, ids) = read_ids(&path, *kind, |found| fits(&path, found, view))?;
+            Ok(Decoded { size, ids, shared: Shared::new(), shared_pixels: 0, cut: 0 })
         }
         Content::Marks { of_photo, .. } => blend(&reading.root, &of_photo[photo], view, reading.overlap),
     }
@@ -45,7 +45,7 @@ fn fits(path: &Path, found: (u32, u32), view: &View) -> Result<()> {
 fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Decoded> {
     let mut layers = Vec::with_capacity(marks.len());
     let (mut size, mut cut) = (None, 0);
-    let photo = (view.camera.width, view.camera.height);
+    let photo = view.camera.size();
     for (at, mark) in marks.iter().enumerate() {
         let (own, spans) = match &mark.shape {
             Shape::Png(file) => {

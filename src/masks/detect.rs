@@ -5,7 +5,7 @@ use super::folder::{Claims, Layouts, layouts, root};
 use super::marks::{Found, Mark, Numbering, Object, Shape, number};
 use super::mask::read_header;
 use super::pred::Pred;
-use super::{Format, ImportOptions, ObjectPer, Overlap, shortened, tools};
+use super::{Format, ImportOptions, ObjectPer, Overlap, names, shortened, tools};
 use labelgs_files::names::below;
 use labelgs_files::read;
 use labelgs_scene::{Error, Result, Setting, View};
@@ -75,7 +75,7 @@ fn nested_formats() -> String {
 
 /// Detects the format for these photos.
 pub(super) fn detect(views: &[&View], options: &ImportOptions) -> Result<Reading> {
-    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let photos = names(views);
     if !options.folder.exists() {
         return Err(Error::data(&options.folder, "", "there is no such folder of masks"));
     }

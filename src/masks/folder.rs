@@ -1,8 +1,9 @@
 //! The files in a folder of masks, and the photo of each.
 
 use super::Format;
-use super::mask_folder::{photo_keys, png_key};
+use super::mask_folder::png_key;
 use labelgs_files::names::claim;
+use labelgs_files::photo_files::photo_keys;
 use labelgs_files::read;
 use labelgs_scene::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};

@@ -5,9 +5,8 @@
 use super::check::no_object;
 use super::decode::{Decoded, Shared, decode};
 use super::detect::{Content, Reading, detect};
-use super::mask_folder::with_png;
 use super::soft_edges::{self, Edges};
-use super::{Format, ImportOptions, ObjectPer, Overlap, shortened};
+use super::{Format, ImportOptions, ObjectPer, Overlap, names, shortened};
 use labelgs_files::all::all_or_one_error;
 use labelgs_files::label_table::{FILE, LabelEntry, LabelTable, unique_name};
 use labelgs_files::{atomic, image};
@@ -84,7 +83,7 @@ struct Survey {
 pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<Imported> {
     atomic::require_empty("output", output)?;
     let views = dataset.all();
-    let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let names = names(&views);
     let reading = detect(&views, options)?;
     let decode = |photo: usize| decode(&reading, photo, views[photo]);
     let with_mask: Vec<usize> = (0..views.len()).filter(|&at| reading.has_mask(at)).collect();
@@ -237,13 +236,12 @@ fn labels(reading: &Reading, surveys: &[Survey]) -> Result<(Vec<LabelEntry>, Has
 
 /// Returns the names of the masks: the photo's name with `.png` in place of the extension, or appended if two photos
 /// differ only in the extension.
-fn output_names(photos: &[&str]) -> Vec<PathBuf> {
-    let mut count: HashMap<PathBuf, usize> = HashMap::new();
-    photos.iter().for_each(|name| *count.entry(Path::new(name).with_extension("")).or_default() += 1);
-    let own = |name: &&str| {
-        let bare = Path::new(name).with_extension("");
-        with_png(if count.get(&bare) == Some(&1) { &bare } else { Path::new(name) })
-    };
+fn output_names(photos: &[&str]) -> Vec<String> {
+    let bare = |name: &str| Path::new(name).with_extension("").to_string_lossy().into_owned();
+    let mut count: HashMap<String, usize> = HashMap::new();
+    photos.iter().for_each(|name| *count.entry(bare(name)).or_default() += 1);
+    let own =
+        |name: &&str| format!("{}.png", if count.get(&bare(name)) == Some(&1) { bare(name) } else { (*name).into() });
     photos.iter().map(own).collect()
 }
 

@@ -2,17 +2,18 @@
 
 use super::check::{Finding, Look, Problem, findings, held_out};
 use super::mask::{read_header, read_mask};
-use super::mask_folder::MaskFolder;
+use super::mask_folder::masks_of_photos;
+use super::names;
 use labelgs_files::label_table::FILE;
 use labelgs_files::names::below;
-use labelgs_files::resize::same_aspect;
+use labelgs_files::resize::aspect_problem;
 use labelgs_scene::sampling::every;
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Dataset, Error, Point, Result, View};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The content of a folder of masks, and its problems.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,17 +31,14 @@ pub struct Report {
 /// Checks the masks in `folder` for the photos of `dataset`. An unusable mask is a finding, not an error.
 pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     let views = dataset.all();
-    let masks = MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()))?;
-    let paths: Vec<Option<PathBuf>> = views.iter().map(|view| masks.find(&view.name)).collect();
+    let masks = masks_of_photos(folder, &names(&views))?;
+    let paths: Vec<Option<&Path>> = views.iter().map(|view| masks.find(&view.name)).collect();
     // A look remembers what is at each point.
     let points = dataset.points.iter().step_by(every(dataset.points.len(), views.len()));
     let points: Vec<Point> = points.copied().collect();
     let stage = Stage::new("checking masks", views.len());
-    let looks: Vec<Result<Look, Finding>> = views
-        .par_iter()
-        .zip(&paths)
-        .map(|(view, path)| stage.counted(|| look(&points, view, path.as_deref())))
-        .collect();
+    let looks: Vec<Result<Look, Finding>> =
+        views.par_iter().zip(&paths).map(|(view, path)| stage.counted(|| look(&points, view, *path))).collect();
     drop(stage);
 
     let mut found = misnamed(folder, &paths)?;
@@ -51,14 +49,8 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
             Err(finding) => found.push(finding.clone()),
         }
     }
-    let named = |views: &[View]| {
-        views.iter().map(|view| view.name.clone()).filter(|name| masks.find(name).is_some()).collect::<Vec<_>>()
-    };
-    let (train, test) = (named(&dataset.train), named(&dataset.test));
-    if train.is_empty() && !test.is_empty() {
-        let text = held_out(&test.iter().map(String::as_str).collect::<Vec<_>>());
-        found.push(Finding { problem: Problem::HeldOut, view: None, id: None, text });
-    }
+    let held_out = held_out(dataset, |view| masks.find(&view.name).is_some());
+    found.extend(held_out.map(|text| Finding::of_scene(Problem::HeldOut, text)));
     found.extend(findings(&usable));
     found.sort();
     let ids: BTreeSet<u32> = usable.iter().flat_map(|(_, look)| look.ids()).collect();
@@ -66,24 +58,20 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
 }
 
 fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Finding> {
-    let finding = |problem, text: String| Finding { problem, view: Some(view.name.clone()), id: None, text };
+    let finding = |problem, text: String| Finding { view: Some(view.name.clone()), ..Finding::of_scene(problem, text) };
     let Some(path) = path else { return Err(finding(Problem::Missing, "has no mask".into())) };
     let unreadable = |error: Error| finding(Problem::Unreadable, error.to_string());
     let size = read_header(path).map_err(unreadable)?.size;
-    let photo = (view.camera.width, view.camera.height);
-    if !same_aspect(size, photo) {
-        let (mask, photo) = (format!("{} x {} px", size.0, size.1), format!("{} x {} px", photo.0, photo.1));
-        let text = format!("{} has {mask} and the photo {photo}, which no scale explains", path.display());
+    if let Some(text) = aspect_problem((&path.display().to_string(), size), ("the photo", view.camera.size())) {
         return Err(finding(Problem::Missized, text));
     }
     let map = read_mask(path).map_err(unreadable)?;
     Ok(Look::new(&map, &view.camera, points))
 }
 
-fn misnamed(folder: &Path, used: &[Option<PathBuf>]) -> Result<Vec<Finding>> {
-    let used: BTreeSet<&Path> = used.iter().flatten().map(PathBuf::as_path).collect();
+fn misnamed(folder: &Path, used: &[Option<&Path>]) -> Result<Vec<Finding>> {
+    let used: BTreeSet<&Path> = used.iter().copied().flatten().collect();
     let unused = below(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));
-    let text = |file: String| format!("{file} belongs to no photo");
-    let finding = |file| Finding { problem: Problem::Misnamed, view: None, id: None, text: text(file) };
+    let finding = |file| Finding::of_scene(Problem::Misnamed, format!("{file} belongs to no photo"));
     Ok(unused.map(finding).collect())
 }

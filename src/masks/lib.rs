@@ -30,8 +30,14 @@ pub use inspect::{Report, inspect};
 pub use mask::read_mask;
 
 use labelgs_files::names::shortened;
+use labelgs_scene::View;
+use labelgs_scene::words::name_of;
 use serde::Serialize;
 use std::path::PathBuf;
+
+fn names<'a>(views: &[&'a View]) -> Vec<&'a str> {
+    views.iter().map(|view| view.name.as_str()).collect()
+}
 
 /// The format of a folder of masks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -73,23 +79,8 @@ pub enum Format {
 
 impl Format {
     /// Returns the name in settings and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::DevaShort => "deva-short",
-            Self::DevaLong => "deva-long",
-            Self::Palette => "palette",
-            Self::Grey16 => "grey16",
-            Self::Binary => "binary",
-            Self::BinaryFolders => "binary-folders",
-            Self::PhotoFolders => "photo-folders",
-            Self::ObjectMask => "object-mask",
-            Self::LerfMask => "lerf-mask",
-            Self::ThreeDOvs => "3d-ovs",
-            Self::Coco => "coco",
-            Self::SamFolders => "sam-folders",
-            Self::SamJson => "sam-json",
-        }
+    pub fn name(self) -> String {
+        name_of(&self)
     }
 }
 

@@ -4,7 +4,7 @@ use super::polygon::Polygons;
 use super::rle::Rle;
 use super::{ObjectPer, shortened};
 use labelgs_files::label_table::unique_name;
-use labelgs_files::resize::same_aspect;
+use labelgs_files::resize::aspect_problem;
 use labelgs_scene::{Error, Result, Setting, View};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -156,12 +156,6 @@ pub(super) fn require_photo(source: &Path, photos: &[&str], found: &Found, named
 
 /// Fails with what is wrong if no scale makes a mask of the photo's size. `what` has that size.
 pub(super) fn require_aspect(what: &str, size: (u32, u32), view: &View) -> Result<(), String> {
-    let photo = (view.camera.width, view.camera.height);
-    if size.0 > 0 && size.1 > 0 && same_aspect(size, photo) {
-        return Ok(());
-    }
-    Err(format!(
-        "{what} has {} x {} px and its photo {} {} x {} px, which no scale explains; use masks of the same photos",
-        size.0, size.1, view.name, photo.0, photo.1
-    ))
+    let problem = aspect_problem((what, size), (&format!("its photo {}", view.name), view.camera.size()));
+    problem.map_or(Ok(()), |problem| Err(problem + "; use masks of the same photos"))
 }

@@ -6,7 +6,6 @@
 
 use labelgs_files::image::{check_png_length, check_size};
 use labelgs_files::read;
-use labelgs_files::resize::same_aspect;
 use labelgs_scene::{Error, LabelMap, Result};
 use png::DecodingError;
 use std::io::{BufRead, BufReader, ErrorKind};
@@ -181,9 +180,4 @@ fn unpack(line: &[u8], depth: png::BitDepth, width: usize) -> Vec<u16> {
             line.chunks_exact(2).take(width).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect()
         }
     }
-}
-
-/// Returns true if a mask of size `found` can serve a photo of size `photo`: they differ by a scale only.
-pub fn mask_size_fits(found: (u32, u32), photo: (u32, u32)) -> bool {
-    same_aspect(found, photo)
 }

@@ -4,7 +4,7 @@ use super::spans::Spans;
 use serde_json::Value;
 
 /// Largest coordinate; no picture is as large.
-const FAR: f64 = 1e6;
+const COORDINATE_MAX: f64 = 1e6;
 
 /// The outlines of an object in a picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ impl Polygons {
                 let count = numbers.len();
                 return Err(format!("polygon {} has {count} numbers; expected x and y of 3 points or more", at + 1));
             }
-            if let Some(far) = numbers.iter().find(|number| !(number.abs() <= FAR)) {
+            if let Some(far) = numbers.iter().find(|number| !(number.abs() <= COORDINATE_MAX)) {
                 return Err(format!("polygon {} has the coordinate {far}; expected pixels of the picture", at + 1));
             }
             Ok(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())

@@ -2,9 +2,11 @@
 //! `metadata.csv`, or `NAME.json` with run lengths.
 
 use super::marks::{Found, Mark, Shape, require_aspect};
-use super::mask_folder::{photo_keys, png_key};
+use super::mask_folder::png_key;
+use super::names;
 use super::rle::Rle;
 use labelgs_files::names::claim;
+use labelgs_files::photo_files::photo_keys;
 use labelgs_files::read;
 use labelgs_scene::{Error, Result, View};
 use rayon::prelude::*;
@@ -13,17 +15,13 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-const TABLE: &str = "metadata.csv";
+/// What follows the name of a photo in the path of its table of pictures, and in that of its list of run lengths.
+pub(super) const TABLE: &str = "/metadata.csv";
+pub(super) const LIST: &str = ".json";
 
-/// Returns the folder of each photo among the files of a folder.
-pub(super) fn folders(photos: &[&str], files: &[String]) -> Vec<Option<String>> {
-    let there = files.iter().filter_map(|file| file.strip_suffix(TABLE)?.strip_suffix('/')).collect();
-    claim(&photo_keys(photos), &there)
-}
-
-/// Returns the JSON of each photo, without `.json`, among the files of a folder.
-pub(super) fn lists(photos: &[&str], files: &[String]) -> Vec<Option<String>> {
-    let there = files.iter().filter_map(|file| file.strip_suffix(".json")).collect();
+/// Returns for each photo the file with an ending that belongs to it, without the ending.
+pub(super) fn of_photos(photos: &[&str], files: &[String], ending: &str) -> Vec<Option<String>> {
+    let there = files.iter().filter_map(|file| file.strip_suffix(ending)).collect();
     claim(&photo_keys(photos), &there)
 }
 
@@ -35,25 +33,41 @@ pub(super) fn is_list(path: &Path) -> Result<bool> {
 }
 
 /// Reads the folders of pictures.
-pub(super) fn read_folders(root: &Path, photos: &[&str], files: &[String]) -> Result<Found> {
-    let folders = folders(photos, files);
-    let mut found = Found::default();
-    for folder in &folders {
-        found.of_photo.push(match folder {
-            Some(folder) => pictures(root, folder, files)?,
-            None => Vec::new(),
-        });
-    }
-    let own: BTreeSet<&str> = folders.iter().flatten().map(String::as_str).collect();
-    let others = files.iter().filter_map(|file| file.strip_suffix(TABLE)?.strip_suffix('/'));
-    found.strays = others.filter(|folder| !own.contains(folder)).map(str::to_owned).collect();
-    super::marks::require_photo(root, photos, &found, &found.strays)?;
+pub(super) fn read_folders(root: &Path, views: &[&View], files: &[String]) -> Result<Found> {
+    let others = |folder: &str| folder.to_owned();
+    read_all(root, views, (files, TABLE), others, |folder, _| pictures(root, folder, files))
+}
+
+/// Reads the lists of run lengths.
+pub(super) fn read_lists(root: &Path, views: &[&View], files: &[String]) -> Result<Found> {
+    let file = |name: &str| format!("{name}{LIST}");
+    read_all(root, views, (files, LIST), file, |name, view| masks(&root.join(file(name)), view))
+}
+
+/// Reads what `read` finds of each photo by the name of its file without the ending; `stray` is how such a name is told if
+/// it belongs to no photo.
+fn read_all(
+    root: &Path,
+    views: &[&View],
+    (files, ending): (&[String], &str),
+    stray: impl Fn(&str) -> String,
+    read: impl Fn(&str, &View) -> Result<Vec<Mark>> + Sync,
+) -> Result<Found> {
+    let photos = names(views);
+    let own = of_photos(&photos, files, ending);
+    let marks = |(name, view): (&Option<String>, &&View)| name.as_ref().map_or(Ok(Vec::new()), |name| read(name, view));
+    let of_photo = own.par_iter().zip(views).map(marks).collect::<Vec<Result<Vec<Mark>>>>();
+    let mut found = Found { of_photo: of_photo.into_iter().collect::<Result<_>>()?, ..Found::default() };
+    let own: BTreeSet<&str> = own.iter().flatten().map(String::as_str).collect();
+    let others = files.iter().filter_map(|file| file.strip_suffix(ending)).filter(|name| !own.contains(name));
+    found.strays = others.map(stray).collect();
+    super::marks::require_photo(root, &photos, &found, &found.strays)?;
     Ok(found)
 }
 
 /// Returns the pictures that the table of a photo lists.
 fn pictures<'a>(root: &Path, folder: &str, files: &'a [String]) -> Result<Vec<Mark>> {
-    let path = root.join(folder).join(TABLE);
+    let path = root.join(format!("{folder}{TABLE}"));
     let text = read::text(&path)?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     if lines.next().is_none_or(|(_, line)| line.split(',').next() != Some("id")) {
@@ -102,23 +116,6 @@ struct Annotation {
 }
 
 const EXPECTED: &str = r#"expected what amg.py writes as run lengths: [{"segmentation": {"size": [height, width], "counts": "..."}, "area": 9}]"#;
-
-/// Reads the lists of run lengths.
-pub(super) fn read_lists(root: &Path, views: &[&View], files: &[String]) -> Result<Found> {
-    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-    let lists = lists(&photos, files);
-    let masks = |(list, view): (&Option<String>, &&View)| match list {
-        Some(list) => masks(&root.join(format!("{list}.json")), view),
-        None => Ok(Vec::new()),
-    };
-    let of_photo = lists.par_iter().zip(views).map(masks).collect::<Vec<Result<Vec<Mark>>>>();
-    let mut found = Found { of_photo: of_photo.into_iter().collect::<Result<_>>()?, ..Found::default() };
-    let own: BTreeSet<&str> = lists.iter().flatten().map(String::as_str).collect();
-    let others = files.iter().filter(|file| file.strip_suffix(".json").is_some_and(|name| !own.contains(name)));
-    found.strays = others.cloned().collect();
-    super::marks::require_photo(root, &photos, &found, &found.strays)?;
-    Ok(found)
-}
 
 fn masks(path: &Path, view: &View) -> Result<Vec<Mark>> {
     // The message of a type with two forms tells neither line nor reason.

@@ -7,7 +7,7 @@ use labelgs_scene::Setting;
 use std::collections::BTreeMap;
 
 /// Shortest run of one value that counts as an area, px.
-const AREA: usize = 3;
+const AREA_MIN: usize = 3;
 /// Most lines of a mask that are looked at, in each direction.
 const LINES_MAX: usize = 128;
 /// Fewest edges that tell anything.
@@ -19,7 +19,7 @@ const SOFT_SHARE: f64 = 0.3;
 const ONE_VALUE: f64 = 0.9;
 /// Length of the way from one area to the next through the values between, relative to the straight one: filters and JPEG
 /// swing beyond both sides.
-const WAY: f64 = 1.5;
+const WAY_MAX: f64 = 1.5;
 
 /// The edges between the areas of a mask, along lines.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl Edges {
         let mut last: Option<(u32, usize)> = None;
         let mut at = 0;
         for run in line.chunk_by(|a, b| a == b) {
-            if run.len() >= AREA {
+            if run.len() >= AREA_MIN {
                 if let Some((value, end)) = last {
                     self.add_edge(value, &line[end..at], run[0]);
                 }
@@ -74,7 +74,7 @@ impl Edges {
             before = value;
         }
         let mut inside = between.iter().filter(|&&value| low < value && value < high).peekable();
-        if inside.peek().is_some() && way as f64 <= WAY * f64::from(high - low) + 4.0 {
+        if inside.peek().is_some() && way as f64 <= WAY_MAX * f64::from(high - low) + 4.0 {
             self.soft += 1;
             inside.for_each(|&value| *self.between.entry(value).or_default() += 1);
         }

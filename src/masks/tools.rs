@@ -2,7 +2,7 @@
 
 use super::folder::{layouts, root};
 use super::marks::Found;
-use super::mask_folder::MaskFolder;
+use super::mask_folder::no_mask_found;
 use super::{Format, Overlap, coco, sam};
 use labelgs_files::names::below;
 use labelgs_scene::{Error, Result, Setting, View};
@@ -20,11 +20,11 @@ pub(super) fn recognise(path: &Path, photos: &[&str]) -> Result<Option<(Format, 
         return Err(Error::data(path, "", problem));
     }
     let with = |list: &[Option<String>]| list.iter().flatten().count();
-    let folders = with(&sam::folders(photos, &files));
+    let folders = with(&sam::of_photos(photos, &files, sam::TABLE));
     if folders > 0 {
         fits.push((Format::SamFolders, format!("{folders} folders named after photos hold a metadata.csv")));
     }
-    let lists = sam::lists(photos, &files);
+    let lists = sam::of_photos(photos, &files, sam::LIST);
     let first = lists.iter().flatten().next();
     if let Some(first) = first
         && sam::is_list(&path.join(format!("{first}.json")))?
@@ -60,7 +60,6 @@ fn other_export(files: &[String]) -> Option<&'static str> {
 
 /// Reads the masks of a tool. Returns the folder or file that they are in, and none for formats of other kinds.
 pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Option<(PathBuf, Found)>> {
-    let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
     if matches!(format, Format::SamFolders | Format::SamJson) && path.is_file() {
         return Err(Error::data(
             path,
@@ -75,7 +74,7 @@ pub(super) fn read(path: &Path, format: Format, views: &[&View]) -> Result<Optio
             let found = coco::read(&file, views)?;
             (file, found)
         }
-        Format::SamFolders => (own(), sam::read_folders(path, &photos, &below(path)?)?),
+        Format::SamFolders => (own(), sam::read_folders(path, views, &below(path)?)?),
         Format::SamJson => (own(), sam::read_lists(path, views, &below(path)?)?),
         _ => return Ok(None),
     }))
@@ -92,14 +91,13 @@ pub(super) fn overlap(format: Format, asked: Overlap) -> Overlap {
 }
 
 /// Makes the error for a folder without a mask for any photo. If the import knows its form, that is the cure.
-pub fn nothing_found(masks: &MaskFolder, scene: &Path, photos: &[&str]) -> Error {
-    let folder = &masks.folder;
+pub fn nothing_found(folder: &Path, scene: &Path, photos: &[&str]) -> Error {
     let why = match recognise(folder, photos) {
         Ok(tool) => tool.map(|(_, why)| why).or_else(|| nested(folder, photos)),
         // Two forms fit; the import says which.
         Err(_) => Some("the files of a segmenter or tool are in it".to_owned()),
     };
-    let Some(why) = why else { return masks.nothing_found(photos.first().copied().unwrap_or_default()) };
+    let Some(why) = why else { return no_mask_found(folder, photos.first().copied().unwrap_or_default()) };
     let problem = format!(
         "holds masks of another form ({why}); make id pictures of them first, by `masks import {}` with the scene {}",
         folder.display(),

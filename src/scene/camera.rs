@@ -27,6 +27,16 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Returns a camera at the origin of the world, along its axes. Intrinsics are fx, fy, cx and cy, px; then width and height.
+    pub fn at_origin([fx, fy, cx, cy]: [f64; 4], (width, height): (u32, u32)) -> Self {
+        Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height }
+    }
+
+    /// Returns width and height of the image, px.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
     /// Returns the direction of the optical axis in world space.
     pub fn axis(&self) -> DVec3 {
         self.rotation.row(2)

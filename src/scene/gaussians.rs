@@ -2,6 +2,7 @@
 
 use super::UNLABELLED;
 use crate::error::{Error, Result};
+use crate::harmonics::coefficients;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Largest opacity of a splat in a pixel (3DGS), as in `glsl/include/constants.glsl`.
@@ -75,7 +76,19 @@ impl Gaussians {
 
     /// Returns the number of coefficients per Gaussian and channel above degree 0: 0, 3, 8 or 15.
     pub fn rest_per_gaussian(&self) -> usize {
-        ((self.sh_degree + 1) * (self.sh_degree + 1) - 1) as usize
+        coefficients(self.sh_degree)
+    }
+
+    /// Returns the coefficients of a Gaussian above degree 0, as triples (r, g, b).
+    pub fn rest(&self, row: usize) -> &[[f32; 3]] {
+        let rest = self.rest_per_gaussian();
+        &self.sh_rest[row * rest..][..rest]
+    }
+
+    /// Returns the same to be changed.
+    pub fn rest_mut(&mut self, row: usize) -> &mut [[f32; 3]] {
+        let rest = self.rest_per_gaussian();
+        &mut self.sh_rest[row * rest..][..rest]
     }
 
     /// Returns an error unless all columns have the right length.
@@ -99,9 +112,8 @@ impl Gaussians {
 
     /// Returns true if no value of a row is infinite or NaN.
     pub fn is_finite(&self, row: usize) -> bool {
-        let rest = self.rest_per_gaussian();
         let triples = [self.means[row], self.scales[row], self.sh0[row]];
-        triples.iter().chain(&self.sh_rest[row * rest..(row + 1) * rest]).all(|t| t.iter().all(|v| v.is_finite()))
+        triples.iter().chain(self.rest(row)).all(|t| t.iter().all(|v| v.is_finite()))
             && self.quats[row].iter().all(|v| v.is_finite())
             && self.opacities[row].is_finite()
     }
@@ -121,6 +133,18 @@ impl Gaussians {
         self.sh_rest = rest;
     }
 
+    /// Adds the rows of a model with the same columns, about the same origin. Labels that this one has not are left out.
+    pub fn append(&mut self, other: Self) {
+        self.means.extend(other.means);
+        self.quats.extend(other.quats);
+        self.scales.extend(other.scales);
+        self.opacities.extend(other.opacities);
+        self.sh0.extend(other.sh0);
+        self.sh_rest.extend(other.sh_rest);
+        self.labels.iter_mut().for_each(|to| to.extend(other.labels.iter().flatten()));
+        self.label_confidence.iter_mut().for_each(|to| to.extend(other.label_confidence.iter().flatten()));
+    }
+
     /// Returns the rows for which `keep` holds, in order.
     pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
         self.picked(&(0..self.len()).filter(|&row| keep(row)).collect::<Vec<_>>())
@@ -128,7 +152,6 @@ impl Gaussians {
 
     /// Returns some rows, in their order.
     pub fn picked(&self, rows: &[usize]) -> Self {
-        let rest = self.rest_per_gaussian();
         Self {
             origin: self.origin,
             means: rows.iter().map(|&r| self.means[r]).collect(),
@@ -136,7 +159,7 @@ impl Gaussians {
             scales: rows.iter().map(|&r| self.scales[r]).collect(),
             opacities: rows.iter().map(|&r| self.opacities[r]).collect(),
             sh0: rows.iter().map(|&r| self.sh0[r]).collect(),
-            sh_rest: rows.iter().flat_map(|&r| self.sh_rest[r * rest..(r + 1) * rest].iter().copied()).collect(),
+            sh_rest: rows.iter().flat_map(|&r| self.rest(r)).copied().collect(),
             sh_degree: self.sh_degree,
             antialiased: self.antialiased,
             labels: self.labels.as_ref().map(|labels| rows.iter().map(|&r| labels[r]).collect()),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Number of coefficients above degree 0, up to degree 3.
-pub const COEFFICIENTS: usize = 15;
+pub const COEFFICIENTS: usize = coefficients(3);
 
 /// The basis function of degree 0.
 pub const SH_C0: f64 = 0.282_094_791_773_878_14;
@@ -16,6 +16,11 @@ const SH_C3_1: f64 = 2.890_611_442_640_554;
 const SH_C3_2: f64 = 0.457_045_799_464_465_8;
 const SH_C3_3: f64 = 0.373_176_332_590_115_46;
 const SH_C3_5: f64 = 1.445_305_721_320_277;
+
+/// Returns the number of coefficients above degree 0 up to a degree: 0, 3, 8 or 15.
+pub const fn coefficients(degree: u32) -> usize {
+    ((degree + 1) * (degree + 1) - 1) as usize
+}
 
 /// Returns the coefficient of degree 0 that shows a value, 0 to 1.
 pub fn sh0_of(value: f64) -> f32 {

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 /// Ratio of distance from the origin to size above which a scene counts as far. At this ratio f32 rounds positions to
 /// 1.5e-5 of the scene size, a hundredth of a pixel; farther away the error soon reaches pixels.
-const FAR: f64 = 256.0;
+const FAR_RATIO: f64 = 256.0;
 /// Size of a scene with a single position, world units.
 const SIZE_OF_A_POINT: f64 = 10.0;
 
@@ -21,7 +21,7 @@ pub fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     let size = by_axis(|axis| median(along(axis).map(|value| (value - middle[axis]).abs())).unwrap_or(0.0)).length();
     // Positions at one place have no size.
     let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
-    if !(middle.length() > FAR * size) || !middle.is_finite() {
+    if !(middle.length() > FAR_RATIO * size) || !middle.is_finite() {
         return DVec3::ZERO;
     }
     let grid = (4.0 * size).log2().ceil().exp2();

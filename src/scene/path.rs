@@ -4,9 +4,9 @@ use super::Camera;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Most start cameras of the greedy search; more cost time and hardly shorten the path.
-const STARTS: usize = 32;
+const STARTS_MAX: usize = 32;
 /// Least gain of an exchange, so that rounding errors cannot cause an endless loop.
-const GAIN: f64 = 1e-12;
+const GAIN_MIN: f64 = 1e-12;
 
 /// The interpolation between two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Places {
 /// by exchanges of two edges (2-opt). The result is deterministic. The end with the smaller index comes first.
 pub fn short_order(cameras: &[&Camera]) -> Vec<usize> {
     let (places, count) = (Places::new(cameras), cameras.len());
-    let starts = count.min(STARTS);
+    let starts = count.min(STARTS_MAX);
     let paths = (0..starts).map(|start| greedy(&places, start * count / starts));
     let mut order = paths.min_by(|a, b| length(&places, a).total_cmp(&length(&places, b))).unwrap_or_default();
     while exchange(&places, &mut order) {}
@@ -90,7 +90,7 @@ fn exchange(places: &Places, order: &mut [usize]) -> bool {
             let (before, after) = (first.checked_sub(1), Some(last + 1).filter(|&at| at < order.len()));
             let now = edge(before, Some(first)) + edge(Some(last), after);
             let turned = edge(before, Some(last)) + edge(Some(first), after);
-            if turned < now - GAIN {
+            if turned < now - GAIN_MIN {
                 order[first..=last].reverse();
                 shorter = true;
             }

@@ -128,12 +128,9 @@ impl Pixels<LabelMap> {
     }
 }
 
-impl<T> Pixels<T> {
+impl<T: Picture> Pixels<T> {
     /// Returns the CRC-32 of the pixels.
-    pub fn crc(&self) -> u32
-    where
-        T: Picture,
-    {
+    pub fn crc(&self) -> u32 {
         match &self.0 {
             Place::Held(pixels) => pixels.crc(),
             Place::Made(_, facts) => facts.crc,

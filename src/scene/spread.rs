@@ -4,7 +4,7 @@ use super::median::median;
 use glam::DVec3;
 
 /// Share of the positions within the radius.
-const WITHIN: f64 = 0.8;
+const SHARE_WITHIN: f64 = 0.8;
 /// Fewest positions of which one can be called stray.
 const COUNT_MIN: usize = 5;
 
@@ -13,7 +13,7 @@ const COUNT_MIN: usize = 5;
 pub struct Spread {
     /// Medians of the coordinates.
     pub middle: DVec3,
-    /// Distance from the middle within which `WITHIN` of the positions lie.
+    /// Distance from the middle within which `SHARE_WITHIN` of the positions lie.
     pub radius: f64,
 }
 
@@ -26,7 +26,7 @@ impl Spread {
         if distances.len() < COUNT_MIN {
             return None;
         }
-        let within = (WITHIN * (distances.len() - 1) as f64) as usize;
+        let within = (SHARE_WITHIN * (distances.len() - 1) as f64) as usize;
         let radius = *distances.select_nth_unstable_by(within, f64::total_cmp).1;
         (radius > 1e-9 * middle.length().max(1.0)).then_some(Self { middle, radius })
     }

@@ -3,6 +3,7 @@
 use super::spread::Spread;
 use super::{Camera, LabelMap, Pixels};
 use crate::error::{Error, Result};
+use crate::words::unique;
 use glam::DVec3;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -27,22 +28,22 @@ pub struct Photo {
 }
 
 /// Alpha of a valid pixel that shows nothing but what is behind it.
-const CLEAR: u8 = 128;
+const ALPHA_CLEAR: u8 = 128;
 
 /// Returns the alpha of a valid pixel of an opacity from 0 to 1.
 pub fn alpha_of(opacity: f64) -> u8 {
-    CLEAR + (f64::from(u8::MAX - CLEAR) * opacity).round() as u8
+    ALPHA_CLEAR + (f64::from(u8::MAX - ALPHA_CLEAR) * opacity).round() as u8
 }
 
 impl Photo {
     /// Returns the colours over a colour of r, g, b from 0 to 1; none if the photo is opaque.
     pub fn over(&self, behind: [f32; 3]) -> Option<Vec<[u8; 4]>> {
-        let shows = |alpha: u8| (CLEAR..u8::MAX).contains(&alpha);
+        let shows = |alpha: u8| (ALPHA_CLEAR..u8::MAX).contains(&alpha);
         let over = |&[r, g, b, alpha]: &[u8; 4]| {
             if !shows(alpha) {
                 return [r, g, b, alpha];
             }
-            let through = 255.0 * f32::from(u8::MAX - alpha) / f32::from(u8::MAX - CLEAR);
+            let through = 255.0 * f32::from(u8::MAX - alpha) / f32::from(u8::MAX - ALPHA_CLEAR);
             let mix = |colour: u8, behind: f32| (f32::from(colour) + through * behind).round() as u8;
             [mix(r, behind[0]), mix(g, behind[1]), mix(b, behind[2]), u8::MAX]
         };
@@ -95,14 +96,7 @@ impl View {
 /// has the same one (`a/1.jpg` and `a_1.png`).
 pub fn stems(views: &[&View]) -> Vec<String> {
     let mut taken = BTreeSet::new();
-    let mut name = |view: &&View| {
-        let stem = view.stem();
-        let free = (1..).map(|n| if n == 1 { stem.clone() } else { format!("{stem}_{n}") });
-        let name = free.into_iter().find(|name| !taken.contains(name)).unwrap_or_default();
-        taken.insert(name.clone());
-        name
-    };
-    views.iter().map(&mut name).collect()
+    views.iter().map(|view| unique(view.stem(), "_", &mut taken)).collect()
 }
 
 /// A coloured 3D point.

@@ -1,5 +1,8 @@
 //! Words of messages: counts, and names for a misspelt one.
 
+use serde::Serialize;
+use std::collections::BTreeSet;
+
 /// Most names that a message offers for a misspelt one.
 const OFFERED_MAX: usize = 3;
 /// Least similarity of a name that is offered, 0 to 1.
@@ -10,6 +13,19 @@ pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
     let count = count.to_string();
     let ending = if count == "1" { "" } else { "s" };
     format!("{count} {noun}{ending}")
+}
+
+/// Returns `name`, with the first number appended after `gap` that makes it unlike those in `taken`, where it is put.
+pub fn unique(name: String, gap: &str, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{name}{gap}{number}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
+    taken.insert(free.clone());
+    free
+}
+
+/// Returns the name of a variant without content, as files have it.
+pub fn name_of(variant: &impl Serialize) -> String {
+    toml::Value::try_from(variant).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
 /// Returns `did you mean barrel?` with the names that are spelt most like `name`; none if no name is like it.

@@ -1,7 +1,7 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
-use labelgs_files::all::LISTED_MAX;
+use labelgs_files::all::listed;
 use labelgs_scene::{Error, Result, Setting};
 use std::path::Path;
 
@@ -28,11 +28,9 @@ pub fn skip(
         return Err(bad.swap_remove(unread));
     }
     let count = bad.len();
-    let listed = || bad.iter().take(LISTED_MAX).map(|error| format!("\n  {error}")).collect::<String>();
-    let more = if count > LISTED_MAX { format!("\n  and {} more", count - LISTED_MAX) } else { String::new() };
     let allowed = allowed(options.max_bad_photos, total);
     if count <= allowed {
-        notes.push(format!("{count} of {total} photos cannot be read and are skipped:{}{more}", listed()));
+        notes.push(format!("{count} of {total} photos cannot be read and are skipped:{}", listed(&bad)));
         return Ok(());
     }
     if count == 1 && total == 1 {
@@ -40,9 +38,9 @@ pub fn skip(
     }
     let problem = format!(
         "{count} of {total} photos cannot be read, {} allows {allowed}; mend them, take them out \
-         of the scene, or allow more:{}{more}",
+         of the scene, or allow more:{}",
         Setting("max_bad_photos").to(options.max_bad_photos),
-        listed()
+        listed(&bad)
     );
     Err(Error::data(root, "photos", problem))
 }

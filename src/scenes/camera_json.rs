@@ -102,7 +102,7 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
         cy: Some(camera.cy),
     };
     let entries: Vec<Entry> = cameras.iter().enumerate().map(entry).collect();
-    atomic::write(path, |out| Ok(serde_json::to_writer_pretty(out, &entries)?))
+    atomic::write_json(path.as_ref(), &entries)
 }
 
 /// Reads the views in the `cameras.json` of the run that a model belongs to, of any 3DGS trainer, without photos. Returns none

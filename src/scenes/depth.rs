@@ -7,21 +7,16 @@ use super::resample::resample_nearest;
 use super::window::{Window, windows};
 use labelgs_files::depth_file::{EXTENSIONS, read_depth};
 use labelgs_files::names::shortened;
-use labelgs_files::resize::same_aspect;
+use labelgs_files::photo_files::PhotoFiles;
+use labelgs_files::resize::aspect_problem;
 use labelgs_scene::{DepthMap, Error, Result, View};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// A folder of depth maps, with what matches them to the views of a scene.
 pub struct DepthFolder {
-    folder: PathBuf,
+    files: PhotoFiles,
     windows: BTreeMap<String, Window>,
-    /// Number of photos per file stem. A map outside of the photo's folder serves only unique stems.
-    stems: HashMap<PathBuf, usize>,
-}
-
-fn stem(name: &str) -> PathBuf {
-    Path::new(name).file_stem().map(PathBuf::from).unwrap_or_default()
 }
 
 impl DepthFolder {
@@ -32,9 +27,8 @@ impl DepthFolder {
         }
         let windows = windows(scene, lookup)?;
         let photos: BTreeSet<&str> = windows.values().map(|window| window.photo.as_str()).collect();
-        let mut stems = HashMap::new();
-        photos.into_iter().for_each(|name| *stems.entry(stem(name)).or_insert(0) += 1);
-        Ok(Self { folder: folder.to_owned(), windows, stems })
+        let files = PhotoFiles::new(folder, &photos.into_iter().collect::<Vec<_>>(), &EXTENSIONS)?;
+        Ok(Self { files, windows })
     }
 
     /// Refuses a folder without a map for one of `views`.
@@ -51,48 +45,30 @@ impl DepthFolder {
             shortened(&without),
             EXTENSIONS.join(", .")
         );
-        Err(Error::data(&self.folder, "", problem))
+        Err(Error::data(&self.files.folder, "", problem))
     }
 
     /// Reads the map of `view`, at its size. Pixels outside of the photo are holes.
     pub fn read(&self, view: &View) -> Result<DepthMap> {
-        let (Some(window), Some(path)) = (self.windows.get(&view.name), self.find(&view.name)) else {
-            return Err(Error::data(&self.folder, &view.name, "has no depth map"));
+        let Some((window, path)) = self.find(&view.name) else {
+            return Err(Error::data(&self.files.folder, &view.name, "has no depth map"));
         };
-        let map = read_depth(&path)?;
-        let photo = &window.optics.camera;
-        if !same_aspect((map.width, map.height), (photo.width, photo.height)) {
-            let problem = format!(
-                "the depth map has {} x {} px and its photo {} x {} px, which no scale explains; make maps of the same \
-                 photos",
-                map.width, map.height, photo.width, photo.height
-            );
-            return Err(Error::data(&path, "", problem));
-        }
-        let (width, height) = (view.camera.width, view.camera.height);
+        let map = read_depth(path)?;
         let from = (map.width, map.height);
+        if let Some(problem) = aspect_problem(("the depth map", from), ("its photo", window.optics.camera.size())) {
+            return Err(Error::data(path, "", problem + "; make maps of the same photos"));
+        }
+        let (width, height) = view.camera.size();
         let values = resample_nearest(&map.values, from, window, (width, height), f32::NAN);
         if !values.iter().any(|value| value.is_finite()) {
-            return Err(Error::data(&path, "", "holds no finite depth"));
+            return Err(Error::data(path, "", "holds no finite depth"));
         }
         Ok(DepthMap { width, height, values })
     }
 
-    /// Finds the file of a view's photo: its name with the extension replaced or appended, then the same without folders.
-    fn find(&self, view: &str) -> Option<PathBuf> {
-        let name = self.windows.get(view)?.photo.as_str();
-        let stem = stem(name);
-        let flat = (self.stems.get(&stem) == Some(&1)).then_some(stem);
-        let file = flat.is_some().then(|| Path::new(name).file_name().map(PathBuf::from)).flatten();
-        let whole = [Some(Path::new(name).with_extension("")), Some(PathBuf::from(name)), flat, file];
-        let candidates = whole.into_iter().flatten().flat_map(|base| {
-            EXTENSIONS.map(|extension| {
-                let mut path = self.folder.join(&base).into_os_string();
-                path.push(".");
-                path.push(extension);
-                PathBuf::from(path)
-            })
-        });
-        candidates.into_iter().find(|path| path.is_file())
+    /// Finds how a view lies in its photo, and the map of that.
+    fn find(&self, view: &str) -> Option<(&Window, &Path)> {
+        let window = self.windows.get(view)?;
+        Some((window, self.files.find(&window.photo)?))
     }
 }

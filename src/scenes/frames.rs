@@ -48,15 +48,11 @@ impl Frames {
     pub fn read(path: &Path) -> Result<Self> {
         let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
         let video: Self = read::json(path, expected)?;
-        if video.schema_version != SCHEMA_VERSION {
-            let problem = format!("has version {}, labelgs reads {SCHEMA_VERSION}", video.schema_version);
-            return Err(Error::data(path, "schema_version", problem));
-        }
-        let inside = |frame: &Frame| match frame.size {
-            Some([width, height]) => {
-                width > 0 && height > 0 && width <= frame.camera.width && height <= frame.camera.height
-            }
-            None => true,
+        read::require_version(path, video.schema_version, SCHEMA_VERSION)?;
+        let inside = |frame: &Frame| {
+            frame.size.is_none_or(|[width, height]| {
+                (1..=frame.camera.width).contains(&width) && (1..=frame.camera.height).contains(&height)
+            })
         };
         if let Some(frame) = video.frames.iter().find(|frame| !inside(frame)) {
             return Err(Error::data(path, format!("frame {}", frame.file), "has a `size` beyond that of its camera"));
@@ -75,7 +71,6 @@ impl Frames {
 
     /// Writes the file, atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
-        atomic::write(path, |out| out.write_all(text.as_bytes()))
+        atomic::write_json(path, self)
     }
 }

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// One of this many photos of a folder may have no pose without a note: programs that find poses drop some.
-const WITHOUT_POSE: usize = 10;
+const UNPOSED_ONE_OF: usize = 10;
 
 /// Returns the folder of a scene, given the folder or one file in it.
 pub(super) fn folder_of(scene: &Path) -> &Path {
@@ -139,7 +139,7 @@ fn without_pose(listing: &Listing) -> Option<String> {
     let all: usize = folders.iter().map(|folder| count_photos(folder)).sum();
     let without = all.saturating_sub(photos.len() + listing.bad.len());
     let names: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
-    (without * WITHOUT_POSE > all).then(|| {
+    (without * UNPOSED_ONE_OF > all).then(|| {
         format!(
             "{without} of {} in {} have no pose in {}",
             counted(all, "photo"),

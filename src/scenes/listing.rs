@@ -4,6 +4,7 @@ use super::lens::Lens;
 use super::photo_finder::EXTENSIONS;
 use super::pose_convention::Native;
 use glam::{DMat3, DQuat, DVec3};
+use labelgs_scene::words::counted;
 use labelgs_scene::{Camera, Error, Flaw, Point, Result};
 use std::path::{Path, PathBuf};
 
@@ -11,11 +12,11 @@ use std::path::{Path, PathBuf};
 const SIDE_MAX: u32 = 1 << 17;
 
 /// Largest distance of a camera or a point from the origin, world units: squares still fit into f32.
-pub const FAR: f64 = 1e12;
+pub const DISTANCE_MAX: f64 = 1e12;
 
 /// Largest side of a photo in focal lengths. A pinhole of 179 degrees has 115, and no lens has more than 2 pi of its own
 /// focal lengths.
-const WIDEST: f64 = 115.0;
+const SIDE_FOCALS_MAX: f64 = 115.0;
 
 /// A photo in the listing of a scene.
 #[derive(Clone, Debug)]
@@ -27,7 +28,7 @@ pub struct Listed {
     /// Camera at the size in the data set.
     pub camera: Camera,
     pub lens: Lens,
-    /// Split of the data set itself: true for held-out.
+    /// True for held-out, false for trained on; `None` until something says it.
     pub test: Option<bool>,
 }
 
@@ -67,6 +68,13 @@ impl Listing {
         }
     }
 
+    /// Notes what holds for how many of the things called `noun` in a file, where it is any.
+    pub fn note_counts(&mut self, path: &Path, noun: &str, counts: &[(usize, &str)]) {
+        for (count, what) in counts.iter().filter(|(count, _)| *count > 0) {
+            self.notes.push(format!("{} of {} {what}", counted(count, noun), path.display()));
+        }
+    }
+
     /// Returns true if photos of it do not exist.
     pub fn is_incomplete(&self) -> bool {
         !self.missing.is_empty() || self.views.iter().any(|view| view.photo.is_none())
@@ -90,7 +98,7 @@ pub fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> R
     }
     // Half of the side over the focal length is the tangent of half the field of view.
     let widest = (f64::from(width) / fx).max(f64::from(height) / fy);
-    if widest > WIDEST {
+    if widest > SIDE_FOCALS_MAX {
         let hint = if fx < 10.0 { "; if it is a share of the photo's size, multiply it by that" } else { "" };
         return refuse(format!(
             "focal lengths {fx} and {fy} px make a field of view of 180 degrees; a pinhole ends before{hint}"
@@ -111,8 +119,8 @@ pub fn check_camera(path: &Path, place: &str, camera: &Camera, lens: &Lens) -> R
     if !camera.translation.is_finite() || !camera.rotation.is_finite() {
         return refuse("the pose is not finite".into());
     }
-    if camera.translation.length() > FAR {
-        return refuse(format!("the camera is farther than {FAR:e} from the origin; move the scene to it"));
+    if camera.translation.length() > DISTANCE_MAX {
+        return refuse(format!("the camera is farther than {DISTANCE_MAX:e} from the origin; move the scene to it"));
     }
     Ok(())
 }

@@ -6,14 +6,15 @@ use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, bad_photos, frame_check, mask_notes, missing, stray};
 use labelgs_files::all::all_or_one_error;
 use labelgs_files::names::shortened;
-use labelgs_masks as masks;
-use labelgs_masks::mask_folder::MaskFolder;
+use labelgs_files::photo_files::PhotoFiles;
+use labelgs_masks::mask_folder::masks_of_photos;
+use labelgs_masks::tools::nothing_found;
 use labelgs_scene::words::counted;
 use labelgs_scene::{Dataset, Flaw, Photo, View, crew};
 use labelgs_scene::{Error, Result, Setting};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<Dataset> {
@@ -22,35 +23,41 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     let mut views = missing::existing(&listing, options, &mut notes, &mut faults)?;
     stray::remove(&mut views, &listing.points, options.max_bad_photos, &mut faults);
     views.sort_by(|a, b| a.name.cmp(&b.name));
-    let mut test = split(&views, options.test_every, &mut notes)?;
+    split(&mut views, options.test_every, &mut notes)?;
     if let Some(only) = &options.only {
-        limit(root, &mut views, &mut test, only)?;
+        // Photos of wide lenses have their views below their names.
+        views.retain(|view| only.contains(&view.name) || !view.lens.is_pinhole());
+        if views.is_empty() {
+            return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
+        }
     }
-    let open = |folder: &Path| MaskFolder::new(folder, views.iter().map(|view| view.name.as_str()));
-    let masks = options.masks.as_deref().map(open).transpose()?;
-    let ignore = options.ignore.as_deref().map(open).transpose()?;
+    let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+    let open = |folder: &PathBuf| masks_of_photos(folder, &names);
+    let masks = options.masks.as_ref().map(open).transpose()?;
+    let ignore = options.ignore.as_ref().map(open).transpose()?;
     if let Some(ignore) = &ignore {
-        note_missing(root, ignore, &views, "picture of what to ignore", &mut notes)?;
+        note_missing(root, ignore, &names, "picture of what to ignore", &mut notes)?;
     }
-    let recipe = |(view, &test): (&Listed, &bool)| {
-        let of = |folder: &Option<MaskFolder>| folder.as_ref().and_then(|folder| folder.find(&view.name));
-        Arc::new(Recipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], test, options))
+    let recipe = |view: &Listed| {
+        let of =
+            |files: &Option<PhotoFiles>| files.as_ref().and_then(|files| files.find(&view.name)).map(Path::to_owned);
+        Arc::new(Recipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], options))
     };
-    let recipes: Vec<Arc<Recipe>> = views.iter().zip(&test).map(recipe).collect();
-    let Read { photos, resampled, blank } = read_views(&recipes, &test, options);
+    let recipes: Vec<Arc<Recipe>> = views.iter().map(recipe).collect();
+    let Read { photos, resampled, blank } = read_views(&recipes, options);
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
     let mut loaded = Vec::with_capacity(views.len());
-    for (views, test) in photos.into_iter().zip(test) {
-        match views {
-            Ok(views) => loaded.push(views.map(|views| (views, test))),
+    for (made, view) in photos.into_iter().zip(&views) {
+        match made {
+            Ok(made) => loaded.push(made.map(|made| (made, view.test == Some(true)))),
             Err(error) => undecodable.push(error),
         }
     }
     bad_photos::skip(root, undecodable, total, options, &mut faults)?;
     let loaded: Vec<(Vec<View>, bool)> = all_or_one_error(root, loaded)?;
     if let Some(masks) = &masks {
-        note_missing(root, masks, &views, "mask", &mut notes)?;
+        note_missing(root, masks, &names, "mask", &mut notes)?;
     }
     note_blank(root, &blank, loaded.iter().all(|(views, _)| views.is_empty()), &mut notes)?;
     if resampled > 0 {
@@ -61,8 +68,7 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
     let is_wide = note_wide(&loaded, &mut notes);
-    let flaws: Vec<Flaw> =
-        std::mem::take(&mut listing.flaws).into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
+    let flaws: Vec<Flaw> = listing.flaws.into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
     notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
     let (train, test) = divided(loaded, options.only.as_deref());
     let Listing { source, native, points, .. } = listing;
@@ -103,15 +109,13 @@ fn note_wide(loaded: &[(Vec<View>, bool)], notes: &mut Vec<String>) -> bool {
 }
 
 /// Notes the photos without a picture in the folder; refuses one without any.
-fn note_missing(root: &Path, masks: &MaskFolder, views: &[Listed], what: &str, notes: &mut Vec<String>) -> Result<()> {
-    let without = views.iter().filter(|view| masks.find(&view.name).is_none()).map(|view| view.name.as_str());
-    let without: Vec<&str> = without.collect();
-    if without.len() == views.len() {
-        let photos: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-        return Err(masks::tools::nothing_found(masks, root, &photos));
+fn note_missing(root: &Path, files: &PhotoFiles, photos: &[&str], what: &str, notes: &mut Vec<String>) -> Result<()> {
+    let without: Vec<&str> = photos.iter().copied().filter(|name| files.find(name).is_none()).collect();
+    if without.len() == photos.len() {
+        return Err(nothing_found(&files.folder, root, photos));
     }
     if !without.is_empty() {
-        notes.push(format!("{} of {} photos have no {what}: {}", without.len(), views.len(), shortened(&without)));
+        notes.push(format!("{} of {} photos have no {what}: {}", without.len(), photos.len(), shortened(&without)));
     }
     Ok(())
 }
@@ -121,31 +125,12 @@ fn note_blank(root: &Path, blank: &[String], is_all: bool, notes: &mut Vec<Strin
     if blank.is_empty() {
         return Ok(());
     }
-    let names: Vec<&str> = blank.iter().map(String::as_str).collect();
-    let problem = format!("{} have no pixel that counts: all are ignored, or outside of the lens", shortened(&names));
+    let problem = format!("{} have no pixel that counts: all are ignored, or outside of the lens", shortened(blank));
     if is_all {
         return Err(Error::data(root, "photos", problem + "; check what is ignored and the coefficients of the lens"));
     }
-    notes.push(format!("{} views are skipped, because {problem}", names.len()));
+    notes.push(format!("{} views are skipped, because {problem}", blank.len()));
     Ok(())
-}
-
-/// Keeps the views that are asked for, and which of them are held out.
-fn limit(root: &Path, views: &mut Vec<Listed>, test: &mut Vec<bool>, only: &BTreeSet<String>) -> Result<()> {
-    // Photos of wide lenses have their views below their names.
-    let kept: Vec<bool> = views.iter().map(|view| only.contains(&view.name) || !view.lens.is_pinhole()).collect();
-    retain(views, &kept);
-    retain(test, &kept);
-    if views.is_empty() {
-        return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
-    }
-    Ok(())
-}
-
-/// Keeps the items whose flag is set.
-fn retain<T>(items: &mut Vec<T>, kept: &[bool]) {
-    let mut flags = kept.iter();
-    items.retain(|_| flags.next() == Some(&true));
 }
 
 /// What is read of all photos.
@@ -159,9 +144,9 @@ struct Read {
 }
 
 /// Makes the views of each photo.
-fn read_views(recipes: &[Arc<Recipe>], test: &[bool], options: &LoadOptions) -> Read {
+fn read_views(recipes: &[Arc<Recipe>], options: &LoadOptions) -> Read {
     let stored: Vec<_> = recipes.par_iter().map(|recipe| recipe.stored()).collect();
-    let store = PhotoStore::new(recipes, &stored, test, options);
+    let store = PhotoStore::new(recipes, &stored, options);
     let read = |index: usize| {
         let (recipe, size) = (&recipes[index], *stored[index].as_ref().ok()?);
         let made = recipe.decode(size).map(|photo| recipe.views(size, photo));
@@ -201,18 +186,23 @@ fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
     }
 }
 
-/// Returns which of the views, sorted by name, are held out.
-fn split(views: &[Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<Vec<bool>> {
-    let Some(every) = every else { return Ok(vec![false; views.len()]) };
+/// Decides which of the views, sorted by name, are held out.
+fn split(views: &mut [Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<()> {
+    let Some(every) = every else {
+        views.iter_mut().for_each(|view| view.test = Some(false));
+        return Ok(());
+    };
     if views.iter().all(|view| view.test.is_some()) {
-        return Ok(views.iter().map(|view| view.test == Some(true)).collect());
+        return Ok(());
     }
     if every == 0 {
         return Err(Error::usage(Setting("test_every"), "0 holds out nothing and everything; expected 1 or more"));
     }
-    if views.len() == 1 && every > 1 {
+    let is_alone = views.len() == 1 && every > 1;
+    if is_alone {
         notes.push("the only photo is used for training; nothing is held out".into());
-        return Ok(vec![false]);
     }
-    Ok((0..views.len()).map(|index| index % every as usize == 0).collect())
+    let held_out = |index: usize| !is_alone && index.is_multiple_of(every as usize);
+    views.iter_mut().enumerate().for_each(|(index, view)| view.test = Some(held_out(index)));
+    Ok(())
 }

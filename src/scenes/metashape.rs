@@ -11,7 +11,6 @@ use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, r
 use super::pose_convention::Native;
 use glam::{DAffine3, DMat3, DVec3};
 use labelgs_files::read;
-use labelgs_scene::words::counted;
 use labelgs_scene::{Camera, Error, Result};
 use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::{BTreeMap, BTreeSet};
@@ -64,7 +63,7 @@ pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     }
     let Reader { mut listing, counts, .. } = reader;
     require_some(listing.views.len(), &mut listing.bad)?;
-    let told = [
+    let counts = [
         (counts.disabled, "disabled in Metashape and left out"),
         (counts.lost, "without a pose and left out: not aligned, or exported without it"),
         (
@@ -73,10 +72,7 @@ pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
              displaced, export the cameras without the rig",
         ),
     ];
-    let told = told.into_iter().filter(|(count, _)| *count > 0);
-    listing
-        .notes
-        .extend(told.map(|(count, what)| format!("{} of {} {what}", counted(count, "camera"), path.display())));
+    listing.note_counts(path, "camera", &counts);
     Ok(listing)
 }
 
@@ -106,13 +102,11 @@ impl<'a> Reader<'a> {
             self.counts.disabled += 1;
             return Ok(());
         }
-        let file = self.chunk.file;
-        let label = camera.attribute("label").unwrap_or_default();
-        let place = format!("{}, camera `{label}`", file.line(camera));
-        let refuse = |problem: &str| Error::data(file.path, place.as_str(), problem);
-        let posed = self.chunk.pose(camera, &refuse);
-        let posed = posed.and_then(|pose| pose.map(|pose| self.chunk.view(camera, pose, &refuse)).transpose());
-        let (own, lens, is_slave) = match posed {
+        let posed = self.chunk.pose(camera).and_then(|pose| {
+            let pose = pose.map(|pose| Ok((self.chunk.view(camera, pose.to_world)?, pose.is_slave)));
+            pose.transpose()
+        });
+        let ((own, lens), is_slave) = match posed {
             Ok(Some(view)) => view,
             Ok(None) => {
                 self.counts.lost += 1;
@@ -124,11 +118,12 @@ impl<'a> Reader<'a> {
             }
         };
         self.counts.slaves += usize::from(is_slave);
-        let resolved = self.scene.resolve(file.path, label)?;
+        let label = camera.attribute("label").unwrap_or_default();
+        let resolved = self.scene.resolve(self.chunk.file.path, label)?;
         let photo = self.scene.photos.find(&["images", "."], &resolved.path);
         let name = with_extension(resolved.name, photo.as_deref());
         if !self.names.insert(name.clone()) {
-            return Err(refuse("another camera has this label too; rename one of the photos"));
+            return Err(self.chunk.refusal(camera, "another camera has this label too; rename one of the photos"));
         }
         self.listing.views.push(Listed { name, photo, camera: own, lens, test: None });
         Ok(())
@@ -176,6 +171,10 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
+fn child_with_text<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    child(node, name).filter(|node| node.text().is_some_and(|text| !text.trim().is_empty()))
+}
+
 /// Finds all elements of a name below a node, by their ids.
 fn by_id<'a>(chunk: Node<'a, 'a>, name: &str) -> BTreeMap<&'a str, Node<'a, 'a>> {
     let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
@@ -205,47 +204,56 @@ impl<'a> Chunk<'a> {
         Ok(Self { file, node, sensors, components, cameras, to_world: file.similarity(node)? })
     }
 
+    fn place(&self, camera: Node) -> String {
+        format!("{}, camera `{}`", self.file.line(camera), camera.attribute("label").unwrap_or_default())
+    }
+
+    fn refusal(&self, camera: Node, problem: &str) -> Error {
+        Error::data(self.file.path, self.place(camera), problem)
+    }
+
     /// Returns the pose of a camera; `None` if it is not aligned. A slave of a rig without a pose of its own has that of its
     /// sensor in the master's frame.
-    fn pose(&self, camera: Node<'a, 'a>, refuse: &dyn Fn(&str) -> Error) -> Result<Option<Pose>> {
+    fn pose(&self, camera: Node<'a, 'a>) -> Result<Option<Pose>> {
         if let Some(transform) = child(camera, "transform") {
-            let to_world = self.to_world(camera, refuse)? * self.file.matrix(transform)?;
+            let to_world = self.to_world(camera)? * self.file.matrix(transform)?;
             return Ok(Some(Pose { to_world, is_slave: false }));
         }
         let master = camera.attribute("master_id").and_then(|id| self.cameras.get(id));
         let Some((&master, transform)) = master.and_then(|master| Some((master, child(*master, "transform")?))) else {
             return Ok(None);
         };
-        let of_master = self.to_world(master, refuse)? * self.file.matrix(transform)?;
-        let in_master = self.file.mounting(self.sensor(camera, refuse)?)?.ok_or_else(|| {
-            refuse("is a slave of a rig, and its sensor has no `rotation` and `location`; export the cameras without the rig")
+        let of_master = self.to_world(master)? * self.file.matrix(transform)?;
+        let in_master = self.file.mounting(self.sensor(camera)?)?.ok_or_else(|| {
+            let problem = "is a slave of a rig, and its sensor has no `rotation` and `location`; export the cameras without \
+                           the rig";
+            self.refusal(camera, problem)
         })?;
         Ok(Some(Pose { to_world: of_master * in_master, is_slave: true }))
     }
 
-    /// Returns the camera at its pose, its lens, and whether it is a slave.
-    fn view(&self, camera: Node<'a, 'a>, pose: Pose, refuse: &dyn Fn(&str) -> Error) -> Result<(Camera, Lens, bool)> {
-        let (intrinsics, lens) = self.file.sensor(self.sensor(camera, refuse)?)?;
-        let rotation = rotation_of(pose.to_world.matrix3)
-            .ok_or_else(|| refuse("the transform is no rotation with a scale; export the cameras again"))?;
-        let (rotation, translation) = invert_pose(rotation, pose.to_world.translation);
+    /// Returns the camera at its pose, and its lens.
+    fn view(&self, camera: Node<'a, 'a>, to_world: DAffine3) -> Result<(Camera, Lens)> {
+        let (intrinsics, lens) = self.file.sensor(self.sensor(camera)?)?;
+        let problem = "the transform is no rotation with a scale; export the cameras again";
+        let rotation = rotation_of(to_world.matrix3).ok_or_else(|| self.refusal(camera, problem))?;
+        let (rotation, translation) = invert_pose(rotation, to_world.translation);
         let own = Camera { rotation, translation, ..intrinsics };
-        let place = format!("{}, camera `{}`", self.file.line(camera), camera.attribute("label").unwrap_or_default());
-        check_camera(self.file.path, &place, &own, &lens)?;
-        Ok((own, lens, pose.is_slave))
+        check_camera(self.file.path, &self.place(camera), &own, &lens)?;
+        Ok((own, lens))
     }
 
-    fn sensor(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<Node<'a, 'a>> {
+    fn sensor(&self, camera: Node) -> Result<Node<'a, 'a>> {
         let sensor = camera.attribute("sensor_id").and_then(|id| self.sensors.get(id)).copied();
-        sensor.ok_or_else(|| refuse("names no sensor of the chunk; export the cameras again"))
+        sensor.ok_or_else(|| self.refusal(camera, "names no sensor of the chunk; export the cameras again"))
     }
 
     /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.
-    fn to_world(&self, camera: Node, refuse: &dyn Fn(&str) -> Error) -> Result<DAffine3> {
+    fn to_world(&self, camera: Node) -> Result<DAffine3> {
         let own = match camera.attribute("component_id") {
             Some(id) if !self.components.is_empty() => match self.components.get(id) {
                 Some(&component) => self.file.similarity(component)?,
-                None => return Err(refuse("names no component of the chunk; export the cameras again")),
+                None => return Err(self.refusal(camera, "names no component of the chunk; export the cameras again")),
             },
             _ => None,
         };
@@ -294,27 +302,24 @@ impl<'a> File<'a> {
     /// Reads the `transform` of a chunk or a component: rotation, row by row, translation and scale.
     fn similarity(&self, node: Node<'a, 'a>) -> Result<Option<DAffine3>> {
         let Some(transform) = child(node, "transform") else { return Ok(None) };
-        let rotation = child(transform, "rotation").map(|node| self.numbers::<9>(node)).transpose()?;
-        let rotation = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
-        let translation = child(transform, "translation").map(|node| self.numbers::<3>(node)).transpose()?;
-        let scale = child(transform, "scale").map_or(Ok(1.0), |node| self.numbers::<1>(node).map(|[scale]| scale))?;
-        let translation = translation.map_or(DVec3::ZERO, DVec3::from_array);
-        Ok(Some(DAffine3 { matrix3: rotation * scale, translation }))
+        let motion = self.motion(transform, "translation")?;
+        let scale = child(transform, "scale").map_or(Ok([1.0]), |node| self.numbers::<1>(node))?;
+        Ok(Some(DAffine3 { matrix3: motion.matrix3 * scale[0], ..motion }))
     }
 
     /// Reads how a sensor is mounted in a rig: from its axes to those of the master, with its centre there, in units of the
     /// chunk. `None` if the sensor does not say.
     fn mounting(&self, sensor: Node<'a, 'a>) -> Result<Option<DAffine3>> {
-        let with_text =
-            |name: &str| child(sensor, name).filter(|node| node.text().is_some_and(|text| !text.trim().is_empty()));
-        let (rotation, location) = (with_text("rotation"), with_text("location"));
-        if rotation.or(location).is_none() {
-            return Ok(None);
-        }
-        let rotation = rotation.map(|node| self.numbers::<9>(node)).transpose()?;
+        let says = ["rotation", "location"].into_iter().any(|name| child_with_text(sensor, name).is_some());
+        says.then(|| self.motion(sensor, "location")).transpose()
+    }
+
+    /// Reads the child `rotation`, row by row, and the child with the place; none turns or moves nothing.
+    fn motion(&self, node: Node<'a, 'a>, place: &str) -> Result<DAffine3> {
+        let rotation = child_with_text(node, "rotation").map(|node| self.numbers::<9>(node)).transpose()?;
         let matrix3 = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
-        let location = location.map(|node| self.numbers::<3>(node)).transpose()?;
-        Ok(Some(DAffine3 { matrix3, translation: location.map_or(DVec3::ZERO, DVec3::from_array) }))
+        let place = child_with_text(node, place).map(|node| self.numbers::<3>(node)).transpose()?;
+        Ok(DAffine3 { matrix3, translation: place.map_or(DVec3::ZERO, DVec3::from_array) })
     }
 
     /// Reads a sensor: intrinsics at an identity pose, and the lens.
@@ -331,16 +336,13 @@ impl<'a> File<'a> {
             let value = resolution.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN);
             side(self.path, &place, value)
         };
-        let (width, height) = (pixels("width")?, pixels("height")?);
-        let (w, h) = (f64::from(width), f64::from(height));
-        let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
+        let size = (pixels("width")?, pixels("height")?);
+        let (w, h) = (f64::from(size.0), f64::from(size.1));
         let kind = sensor.attribute("type").unwrap_or("frame");
         if kind == "spherical" {
             // Pixels are square: what lacks above and below was cut off.
             let f = w / (2.0 * PI);
-            let (cx, cy) = (w / 2.0, h / 2.0);
-            let camera = Camera { rotation, translation, fx: f, fy: f, cx, cy, width, height };
-            return Ok((camera, Lens::Equirectangular));
+            return Ok((Camera::at_origin([f, f, w / 2.0, h / 2.0], size), Lens::Equirectangular));
         }
         let Some(calibration) = calibration else {
             return self.refuse(sensor, "the sensor has no `calibration`; export the cameras of aligned photos");
@@ -369,6 +371,6 @@ impl<'a> File<'a> {
                 return Err(Error::data(self.path, place, problem));
             }
         };
-        Ok((Camera { rotation, translation, fx, fy: f, cx, cy, width, height }, lens))
+        Ok((Camera::at_origin([fx, f, cx, cy], size), lens))
     }
 }

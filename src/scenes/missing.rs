@@ -7,7 +7,7 @@ use labelgs_files::names::shortened;
 use labelgs_scene::{Error, Result, Setting};
 
 /// One of this many photos may lack: published scenes list photos that were left out of them.
-const SHARE: usize = 3;
+const MISSING_ONE_OF: usize = 3;
 
 /// Returns the views whose photos exist; if photos are not requested and none exists, all views with a known size. Notes
 /// those that are skipped in `faults`.
@@ -39,7 +39,7 @@ pub(super) fn existing(
     tracing::debug!("photos that do not exist: {}", absent.join(", "));
     let missing = format!("{} of {total} listed photos do not exist ({})", absent.len(), shortened(&absent));
     // Who asks for cameras alone can do without photos.
-    let usual = if options.photos { total / SHARE } else { total / 2 };
+    let usual = if options.photos { total / MISSING_ONE_OF } else { total / 2 };
     let allowed = allowed(options.max_bad_photos, total).max(usual);
     if absent.len() > allowed {
         let limit = if found.is_empty() {

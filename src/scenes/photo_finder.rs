@@ -124,17 +124,13 @@ impl PhotoFinder {
 
     /// The folder of photos of a scene of which this is one of the models, as `sparse/1` is.
     fn above(&self) -> Option<PathBuf> {
-        self.above.get_or_init(|| self.look_above()).clone()
-    }
-
-    fn look_above(&self) -> Option<PathBuf> {
-        let root = std::path::absolute(&self.root).ok()?;
-        let scene = root
-            .ancestors()
-            .skip(1)
-            .take(3)
-            .find(|above| above.join("sparse").is_dir() && root.starts_with(above.join("sparse")))?;
-        Some(scene.join("images")).filter(|images| images.is_dir())
+        let look = || {
+            let root = std::path::absolute(&self.root).ok()?;
+            let is_scene = |above: &&Path| above.join("sparse").is_dir() && root.starts_with(above.join("sparse"));
+            let scene = root.ancestors().skip(1).take(3).find(is_scene)?;
+            Some(scene.join("images")).filter(|images| images.is_dir())
+        };
+        self.above.get_or_init(look).clone()
     }
 
     /// Returns a note on the photos that were found elsewhere.
@@ -188,17 +184,16 @@ impl PhotoFinder {
 
     /// Folders that may hold the photos: those of photos, with the full sizes first, then the scene's own.
     fn bases(&self) -> Vec<PathBuf> {
-        self.bases.get_or_init(|| self.look_for_bases()).clone()
-    }
-
-    fn look_for_bases(&self) -> Vec<PathBuf> {
-        let entries = read::folder(&self.root).unwrap_or_default();
-        let name = |path: &PathBuf| path.file_name().and_then(OsStr::to_str).unwrap_or_default().to_owned();
-        let mut found: Vec<String> =
-            entries.iter().filter(|path| path.is_dir()).map(name).filter(|name| is_folder_of_photos(name)).collect();
-        let rank = |name: &str| FOLDERS.iter().position(|known| *known == name).unwrap_or(FOLDERS.len());
-        found.sort_by_key(|name| (rank(name), name.len(), name.clone()));
-        found.into_iter().map(|name| self.root.join(name)).chain([self.root.clone()]).collect()
+        let look = || {
+            let entries = read::folder(&self.root).unwrap_or_default();
+            let folders = entries.iter().filter(|path| path.is_dir());
+            let names = folders.filter_map(|path| path.file_name()?.to_str());
+            let mut found: Vec<&str> = names.filter(|name| is_folder_of_photos(name)).collect();
+            let rank = |name: &str| FOLDERS.iter().position(|known| *known == name).unwrap_or(FOLDERS.len());
+            found.sort_by_key(|&name| (rank(name), name.len(), name));
+            found.into_iter().map(|name| self.root.join(name)).chain([self.root.clone()]).collect()
+        };
+        self.bases.get_or_init(look).clone()
     }
 
     fn has_photos(&self, folder: &Path) -> bool {

@@ -22,7 +22,7 @@ const MASK_BYTES: u64 = 6;
 const MAKING_BYTES: u64 = 16;
 
 /// What happens without space for the file.
-const AGAIN: &str = "photos are decoded again each time, which takes longer";
+const WITHOUT_FILE: &str = "photos are decoded again each time, which takes longer";
 
 /// Size in a photo's file, if there is one.
 type Size = Option<(u32, u32)>;
@@ -46,14 +46,15 @@ struct Files {
 
 impl PhotoStore {
     /// Plans the memory of all photos, of known sizes. Views to train on have it before held-out ones.
-    pub(super) fn new(recipes: &[Arc<Recipe>], stored: &[Result<Size>], test: &[bool], options: &LoadOptions) -> Self {
+    pub(super) fn new(recipes: &[Arc<Recipe>], stored: &[Result<Size>], options: &LoadOptions) -> Self {
         let cost = |(recipe, stored): (&Arc<Recipe>, &Result<Size>)| {
             let photo = if recipe.photos && recipe.listed.photo.is_some() { PHOTO_BYTES } else { 0 };
             let mask = if recipe.mask.is_some() { MASK_BYTES } else { 0 };
             if photo + mask == 0 { 0 } else { stored.as_ref().map_or(0, |&size| recipe.pixels(size)) * (photo + mask) }
         };
         let costs: Vec<u64> = recipes.iter().zip(stored).map(cost).collect();
-        let holds = held(&costs, test, options.photo_memory);
+        let test: Vec<bool> = recipes.iter().map(|recipe| recipe.listed.test == Some(true)).collect();
+        let holds = held(&costs, &test, options.photo_memory);
         if holds.contains(&false) {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             tracing::info!(
@@ -97,7 +98,7 @@ impl PhotoStore {
             return picture.into();
         }
         let (facts, size) = (picture.facts(), picture.size());
-        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), AGAIN));
+        let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), WITHOUT_FILE));
         let files = Arc::clone(&self.files);
         Pixels::made(Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }), facts)
     }

@@ -1,6 +1,6 @@
 //! Coloured points.
 
-use super::listing::FAR;
+use super::listing::DISTANCE_MAX;
 use glam::DVec3;
 use labelgs_formats::ply_table::Table;
 use labelgs_scene::{Error, Point, Result};
@@ -16,6 +16,10 @@ const COLOURS: [[&str; 3]; 3] =
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
+    if table.has("packed_position") {
+        let cure = "a compressed PLY, which is read as a model only; convert it to a plain PLY first";
+        return Err(Error::data(path, "header", cure));
+    }
     let has = |colours: &&[&str; 3]| colours.iter().all(|colour| table.names().any(|name| name == *colour));
     let colours = COLOURS.iter().find(has);
     let largest = colours.and_then(|colours| table.integer_max(colours[0]));
@@ -26,7 +30,7 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
         if colour.iter().any(|value| !value.is_finite()) {
             return Err(Error::data(path, format!("vertex {index}"), "has a colour of NaN or infinity"));
         }
-        if row[..3].iter().all(|value| value.abs() <= FAR) {
+        if row[..3].iter().all(|value| value.abs() <= DISTANCE_MAX) {
             rows.push(([row[0], row[1], row[2]], colour));
         }
         Ok(())

@@ -92,11 +92,10 @@ impl PoseConvention {
         }
         let Native(direction, axes) = native;
         // The pose as it stands in the file.
-        let (mut rotation, mut translation) = (camera.rotation, camera.translation);
+        let mut file = (camera.rotation, camera.translation);
         if axes == Axes::OpenGl {
-            (rotation, translation) = (SWAP * rotation, SWAP * translation);
+            file = (SWAP * file.0, SWAP * file.1);
         }
-        let mut file = (rotation, translation);
         if direction == Direction::CameraToWorld {
             file = inverse(file);
         }
@@ -113,27 +112,30 @@ impl PoseConvention {
         (camera.rotation, camera.translation) = file;
     }
 
-    /// Returns what the file means, in words.
-    pub fn text(self) -> String {
+    /// Returns its words as they are typed, each with its meaning.
+    fn words(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let direction = self.direction.map(|direction| match direction {
-            Direction::CameraToWorld => "camera-to-world poses",
-            Direction::WorldToCamera => "world-to-camera poses",
+            Direction::CameraToWorld => ("c2w", "camera-to-world poses"),
+            Direction::WorldToCamera => ("w2c", "world-to-camera poses"),
         });
         let axes = self.axes.map(|axes| match axes {
-            Axes::OpenCv => "camera axes of OpenCV",
-            Axes::OpenGl => "camera axes of OpenGL",
+            Axes::OpenCv => ("opencv", "camera axes of OpenCV"),
+            Axes::OpenGl => ("opengl", "camera axes of OpenGL"),
         });
-        let order = self.is_xyzw.then_some("quaternions with the real part last");
-        let all: Vec<&str> = [direction, axes, order].into_iter().flatten().collect();
+        let order = self.is_xyzw.then_some(("xyzw", "quaternions with the real part last"));
+        [direction, axes, order].into_iter().flatten()
+    }
+
+    /// Returns what the file means, in words.
+    pub fn text(self) -> String {
+        let all: Vec<&str> = self.words().map(|(_, meaning)| meaning).collect();
         if all.is_empty() { "the convention of its format".to_owned() } else { all.join(" and ") }
     }
 }
 
 impl Display for PoseConvention {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let direction = self.direction.map(|way| if way == Direction::CameraToWorld { "c2w" } else { "w2c" });
-        let axes = self.axes.map(|axes| if axes == Axes::OpenCv { "opencv" } else { "opengl" });
-        let words: Vec<&str> = [direction, axes, self.is_xyzw.then_some("xyzw")].into_iter().flatten().collect();
+        let words: Vec<&str> = self.words().map(|(word, _)| word).collect();
         out.write_str(&words.join(","))
     }
 }

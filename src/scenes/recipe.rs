@@ -6,7 +6,7 @@ use super::listing::{Listed, check_camera};
 use super::resample::{resample_ids, undistort_photo};
 use super::window::Window;
 use labelgs_files::image::{check_size, photo_size, read_open_photo, read_photo};
-use labelgs_files::resize::{bounded_size, same_aspect, shrink_photo};
+use labelgs_files::resize::{aspect_problem, bounded_size, same_aspect, shrink_photo};
 use labelgs_masks::mask::{read_checked, read_ignored};
 use labelgs_scene::{Camera, Error, LabelMap, Photo, Result};
 use std::path::{Path, PathBuf};
@@ -43,15 +43,14 @@ pub struct MadeViews {
 }
 
 impl Recipe {
-    /// `source` lists the photo. `[mask, ignore]` are files of the photo, which is held out if `test`.
+    /// `source` lists the photo. `[mask, ignore]` are files of the photo.
     pub fn new(
         (listed, source): (Listed, PathBuf),
         [mask, ignore]: [Option<PathBuf>; 2],
-        test: bool,
         options: &LoadOptions,
     ) -> Self {
         let LoadOptions { photos, max_resolution, undistort, .. } = *options;
-        let background = (test || !options.keep_opacity).then_some(options.background);
+        let background = (listed.test == Some(true) || !options.keep_opacity).then_some(options.background);
         Self { listed, source, mask, ignore, photos, background, max_resolution, undistort }
     }
 
@@ -65,7 +64,7 @@ impl Recipe {
         let camera = &self.listed.camera;
         // Check the shape before the pixels take memory; the error comes later.
         match (&self.listed.photo, stored) {
-            (Some(path), Some(size)) if self.photos && same_aspect(size, (camera.width, camera.height)) => {
+            (Some(path), Some(size)) if self.photos && same_aspect(size, camera.size()) => {
                 let read = |colour| read_photo(path, colour);
                 self.background.map_or_else(|| read_open_photo(path), read).map(Some)
             }
@@ -76,7 +75,7 @@ impl Recipe {
     /// Makes the views, one or several, of the decoded photo.
     pub fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
         let original = at_size(&self.listed, stored)?;
-        let size = (original.width, original.height);
+        let size = original.size();
         let mask = self.mask.as_deref().map(|path| read_checked(path, |found| fits_photo(path, found, size)));
         let mask = mask.transpose()?;
         let is_other = |mask: &LabelMap| usize::from((mask.width, mask.height) != size);
@@ -126,7 +125,7 @@ impl Recipe {
     }
 
     fn size_of(&self, window: &Window) -> (u32, u32) {
-        bounded_size((window.camera.width, window.camera.height), self.max_resolution)
+        bounded_size(window.camera.size(), self.max_resolution)
     }
 }
 
@@ -160,13 +159,10 @@ fn stored_size(path: &Path) -> Result<(u32, u32)> {
 fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
     let (Some(path), Some(size)) = (&listed.photo, stored) else { return Ok(listed.camera.clone()) };
     let camera = &listed.camera;
-    if !same_aspect(size, (camera.width, camera.height)) {
-        let problem = format!(
-            "the photo has {} x {} px and its camera {} x {} px, which no scale explains; use the photos that the \
-             cameras were made for (an EXIF orientation is ignored, because poses belong to the stored pixels)",
-            size.0, size.1, camera.width, camera.height
-        );
-        return Err(Error::data(path, "", problem));
+    if let Some(problem) = aspect_problem(("the photo", size), ("its camera", camera.size())) {
+        let cure = "use the photos that the cameras were made for (an EXIF orientation is ignored, because poses belong to \
+                    the stored pixels)";
+        return Err(Error::data(path, "", format!("{problem}; {cure}")));
     }
     Ok(camera.resized(size.0, size.1))
 }
@@ -181,12 +177,6 @@ fn fitted(photo: &Photo, window: &Window, (width, height): (u32, u32)) -> Photo 
 }
 
 fn fits_photo(path: &Path, found: (u32, u32), photo: (u32, u32)) -> Result<()> {
-    if same_aspect(found, photo) {
-        return Ok(());
-    }
-    let problem = format!(
-        "the mask has {} x {} px and its photo {} x {} px, which no scale explains; make masks of the same photos",
-        found.0, found.1, photo.0, photo.1
-    );
-    Err(Error::data(path, "", problem))
+    let problem = aspect_problem(("the mask", found), ("its photo", photo));
+    problem.map_or(Ok(()), |problem| Err(Error::data(path, "", problem + "; make masks of the same photos")))
 }

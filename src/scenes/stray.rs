@@ -7,7 +7,7 @@ use labelgs_scene::Point;
 use labelgs_scene::spread::Spread;
 
 /// Distance from which a camera is stray, in radii of cameras and points, whichever are wider.
-const RADII: f64 = 30.0;
+const STRAY_RADII: f64 = 30.0;
 /// The same without points, in radii of the cameras: they may be together, and two of them at another place.
 const RADII_WITHOUT_POINTS: f64 = 1000.0;
 /// Fewest points that say how wide the scene is.
@@ -22,7 +22,7 @@ pub(super) fn remove(views: &mut Vec<Listed>, points: &[Point], max_share: f32, 
     let seen = Spread::of(some).filter(|_| points.len() >= POINTS_MIN);
     let limit = match seen {
         // Points may lie anywhere around the cameras.
-        Some(seen) => RADII * cameras.radius.max(seen.radius + seen.middle.distance(cameras.middle)),
+        Some(seen) => STRAY_RADII * cameras.radius.max(seen.radius + seen.middle.distance(cameras.middle)),
         None => RADII_WITHOUT_POINTS * cameras.radius,
     };
     let is_stray = |view: &Listed| view.camera.centre().distance(cameras.middle) > limit;

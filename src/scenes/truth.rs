@@ -3,9 +3,9 @@
 use super::resample::resample_ids;
 use super::window::Window;
 use labelgs_files::image::read_grey;
-use labelgs_files::read;
-use labelgs_files::resize::{bounded_size, same_aspect, shrink_photo};
-use labelgs_scene::{Error, LabelMap, Photo, Result, View};
+use labelgs_files::names::below;
+use labelgs_files::resize::{aspect_problem, bounded_size};
+use labelgs_scene::{Error, LabelMap, Result, View};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -22,38 +22,18 @@ pub struct TruthMask {
 
 /// Extensions of masks.
 const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Number of folder levels that [`files_below`] searches.
-const DEPTH: u32 = 3;
 
 /// Lists the PNG and JPEG files below a folder by relative path, sorted. Hidden files are left out.
 pub fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.is_dir() {
         return Err(Error::data(folder, "", "there is no such folder of true masks"));
     }
-    let mut found = Vec::new();
-    collect(folder, Path::new(""), DEPTH, &mut found)?;
+    let is_picture = |path: &PathBuf| {
+        path.extension().is_some_and(|found| EXTENSIONS.iter().any(|known| found.eq_ignore_ascii_case(known)))
+    };
+    let mut found: Vec<PathBuf> = below(folder)?.into_iter().map(PathBuf::from).filter(is_picture).collect();
     found.sort();
     Ok(found)
-}
-
-fn collect(root: &Path, inside: &Path, depth: u32, found: &mut Vec<PathBuf>) -> Result<()> {
-    let folder = root.join(inside);
-    for entry in read::folder(&folder)? {
-        let name = entry.file_name().unwrap_or_default();
-        let path = inside.join(name);
-        if name.to_string_lossy().starts_with('.') {
-            continue;
-        }
-        if root.join(&path).is_dir() {
-            if depth > 0 {
-                collect(root, &path, depth - 1, found)?;
-            }
-        } else if path.extension().is_some_and(|found| EXTENSIONS.iter().any(|known| found.eq_ignore_ascii_case(known)))
-        {
-            found.push(path);
-        }
-    }
-    Ok(())
 }
 
 /// Reads the mask of an object in `view`. The object is where the value is above 128, or above 0 in a file without
@@ -71,29 +51,18 @@ pub fn read_truth(path: &Path, view: &View, windows: &BTreeMap<String, Window>) 
             &stored
         }
     };
-    let photo = &window.optics.camera;
-    if !same_aspect((width, height), (photo.width, photo.height)) {
-        let problem = format!(
-            "the mask has {width} x {height} px and photo {} {} x {} px, which no scale explains; use masks of the same \
-             photos",
-            window.photo, photo.width, photo.height
-        );
-        return Err(Error::data(path, "", problem));
+    let photo = format!("photo {}", window.photo);
+    if let Some(problem) = aspect_problem(("the mask", (width, height)), (&photo, window.optics.camera.size())) {
+        return Err(Error::data(path, "", problem + "; use masks of the same photos"));
     }
     let above = if values.iter().all(|&value| value <= 1) { 0 } else { 128 };
     let ids = values.iter().map(|&value| u16::from(value > above)).collect();
     let own = match window.is_photo() {
         true => (width, height),
-        false => bounded_size((window.camera.width, window.camera.height), Some(width.max(height))),
+        false => bounded_size(window.camera.size(), Some(width.max(height))),
     };
     let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
-    let of_view = (view.camera.width, view.camera.height);
-    let size = if pixels(own) > pixels(of_view) { of_view } else { own };
+    let size = if pixels(own) > pixels(view.camera.size()) { view.camera.size() } else { own };
     let map = resample_ids(&LabelMap { width, height, ids }, window, size);
     Ok(TruthMask { width: map.width, height: map.height, inside: map.ids.iter().map(|&id| id != 0).collect() })
-}
-
-/// Shrinks a photo to the size of a mask, which is not larger.
-pub fn photo_at(photo: &Photo, width: u32, height: u32) -> Photo {
-    shrink_photo(photo, width, height)
 }

@@ -11,15 +11,15 @@ use std::path::Path;
 
 /// Field of view up to which a photo becomes one view, radians: 110 degrees, where the border of a pinhole picture is
 /// stretched three times as much as its middle.
-const ONE_VIEW: f64 = 110.0 / 180.0 * std::f64::consts::PI;
+const ONE_VIEW_ANGLE_MAX: f64 = 110.0 / 180.0 * std::f64::consts::PI;
 /// Share of the fitted field of view that a polynomial's own intrinsics have to show, which programs that undistort keep.
-const KEPT: f64 = 0.9;
+const OWN_VIEW_SHARE_MIN: f64 = 0.9;
 /// Most pixels of a view, relative to the photo.
-const PIXELS: f64 = 2.0;
+const PIXELS_TIMES_MAX: f64 = 2.0;
 /// Cells along a side of a face in which its covered part is searched.
 const CELLS: u32 = 64;
 /// Part of a face that the photo covers below which the face is left out.
-const COVERED: f64 = 0.02;
+const COVERED_SHARE_MIN: f64 = 0.02;
 
 /// The faces: name, and the axes of the view (right, down, forward) in those of the photo.
 const FACES: [(&str, [DVec3; 3]); 6] = [
@@ -59,8 +59,8 @@ impl Window {
 
     /// Returns the views of a photo, whose camera has the size of its file.
     ///
-    /// A lens up to `ONE_VIEW` becomes one view with the scale of the middle of the photo and the field of view between
-    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show `KEPT` of
+    /// A lens up to `ONE_VIEW_ANGLE_MAX` becomes one view with the scale of the middle of the photo and the field of view between
+    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show `OWN_VIEW_SHARE_MIN` of
     /// that. Wider lenses and panoramas become faces of 90 degrees at that scale, without what the photo does not cover.
     pub fn all(name: &str, camera: &Camera, lens: &Lens) -> Vec<Self> {
         let optics = Optics::new(camera.clone(), *lens);
@@ -68,9 +68,10 @@ impl Window {
             return vec![Self::whole(name, &optics, camera.clone())];
         }
         let edges = edges(&optics);
-        if 2.0 * edges.into_iter().fold(0.0, f64::max) < ONE_VIEW {
+        if 2.0 * edges.into_iter().fold(0.0, f64::max) < ONE_VIEW_ANGLE_MAX {
             let fitted = fitted(&optics, edges);
-            let keeps = matches!(lens, Lens::Polynomial(_)) && shows(camera).cmpge(KEPT * shows(&fitted)).all();
+            let keeps =
+                matches!(lens, Lens::Polynomial(_)) && shows(camera).cmpge(OWN_VIEW_SHARE_MIN * shows(&fitted)).all();
             return vec![Self::whole(name, &optics, if keeps { camera.clone() } else { fitted })];
         }
         FACES.iter().filter_map(|&(face, axes)| Self::face(name, &optics, face, axes)).collect()
@@ -99,7 +100,7 @@ impl Window {
 
     fn face(name: &str, optics: &Optics, face: &str, axes: [DVec3; 3]) -> Option<Self> {
         let scale = scale(optics);
-        let pixels = PIXELS * f64::from(optics.camera.width) * f64::from(optics.camera.height);
+        let pixels = PIXELS_TIMES_MAX * f64::from(optics.camera.width) * f64::from(optics.camera.height);
         // An even side keeps the back of a panorama, where its borders meet, between two pixels.
         let half = (scale.x * scale.y).sqrt().min(pixels.sqrt() / 2.0).round().max(1.0);
         let turn = DMat3::from_cols(axes[0], axes[1], axes[2]);
@@ -149,7 +150,7 @@ impl Window {
                 box_[3].max(high.y as u32),
             ];
         }
-        (f64::from(count) >= COVERED * f64::from((CELLS + 1).pow(2))).then_some(box_)
+        (f64::from(count) >= COVERED_SHARE_MIN * f64::from((CELLS + 1).pow(2))).then_some(box_)
     }
 }
 
@@ -217,7 +218,7 @@ fn fitted(optics: &Optics, edges: [f64; 4]) -> Camera {
     let tangents = edges.map(f64::tan);
     let size = DVec2::new(tangents[0] + tangents[2], tangents[1] + tangents[3]);
     let scale = scale(optics);
-    let pixels = PIXELS * f64::from(photo.width) * f64::from(photo.height);
+    let pixels = PIXELS_TIMES_MAX * f64::from(photo.width) * f64::from(photo.height);
     let scale = scale * (pixels / (size * scale).element_product()).sqrt().min(1.0);
     let side = |side: f64| (side.round() as u32).max(1);
     let (width, height) = (side(size.x * scale.x), side(size.y * scale.y));

@@ -5,13 +5,13 @@ use super::{SynthOptions, hash01};
 /// Gains of photos, from the least to the most.
 const GAINS: (f64, f64) = (0.7, 1.4);
 /// Gain of a channel over that of the photo, up or down.
-const CAST: f64 = 1.1;
+const CAST_MAX: f64 = 1.1;
 
 /// Returns the gains of a view, r, g, b.
 fn gains(options: &SynthOptions, view: u32) -> [f64; 3] {
     let random = |what: u64| hash01(options.seed, 7, u64::from(view), what);
     let gain = GAINS.0.ln() + (GAINS.1 / GAINS.0).ln() * random(0);
-    [1, 2, 3].map(|channel| (gain + CAST.ln() * (2.0 * random(channel) - 1.0)).exp().clamp(GAINS.0, GAINS.1))
+    [1, 2, 3].map(|channel| (gain + CAST_MAX.ln() * (2.0 * random(channel) - 1.0)).exp().clamp(GAINS.0, GAINS.1))
 }
 
 /// Returns a photo at the exposure of its view, if the scene has any.

@@ -10,9 +10,9 @@ const STREETS_EVERY: u32 = 3;
 /// overlap.
 const DISTANCE: (f64, f64) = (8.5, 16.0);
 /// Number of such photos that overlap enough from the least distance.
-const ENOUGH: f64 = 120.0;
+const OVERLAP_COUNT: f64 = 120.0;
 /// Half the size of the city, world units.
-const HALF: DVec3 = DVec3::new(COLUMNS as f64 * PLOT / 2.0, ROWS as f64 * PLOT / 2.0, 0.0);
+const HALF_SIZE: DVec3 = DVec3::new(COLUMNS as f64 * PLOT / 2.0, ROWS as f64 * PLOT / 2.0, 0.0);
 
 /// Returns the position of a view and the unit vector along its optical axis.
 pub(super) fn pose(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
@@ -26,11 +26,12 @@ pub(super) fn pose(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
     let index = f64::from(view - before) + 0.5;
     let spread = |step: f64| 2.0 * (index * step).fract() - 1.0;
     let target =
-        HALF * DVec3::new(0.97 * spread(0.754_877_666_2), 0.95 * spread(0.569_840_291_0), 0.0) + DVec3::Z * 0.4;
+        HALF_SIZE * DVec3::new(0.97 * spread(0.754_877_666_2), 0.95 * spread(0.569_840_291_0), 0.0) + DVec3::Z * 0.4;
     let azimuth = std::f64::consts::PI * spread(0.618_033_988_7) + 0.3 * jitter(0);
     let elevation = (46.0 + 18.0 * jitter(1)).to_radians();
     let outward = DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
-    let distance = (DISTANCE.0 * (ENOUGH / count).sqrt()).clamp(DISTANCE.0, DISTANCE.1) * (1.0 + 0.1 * jitter(2));
+    let distance =
+        (DISTANCE.0 * (OVERLAP_COUNT / count).sqrt()).clamp(DISTANCE.0, DISTANCE.1) * (1.0 + 0.1 * jitter(2));
     (target + outward * distance, -outward)
 }
 
@@ -39,12 +40,12 @@ fn in_street(options: &SynthOptions, view: u32, share: f64) -> (DVec3, DVec3) {
     let jitter = |what: u64| hash01(options.seed, 3, u64::from(view), what) - 0.5;
     // Streets along x, then streets along y.
     let (rows, columns) = (ROWS - 1, COLUMNS - 1);
-    let way = f64::from(rows) * 2.0 * HALF.x + f64::from(columns) * 2.0 * HALF.y;
-    let (mut at, mut street, mut length) = (share * way, 0, 2.0 * HALF.x);
+    let way = f64::from(rows) * 2.0 * HALF_SIZE.x + f64::from(columns) * 2.0 * HALF_SIZE.y;
+    let (mut at, mut street, mut length) = (share * way, 0, 2.0 * HALF_SIZE.x);
     while at >= length && street + 1 < rows + columns {
         at -= length;
         street += 1;
-        length = if street < rows { 2.0 * HALF.x } else { 2.0 * HALF.y };
+        length = if street < rows { 2.0 * HALF_SIZE.x } else { 2.0 * HALF_SIZE.y };
     }
     let (along, aside) = if street < rows { (DVec3::X, DVec3::Y) } else { (DVec3::Y, DVec3::X) };
     let (index, count) = if street < rows { (street, rows) } else { (street - rows, columns) };

@@ -6,9 +6,9 @@ use super::shape::Shape;
 use glam::DVec3;
 
 /// Albedo of the black object: too dark to tell it from a hole in an 8-bit photo.
-pub(super) const BLACK: f64 = 0.018;
+pub(super) const BLACK_ALBEDO: f64 = 0.018;
 /// Half the thickness of wires and bars, one to three pixels in the usual view, world units.
-const THIN: f64 = 0.013;
+const THIN_RADIUS: f64 = 0.013;
 
 /// Returns the objects, with ids 1, 2, ... in order.
 pub(super) fn rows() -> Vec<Row> {
@@ -20,8 +20,14 @@ pub(super) fn rows() -> Vec<Row> {
         ("apple", ball(0.13), [-0.12, 0.02, 0.17], 0.0, Pattern::Noise(0.12)),
         ("die", block(0.11, 0.11, 0.1), [0.12, 0.02, 0.14], 0.0, Pattern::Spots(0.09)),
         // Thin parts: bars in front of the ground, a wire between two poles.
-        ("fence", Shape::Fence(9, 0.14, 0.38, THIN), [0.05, -1.0, 0.38], 0.0, Pattern::Stripes(0.2, 2)),
-        ("wire", Shape::RoundBlock(DVec3::new(0.8, 0.0, 0.0), THIN), [0.0, 0.8, 1.25], 0.0, Pattern::Stripes(0.3, 0)),
+        ("fence", Shape::Fence(9, 0.14, 0.38, THIN_RADIUS), [0.05, -1.0, 0.38], 0.0, Pattern::Stripes(0.2, 2)),
+        (
+            "wire",
+            Shape::RoundBlock(DVec3::new(0.8, 0.0, 0.0), THIN_RADIUS),
+            [0.0, 0.8, 1.25],
+            0.0,
+            Pattern::Stripes(0.3, 0),
+        ),
         // Objects cut by the border: the taller pole at the top, the plank on both sides.
         ("mast", Shape::Cylinder(0.08, 1.25), [-0.88, 0.8, 1.25], 0.0, Pattern::Stripes(0.25, 2)),
         ("pole", Shape::Cylinder(0.08, 0.66), [0.88, 0.8, 0.66], 0.0, Pattern::Stripes(0.25, 2)),

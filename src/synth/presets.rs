@@ -71,7 +71,7 @@ fn object(index: usize, (name, shape, position, turn, pattern): Row, seed: u64) 
         seed: seed.wrapping_mul(1009).wrapping_add(id * 16),
     };
     match pattern {
-        Pattern::Plain => material.first = DVec3::splat(hard::BLACK),
+        Pattern::Plain => material.first = DVec3::splat(hard::BLACK_ALBEDO),
         Pattern::Ground => material = Material { offset: DVec3::from_array(position), seed, ..material },
         _ => {}
     }

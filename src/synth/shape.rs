@@ -156,11 +156,11 @@ fn enter_cylinder(origin: DVec3, direction: DVec3, radius: f64, half: f64) -> Op
 
 /// Traces a ray between two distances with an exact signed distance.
 fn march(distance_to: impl Fn(DVec3) -> f64, origin: DVec3, direction: DVec3, near: f64, far: f64) -> Option<Entry> {
-    const CLOSE: f64 = 1e-7;
+    const HIT_DISTANCE: f64 = 1e-7;
     let mut distance = near;
     for _ in 0..200 {
         let gap = distance_to(origin + direction * distance);
-        if gap < CLOSE {
+        if gap < HIT_DISTANCE {
             let at = origin + direction * distance;
             let slope = |axis: DVec3| distance_to(at + axis * 1e-5) - distance_to(at - axis * 1e-5);
             let normal = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize();

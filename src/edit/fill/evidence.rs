@@ -5,19 +5,19 @@ use super::plane::Plane;
 use glam::DVec3;
 
 /// Tolerance of depths, in cells.
-const DEPTH: f64 = 2.5;
+const DEPTH_TOLERANCE: f64 = 2.5;
 /// Distance from the surface in question, and depth below any, that still counts as that surface, in tolerances: where
 /// little is seen, as in shadows and corners, surfaces of a model are uneven.
-const OWN: f64 = 3.0;
+const OWN_SURFACE_TOLERANCES: f64 = 3.0;
 /// Least sine of the angle between a view and the plane: a flatter one cannot tell its places apart.
-const STEEP: f64 = 0.15;
+const VIEW_SINE_MIN: f64 = 0.15;
 /// Views that have to show the removed object before a hole, and the share of them that may show something else: at
 /// contours a pixel is decided by chance.
 const HIDING: (u32, f64) = (2, 0.1);
 
 /// Returns the distance up to which something is on a surface, world units.
 pub(super) fn on_surface(cell: f64) -> f64 {
-    OWN * DEPTH * cell
+    OWN_SURFACE_TOLERANCES * DEPTH_TOLERANCE * cell
 }
 
 /// What a view shows at a place.
@@ -72,14 +72,14 @@ impl Evidence {
         let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
         let ray = camera.rotation.transpose() * camera.ray(camera.pixel_centre(index));
         let depth = -plane.height(camera.centre()) / ray.dot(plane.normal);
-        if ray.normalize().dot(plane.normal).abs() < STEEP || !(depth > 0.0 && depth.is_finite()) {
+        if ray.normalize().dot(plane.normal).abs() < VIEW_SINE_MIN || !(depth > 0.0 && depth.is_finite()) {
             return None;
         }
         let shown = f64::from(sight.depth[index]);
         let behind = if shown > 0.0 { depth - shown } else { f64::NEG_INFINITY };
         // Distance from the plane of the surface that the view shows: flat views change depths much from pixel to pixel.
         let off = if shown > 0.0 { plane.height(sight.at(index, shown)).abs() } else { f64::INFINITY };
-        let slack = DEPTH * cell;
+        let slack = DEPTH_TOLERANCE * cell;
         let label = u32::from(sight.labels.ids[index]);
         let is_removed = removed.contains(&label);
         let (shown, count) = if is_removed && (behind >= -slack || off <= on_surface(cell)) {
@@ -107,7 +107,7 @@ impl Evidence {
         let index = pixel.y as usize * camera.width as usize + pixel.x as usize;
         let shown = f64::from(sight.depth[index]);
         let behind = if shown > 0.0 { camera.to_camera(world).z - shown } else { f64::NEG_INFINITY };
-        let slack = DEPTH * cell;
+        let slack = DEPTH_TOLERANCE * cell;
         if behind < -slack {
             self.through += 1;
         } else if removed.contains(&u32::from(sight.labels.ids[index])) {

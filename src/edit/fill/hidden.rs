@@ -9,7 +9,7 @@ use labelgs_scene::gaussians::axes_of;
 use rayon::prelude::*;
 
 /// Distance from its centre, in standard deviations, at which a Gaussian must be hidden too: its rim is still seen there.
-const REACH: f64 = 1.5;
+const RIM_DEVIATIONS: f64 = 1.5;
 
 impl Place {
     /// Returns for each row of `model`, in which the objects `removed` are missing, whether the objects hide it in all views.
@@ -25,7 +25,7 @@ impl Place {
                 return false;
             }
             let turn = axes_of(model.quats[row]);
-            let arm = |axis: usize| REACH * f64::from(model.scales[row][axis]).exp() * turn.col(axis);
+            let arm = |axis: usize| RIM_DEVIATIONS * f64::from(model.scales[row][axis]).exp() * turn.col(axis);
             (0..3).map(arm).all(|arm| is_hole(world + arm) && is_hole(world - arm))
         };
         (0..model.len()).into_par_iter().map(is_hidden).collect()

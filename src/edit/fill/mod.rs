@@ -33,7 +33,7 @@ pub const SIGHT_SIDE: u32 = 640;
 /// least width, in cells.
 const RING: (f64, f64) = (0.25, 8.0);
 /// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
-const LARGE: f64 = 0.25;
+const BLOCKER_SHARE_MAX: f64 = 0.25;
 /// Most points that one surface is looked for among.
 const POINTS_MAX: usize = 20_000;
 /// Standard deviation of a new Gaussian in and across its surface, in cells: neighbours overlap without gaps.
@@ -171,7 +171,7 @@ impl Place {
     /// Returns true for what is within a margin of the object and not larger than a part of it: haze and sky throw no
     /// shadow.
     fn has(&self, disc: &Disc, margin: f64) -> bool {
-        self.is_near(disc.middle, margin) && disc.radius < LARGE * self.size()
+        self.is_near(disc.middle, margin) && disc.radius < BLOCKER_SHARE_MAX * self.size()
     }
 
     /// Returns the diagonal of the object.
@@ -235,19 +235,16 @@ fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3,
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
     let quat = [turn.w, turn.x, turn.y, turn.z].map(|value| value as f32);
     let scale = [SPREAD.0, SPREAD.0, SPREAD.1].map(|share| (share * cell).ln() as f32);
-    let rest = model.rest_per_gaussian();
-    for (world, colour) in places {
-        model.means.push((*world - model.origin).to_array().map(|value| value as f32));
-        model.quats.push(quat);
-        model.scales.push(scale);
-        model.opacities.push(OPACITY);
-        model.sh0.push(colour.to_array().map(sh0_of));
-        model.sh_rest.extend(std::iter::repeat_n([0.0; 3], rest));
-        if let Some(labels) = &mut model.labels {
-            labels.push(label);
-        }
-        if let Some(shares) = &mut model.label_confidence {
-            shares.push(1.0);
-        }
-    }
+    let count = places.len();
+    model.append(Gaussians {
+        means: places.iter().map(|(world, _)| (*world - model.origin).as_vec3().to_array()).collect(),
+        quats: vec![quat; count],
+        scales: vec![scale; count],
+        opacities: vec![OPACITY; count],
+        sh0: places.iter().map(|(_, colour)| colour.to_array().map(sh0_of)).collect(),
+        sh_rest: vec![[0.0; 3]; count * model.rest_per_gaussian()],
+        labels: Some(vec![label; count]),
+        label_confidence: Some(vec![1.0; count]),
+        ..Gaussians::default()
+    });
 }

@@ -11,11 +11,11 @@ const PLANES_MAX: usize = 6;
 /// Least number of points on a plane, and its least share of the points.
 const LEAST: (usize, f64) = (60, 0.03);
 /// Largest distance of a point from its plane, in cells.
-const NEAR: f64 = 1.5;
+const PLANE_DISTANCE_MAX: f64 = 1.5;
 /// Distance of points from a plane that may lie on another, in cells, and the least cosine of the normals of two planes
 /// that are one if they are near.
-const APART: f64 = 4.0;
-const PARALLEL: f64 = 0.97;
+const OTHER_PLANE_DISTANCE: f64 = 4.0;
+const NORMAL_COSINE_MIN: f64 = 0.97;
 /// Seed of the samples.
 const SEED: u64 = 0;
 
@@ -79,7 +79,7 @@ pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
         if left.len() < least {
             break;
         }
-        let near = |plane: &Plane, point: &DVec3| plane.height(*point).abs() <= NEAR * cell;
+        let near = |plane: &Plane, point: &DVec3| plane.height(*point).abs() <= PLANE_DISTANCE_MAX * cell;
         let count = |plane: &Plane| left.iter().filter(|point| near(plane, point)).count();
         let mut best: Option<(usize, Plane)> = None;
         for _ in 0..TRIES {
@@ -98,9 +98,10 @@ pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
         let on: Vec<DVec3> = left.iter().copied().filter(|point| near(&rough, point)).collect();
         let plane = rough.refined(&on).unwrap_or(rough);
         // Also those of the rough plane, so that each round takes points away.
-        left.retain(|point| plane.height(*point).abs() > APART * cell && !near(&rough, point));
+        left.retain(|point| plane.height(*point).abs() > OTHER_PLANE_DISTANCE * cell && !near(&rough, point));
         let is_same = |other: &Plane| {
-            other.normal.dot(plane.normal).abs() > PARALLEL && other.height(plane.origin).abs() < 2.0 * APART * cell
+            other.normal.dot(plane.normal).abs() > NORMAL_COSINE_MIN
+                && other.height(plane.origin).abs() < 2.0 * OTHER_PLANE_DISTANCE * cell
         };
         if !found.iter().any(is_same) {
             found.push(plane);

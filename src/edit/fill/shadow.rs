@@ -4,24 +4,24 @@ use super::Place;
 use super::evidence::on_surface;
 use super::light::Light;
 use super::plane::Plane;
-use super::sheet::{BESIDE, Sheet};
+use super::sheet::{STEPS_BESIDE, Sheet};
 use glam::{DVec2, DVec3};
 use labelgs_scene::Gaussians;
 use labelgs_scene::harmonics::{sh0_of, value_of};
 use rayon::prelude::*;
 
 /// Least sine of the angle between the light and a plane with shadows.
-pub(super) const FLAT: f64 = 0.25;
+pub(super) const LIGHT_SINE_MIN: f64 = 0.25;
 /// Least radius of what throws a shadow, in cells: Gaussians of one surface leave no light between them.
-const LEAST: f64 = 1.5;
+const DISC_RADIUS_MIN: f64 = 1.5;
 /// Spots of the light: one in the middle and a ring around it, and its radius as the tangent of the angle. A shadow has soft
 /// edges, those of a model more so than those of a photo.
 const SPOTS: usize = 6;
-const SOFT: f64 = 0.06;
+const LIGHT_RADIUS: f64 = 0.06;
 /// Distance from the edge of a shadow at which it is sure on which side a place is, in cells.
-const EDGE: usize = 2;
+const EDGE_CELLS: usize = 2;
 /// Distance from the object at which other things that throw shadows are looked for, in its diagonals.
-const AROUND: f64 = 1.5;
+const BLOCKERS_WITHIN: f64 = 1.5;
 
 /// What stands in the light: a Gaussian.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ pub(super) fn discs(model: &Gaussians) -> Vec<Disc> {
 
 /// Returns those that stand above a plane around an object.
 pub(super) fn above(discs: &[Disc], place: &Place, plane: &Plane) -> Vec<Disc> {
-    let around = AROUND * place.size();
+    let around = BLOCKERS_WITHIN * place.size();
     let stands = |disc: &Disc| plane.height(disc.middle) > on_surface(place.cell) && place.has(disc, around);
     discs.iter().copied().filter(stands).collect()
 }
@@ -90,7 +90,6 @@ impl Shadows {
 
     /// Brings Gaussians of the surface out of the shadow of the removed, each at most once.
     pub(super) fn lift(&self, sheet: &Sheet, model: &mut Gaussians, is_lit: &mut [bool]) {
-        let rest = model.rest_per_gaussian();
         for row in 0..is_lit.len() {
             let world = model.world(row);
             let is_on = model.label(row) == sheet.label && sheet.plane.height(world).abs() <= on_surface(sheet.cell);
@@ -103,18 +102,16 @@ impl Shadows {
             for (channel, gain) in gain.to_array().into_iter().enumerate() {
                 let sh0 = &mut model.sh0[row][channel];
                 *sh0 = sh0_of(gain * value_of(*sh0));
-                for band in &mut model.sh_rest[row * rest..][..rest] {
-                    band[channel] *= gain as f32;
-                }
+                model.rest_mut(row).iter_mut().for_each(|band| band[channel] *= gain as f32);
             }
         }
     }
 }
 
-/// Returns true if shadows differ within [`EDGE`] cells.
+/// Returns true if shadows differ within [`EDGE_CELLS`] cells.
 fn is_mixed(sheet: &Sheet, shadow: &[f64], index: usize) -> bool {
     let (x, y) = (index % sheet.width, index / sheet.width);
-    let range = |at: usize, side: usize| at.saturating_sub(EDGE)..(at + EDGE + 1).min(side);
+    let range = |at: usize, side: usize| at.saturating_sub(EDGE_CELLS)..(at + EDGE_CELLS + 1).min(side);
     let mut around = range(y, sheet.height).flat_map(|y| range(x, sheet.width).map(move |x| y * sheet.width + x));
     around.any(|at| shadow[at] != shadow[index])
 }
@@ -125,7 +122,7 @@ pub(super) fn soft(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<f64> {
     let around = (0..SPOTS).map(|spot| DVec2::from_angle(std::f64::consts::TAU * spot as f64 / SPOTS as f64));
     let spots: Vec<DVec3> = std::iter::once(DVec2::ZERO)
         .chain(around)
-        .map(|at| (towards + SOFT * (at.x * u + at.y * v)).normalize())
+        .map(|at| (towards + LIGHT_RADIUS * (at.x * u + at.y * v)).normalize())
         .collect();
     let masks: Vec<Vec<bool>> = spots.par_iter().map(|&towards| hard(sheet, towards, discs)).collect();
     let share = |index: usize| masks.iter().filter(|mask| mask[index]).count() as f64 / masks.len() as f64;
@@ -137,7 +134,7 @@ pub(super) fn hard(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
     let wide = drawn(sheet, towards, discs);
     let is_wide = |at: usize| wide[at];
     let is_inside =
-        |index: usize| wide[index] && BESIDE.iter().all(|&step| sheet.step(index, step).is_none_or(is_wide));
+        |index: usize| wide[index] && STEPS_BESIDE.iter().all(|&step| sheet.step(index, step).is_none_or(is_wide));
     (0..wide.len()).map(is_inside).collect()
 }
 
@@ -145,7 +142,7 @@ fn drawn(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
     let mut mask = vec![false; sheet.width * sheet.height];
     for disc in discs {
         let Some(place) = thrown(&sheet.plane, towards, disc.middle) else { continue };
-        let ([x, y], radius) = (sheet.at(place), (disc.radius / sheet.cell).max(LEAST));
+        let ([x, y], radius) = (sheet.at(place), (disc.radius / sheet.cell).max(DISC_RADIUS_MIN));
         let range =
             |at: f64, side: usize| (at - radius).max(0.0) as usize..((at + radius).max(0.0) as usize + 1).min(side);
         for row in range(y, sheet.height) {
@@ -161,5 +158,5 @@ fn drawn(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
 /// Returns where the shadow of a point falls on a plane; `None` where it is below, or the light almost in the plane.
 pub(super) fn thrown(plane: &Plane, towards: DVec3, point: DVec3) -> Option<DVec3> {
     let (height, slope) = (plane.height(point), towards.dot(plane.normal));
-    (height > 0.0 && slope > FLAT).then(|| point - towards * (height / slope))
+    (height > 0.0 && slope > LIGHT_SINE_MIN).then(|| point - towards * (height / slope))
 }

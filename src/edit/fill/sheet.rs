@@ -31,9 +31,9 @@ pub(super) struct Sheet {
 }
 
 /// Steps to the cells beside one.
-pub(super) const BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
+pub(super) const STEPS_BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 1]];
 /// Steps in all directions.
-const AROUND: [[isize; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
+const STEPS_AROUND: [[isize; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
 
 impl Sheet {
     /// Looks at the cells of a plane, the surface of a label, in every view: at those around the object, and those in its
@@ -147,7 +147,7 @@ impl Sheet {
             let way = std::iter::successors(self.step(index, direction), |&at| self.step(at, direction));
             way.map(|at| states[at]).find(|state| matches!(state, State::Seen | State::Free)) == Some(State::Seen)
         };
-        AROUND.iter().filter(meets).count() >= BOUNDED_MIN
+        STEPS_AROUND.iter().filter(meets).count() >= BOUNDED_MIN
     }
 
     /// Returns the colours without any shadow, but for those at edges of shadows if there are others.
@@ -171,7 +171,7 @@ impl Sheet {
         let mean = known.iter().sum::<DVec3>() / known.len() as f64;
         let mut colours: Vec<DVec3> = lit.iter().map(|colour| colour.unwrap_or(mean)).collect();
         let is_there = |index: usize| self.states[index] != State::Free;
-        let beside = |index: usize| BESIDE.iter().filter_map(move |&step| self.step(index, step));
+        let beside = |index: usize| STEPS_BESIDE.iter().filter_map(move |&step| self.step(index, step));
         let unknown: Vec<(usize, Vec<usize>)> = (0..colours.len())
             .filter(|&index| lit[index].is_none() && is_there(index))
             .map(|index| (index, beside(index).filter(|&at| is_there(at)).collect()))

@@ -5,7 +5,7 @@ use labelgs_scene::gaussians::{ALPHA_MAX, axes_of};
 use labelgs_scene::harmonics::SH_C0;
 
 /// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
-const COLOUR: f64 = 4.0;
+const COLOUR_WEIGHT: f64 = 4.0;
 /// Smallest opacity that a merged Gaussian gets, so that it has a logit. Blending ends at the largest.
 const OPACITY_MIN: f64 = 1e-6;
 /// Sweeps of the eigenvalue iteration; five reach double precision for 3 x 3.
@@ -38,7 +38,7 @@ impl Blob {
         let shape = 0.5 * (mean.determinant() / product.max(f64::MIN_POSITIVE).sqrt()).max(1.0).ln();
         let colour = self.colour().distance_squared(other.colour());
         let weight = self.weight * other.weight / (self.weight + other.weight).max(f64::MIN_POSITIVE);
-        let cost = weight * (place + shape + COLOUR * colour);
+        let cost = weight * (place + shape + COLOUR_WEIGHT * colour);
         // Flat Gaussians that are too thin for an inverse stay.
         if cost.is_finite() { cost } else { f64::INFINITY }
     }

@@ -15,7 +15,7 @@ use std::num::NonZero;
 /// Neighbours that a Gaussian may merge with.
 const NEIGHBOURS: usize = 10;
 /// Share of the Gaussians that may vanish in one round; merged ones find new neighbours in the next.
-const ROUND: f64 = 0.1;
+const ROUND_SHARE_MAX: f64 = 0.1;
 
 /// A model on its way to fewer Gaussians.
 #[derive(Clone, Debug)]
@@ -31,7 +31,6 @@ impl<'a> Simplifier<'a> {
     ///
     /// If there are fewer weights than Gaussians.
     pub fn new(model: &'a Gaussians, weights: &[f32]) -> Self {
-        let rest = model.rest_per_gaussian();
         let blob = |row: usize| Blob {
             mean: DVec3::from_array(model.means[row].map(f64::from)),
             covariance: covariance(model.quats[row], model.scales[row]),
@@ -39,7 +38,7 @@ impl<'a> Simplifier<'a> {
             weight: weights[row].into(),
             label: model.label(row),
             confidence: model.label_confidence.as_ref().map_or(1.0, |shares| shares[row]),
-            harmonics: [&[model.sh0[row]], &model.sh_rest[row * rest..(row + 1) * rest]].concat(),
+            harmonics: [&[model.sh0[row]], model.rest(row)].concat(),
             row: Some(row),
         };
         Self { model, blobs: (0..model.len()).map(blob).collect() }
@@ -57,7 +56,7 @@ impl<'a> Simplifier<'a> {
     /// Positions that are not finite.
     pub fn reduce_to(&mut self, count: usize) -> Result<()> {
         while self.blobs.len() > count {
-            let most = (self.blobs.len() - count).min((ROUND * self.blobs.len() as f64).ceil() as usize);
+            let most = (self.blobs.len() - count).min((ROUND_SHARE_MAX * self.blobs.len() as f64).ceil() as usize);
             if self.round(most)? == 0 {
                 break;
             }

@@ -9,9 +9,9 @@ use crate::error::Result;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::covered;
 use crate::eval::subject::Subject;
+use crate::files::resize::shrink_photo;
 use crate::render::{Parts, RenderOptions};
 use crate::scene::View;
-use crate::scenes::truth::photo_at;
 
 /// Returns the largest number of pictures that [`run`] renders, without prompts.
 #[cfg(feature = "cli")]
@@ -85,7 +85,7 @@ fn score_one(
     watch: &mut dyn Watch,
 ) -> Result<PairScores> {
     let mask = (bench.truth)(&truth.file, view)?;
-    let photo = photo_at(&*view.photo()?, mask.width, mask.height);
+    let photo = shrink_photo(&*view.photo()?, mask.width, mask.height);
     let pixels = mask.inside.len();
     let (scores, found, rgb) = if reason.is_some() {
         (PairScores::absent(bench.lpips.is_some()), vec![false; pixels], vec![[0.0; 3]; pixels])

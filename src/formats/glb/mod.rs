@@ -13,7 +13,7 @@ use super::turn::Signs;
 
 /// The format by its ending.
 pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: "GLB", endings: &[".glb"], read: read::read, write: Some(write::WRITER) };
+    ModelFormat { name: "GLB", endings: &[".glb"], contents: &["a GLB"], read: read::read, write: Some(write::WRITER) };
 
 /// Axes of glTF as its viewers show a model of COLMAP's axes: turned about z, so that y is up.
 const AXES: Signs = Signs([-1.0, -1.0, 1.0]);

@@ -106,15 +106,7 @@ fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
         ..Gaussians::default()
     };
     for part in parts {
-        let part = fitting(part, &all)?;
-        all.means.extend(part.means);
-        all.quats.extend(part.quats);
-        all.scales.extend(part.scales);
-        all.opacities.extend(part.opacities);
-        all.sh0.extend(part.sh0);
-        all.sh_rest.extend(part.sh_rest);
-        all.labels.iter_mut().for_each(|to| to.extend(part.labels.iter().flatten()));
-        all.label_confidence.iter_mut().for_each(|to| to.extend(part.label_confidence.iter().flatten()));
+        all.append(fitting(part, &all)?);
     }
     Ok(all)
 }
@@ -202,28 +194,16 @@ impl Glb<'_> {
         if accessor["type"] != kind || accessor.get("sparse").is_some() {
             return Err(self.bad(&place, format!("is {} or sparse; expected a plain {kind}", accessor["type"])));
         }
-        let number: fn(&[u8], bool) -> f32 = match accessor["componentType"].as_u64() {
-            Some(FLOAT) => |b, _| f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-            Some(5120) => {
-                |b, unit| if unit { (f32::from(b[0] as i8) / 127.0).max(-1.0) } else { f32::from(b[0] as i8) }
-            }
-            Some(5121) => |b, unit| if unit { f32::from(b[0]) / 255.0 } else { f32::from(b[0]) },
-            Some(5122) => |b, unit| {
-                let value = f32::from(i16::from_le_bytes([b[0], b[1]]));
-                if unit { (value / 32_767.0).max(-1.0) } else { value }
-            },
-            Some(5123) => |b, unit| {
-                let value = f32::from(u16::from_le_bytes([b[0], b[1]]));
-                if unit { value / 65_535.0 } else { value }
-            },
+        // Bytes, value, and the value that is 1 where integers are shares.
+        let (size, number, full): (u64, fn(&[u8]) -> f32, f32) = match accessor["componentType"].as_u64() {
+            Some(FLOAT) => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]), 1.0),
+            Some(5120) => (1, |b| f32::from(b[0] as i8), 127.0),
+            Some(5121) => (1, |b| f32::from(b[0]), 255.0),
+            Some(5122) => (2, |b| f32::from(i16::from_le_bytes([b[0], b[1]])), 32_767.0),
+            Some(5123) => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])), 65_535.0),
             _ => return Err(self.bad(&place, "has another component type than float, and signed or not 8 or 16 bits")),
         };
-        let size = match accessor["componentType"].as_u64() {
-            Some(5120 | 5121) => 1,
-            Some(5122 | 5123) => 2,
-            _ => 4,
-        };
-        let unit = accessor["normalized"].as_bool().unwrap_or(false);
+        let is_share = size < 4 && accessor["normalized"].as_bool().unwrap_or(false);
         let count = accessor["count"].as_u64().unwrap_or(0);
         let (view, stride) = self.view(&place, &accessor["bufferView"])?;
         let start = accessor["byteOffset"].as_u64().unwrap_or(0);
@@ -237,7 +217,8 @@ impl Glb<'_> {
             return Err(self.bad(&place, format!("{problem}; the file was cut short or changed")));
         }
         let at = |row: u64, column: usize| (start + row * stride + column as u64 * size) as usize;
-        let value = |row: u64| (0..width).map(move |column| number(&view[at(row, column)..], unit));
+        let number = |bytes: &[u8]| if is_share { (number(bytes) / full).max(-1.0) } else { number(bytes) };
+        let value = |row: u64| (0..width).map(move |column| number(&view[at(row, column)..]));
         Ok(Some(Column { values: (0..count).flat_map(value).collect(), width }))
     }
 

@@ -5,7 +5,7 @@ use super::{
     harmonic, harmonics,
 };
 use crate::format::{Export, ModelWriter};
-use crate::values::sigmoid;
+use crate::values::{sigmoid, unit};
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::harmonics::value_of;
 use labelgs_scene::{Error, Result, UNLABELLED};
@@ -121,9 +121,7 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     let g = export.model;
     let rows = || export.rows.iter().copied();
     let rotation = |row: usize| {
-        let quat = AXES.quat(g.quats[row]);
-        let length = quat.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
-        let [w, x, y, z] = quat.map(|value| (f64::from(value) / length) as f32);
+        let [w, x, y, z] = unit(AXES.quat(g.quats[row]));
         [x, y, z, w]
     };
     let mut all = Map::new();
@@ -140,7 +138,7 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     add(OPACITY.into(), to.attribute(false, rows().map(|row| [sigmoid(g.opacities[row])])));
     add(harmonic(0, 0), to.attribute(false, rows().map(|row| g.sh0[row])));
     for ((index, name), sign) in harmonics(g.sh_degree).enumerate().zip(AXES.signs()) {
-        let value = |row: usize| export.rest(row)[index].map(|value| sign * value);
+        let value = |row: usize| export.model.rest(row)[index].map(|value| sign * value);
         add(name, to.attribute(false, rows().map(value)));
     }
     Value::Object(all)

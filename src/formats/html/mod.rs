@@ -18,7 +18,13 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// The format by its ending.
-pub(super) const FORMAT: ModelFormat = ModelFormat { name: "HTML", endings: &[".html"], read, write: Some(WRITER) };
+pub(super) const FORMAT: ModelFormat = ModelFormat {
+    name: "HTML",
+    endings: &[".html"],
+    contents: &["a web page", "a page of HTML or XML"],
+    read,
+    write: Some(WRITER),
+};
 
 const WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
 

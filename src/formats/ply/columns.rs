@@ -2,6 +2,7 @@
 
 use crate::ply_table::Table;
 use crate::rows::Rows;
+use labelgs_scene::harmonics::coefficients;
 use labelgs_scene::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -49,10 +50,11 @@ pub(super) struct Columns {
     pub(super) flat: bool,
     /// The colours are red, green, blue, and 1 is this value.
     pub(super) full_colour: Option<f64>,
-    pub(super) filtered: bool,
-    pub(super) labelled: bool,
-    pub(super) confident: bool,
-    pub(super) edited: bool,
+    /// Places of the columns that a file may have among those that are decoded.
+    pub(super) filter: Option<usize>,
+    pub(super) label: Option<usize>,
+    pub(super) confidence: Option<usize>,
+    pub(super) state: Option<usize>,
     notes: Vec<String>,
 }
 
@@ -92,20 +94,21 @@ impl Columns {
         }
         let (all, rest) = (coefficients(stored), coefficients(kept));
         wanted.extend((0..3 * rest).map(|index| format!("f_rest_{}", index / rest * all + index % rest)));
-        let (filtered, labelled, edited) = (has(FILTER), has("label"), !has("label") && has("state"));
-        let confident = labelled && has("label_confidence");
-        for (there, name) in
-            [(filtered, FILTER), (labelled, "label"), (confident, "label_confidence"), (edited, "state")]
-        {
-            wanted.extend(there.then(|| name.to_owned()));
-        }
+        let mut place = |name: &str, is_used: bool| {
+            (is_used && has(name)).then(|| {
+                wanted.push(name.to_owned());
+                wanted.len() - 1
+            })
+        };
+        let (filter, label) = (place(FILTER, true), place("label", true));
+        let (confidence, state) = (place("label_confidence", label.is_some()), place("state", label.is_none()));
         let missing: Vec<&str> = wanted.iter().map(String::as_str).filter(|name| !has(name)).collect();
         if !missing.is_empty() {
             let cure = "export it from its trainer as a 3DGS PLY";
             return bad(format!("`vertex` lacks the properties {}; {cure}", missing.join(" ")));
         }
         let mut notes = Vec::new();
-        if filtered {
+        if filter.is_some() {
             notes.push(format!(
                 "the column `{FILTER}` of Mip-Splatting was applied to sizes and opacities, as in its fused export"
             ));
@@ -120,7 +123,7 @@ impl Columns {
         notes.extend(unknown(by_name.keys().copied().filter(|name| !wanted.iter().any(|own| own == name))));
         let full_colour = coloured.then(|| table.integer_max(by_name["red"]).unwrap_or(1.0));
         let names = wanted.iter().map(|name| by_name[name.as_str()].to_owned()).collect();
-        Ok(Self { sh_degree: kept, names, flat, full_colour, filtered, labelled, confident, edited, notes })
+        Ok(Self { sh_degree: kept, names, flat, full_colour, filter, label, confidence, state, notes })
     }
 
     /// Their names in the file, in the order of decoding.
@@ -135,18 +138,13 @@ impl Columns {
 
     /// Returns true if rows have labels.
     pub(super) fn have_labels(&self) -> bool {
-        self.labelled || self.edited
+        self.label.or(self.state).is_some()
     }
 
     /// Returns an empty list for the rows.
     pub(super) fn rows(&self) -> Rows {
-        Rows::new(self.sh_degree, self.have_labels(), self.confident)
+        Rows::new(self.sh_degree, self.have_labels(), self.confidence.is_some())
     }
-}
-
-/// Number of coefficients above degree 0.
-pub(super) fn coefficients(degree: u32) -> usize {
-    ((degree + 1) * (degree + 1) - 1) as usize
 }
 
 /// Returns the degree for the number of `f_rest_*` columns, and the one that is kept.

@@ -1,8 +1,8 @@
 //! Rows of a 3DGS PLY.
 
-use super::columns::{Columns, coefficients};
+use super::columns::Columns;
 use crate::rows::Row;
-use labelgs_scene::harmonics::sh0_of;
+use labelgs_scene::harmonics::{coefficients, sh0_of};
 use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use std::path::Path;
 
@@ -37,32 +37,21 @@ impl<'a> Decoder<'a> {
 
     /// Returns the row of the values with this number in the file; `None` if an editor has deleted it.
     pub(super) fn row(&mut self, index: u64, row: &[f64]) -> Result<Option<Row<'_>>> {
-        let Columns { flat, full_colour, filtered, labelled, confident, edited, .. } = *self.columns;
+        let Columns { flat, full_colour, filter, label, confidence, state, .. } = *self.columns;
         let rest = self.triples.len();
-        let (row, mut more) = row.split_at(HEAD + rest * 3);
-        let mut next = || {
-            let (first, others) = more.split_first().map_or((0.0, more), |(first, others)| (*first, others));
-            more = others;
-            first
-        };
         let value = |index: usize| row[index] as f32;
         for (k, triple) in self.triples.iter_mut().enumerate() {
             *triple = [0, 1, 2].map(|channel| value(HEAD + k + channel * rest));
         }
         let third = if flat { DISC.ln() } else { value(9) };
         let (mut opacity, mut scale) = (value(6), [value(7), value(8), third]);
-        if filtered {
-            (opacity, scale) = blurred(opacity, scale, next());
+        if let Some(at) = filter {
+            (opacity, scale) = blurred(opacity, scale, row[at]);
         }
-        let (mut label, mut confidence) = (None, None);
-        if labelled {
-            label = Some(self.label_of(index, next())?);
-        }
-        if confident {
-            confidence = Some(confidence_of(self.path, index, next())?);
-        }
-        if edited {
-            let state = next() as u8;
+        let mut label = label.map(|at| self.label_of(index, row[at])).transpose()?;
+        let confidence = confidence.map(|at| confidence_of(self.path, index, row[at])).transpose()?;
+        if let Some(at) = state {
+            let state = row[at] as u8;
             if state & DELETED != 0 {
                 self.deleted += 1;
                 return Ok(None);
@@ -84,7 +73,7 @@ impl<'a> Decoder<'a> {
     /// What the user should know, after the last row.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.columns.notes().collect();
-        if self.columns.edited {
+        if self.columns.state.is_some() {
             let note = "the selection in the column `state` became label 1";
             let deleted = self.deleted;
             let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were left out") } else { String::new() };

@@ -31,7 +31,7 @@ const ANTIALIASED_POSTSHOT: &str = "antialiased 1";
 
 /// The format that viewers of 3DGS read.
 pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: "PLY", endings: &[".ply"], read, write: Some(write::WRITER) };
+    ModelFormat { name: "PLY", endings: &[".ply"], contents: &["a PLY"], read, write: Some(write::WRITER) };
 
 /// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, with or
 /// without the prefixes of CloudCompare. The number of `f_rest_*` (0, 9, 24, 45 or 72, channel-major) gives the SH degree, of
@@ -42,25 +42,25 @@ pub(super) const FORMAT: ModelFormat =
 ///
 /// [`MODEL_LABEL_MAX`]: labelgs_scene::MODEL_LABEL_MAX
 fn read(path: &Path) -> Result<ReadModel> {
-    if let Some(read) = packed::read(path)? {
-        return Ok(read);
-    }
     let table = Table::open(path)?;
+    if packed::is_packed(&table) {
+        return packed::read(path, table);
+    }
     let columns = Columns::of(path, &table)?;
     let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
     let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, &columns));
-    let odd = table.for_each(&columns.names(), |index, values| {
+    let extra_bytes = table.for_each(&columns.names(), |index, values| {
         if let Some(row) = decoder.row(index, values)? {
             rows.push(&row);
         }
         Ok(())
     })?;
-    let activated = rows.look_activated();
+    let activated = rows.sieve.looks_activated();
     let mut read = rows.finish(path, origin)?;
     read.gaussians.antialiased = antialiased;
     read.dropped += decoder.deleted;
     read.notes.extend(decoder.notes());
-    add_notes(&mut read.notes, activated, odd.extra_bytes);
+    add_notes(&mut read.notes, activated, extra_bytes);
     Ok(read)
 }
 

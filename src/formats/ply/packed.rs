@@ -2,16 +2,16 @@
 //! only read: its readers refuse any further element, so labels have no place.
 
 use crate::format::ReadModel;
-use crate::ply_table::Elements;
+use crate::ply_table::Table;
 use crate::rows::{Row, Rows};
-use crate::values::logit_of_byte;
-use labelgs_scene::harmonics::sh0_of;
+use crate::values::{logit_of_byte, with_largest};
+use labelgs_scene::harmonics::{coefficients, sh0_of};
 use labelgs_scene::{Error, Result};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 
 /// Gaussians in a chunk.
-const CHUNK: usize = 256;
+const CHUNK: u64 = 256;
 /// Columns of a chunk that every file has: bounds of positions and of log-scales.
 const BOUNDS: [&str; 12] = [
     "min_x",
@@ -31,67 +31,84 @@ const BOUNDS: [&str; 12] = [
 const COLOURS: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
 const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
-/// Returns true for a file that is compressed.
-pub(super) fn is_packed(path: &Path) -> Result<bool> {
-    Ok(Elements::open(path, PACKED[0])?.is_some())
+/// Returns true for a table of a compressed file.
+pub(super) fn is_packed(vertex: &Table) -> bool {
+    vertex.has(PACKED[0])
 }
 
-/// Reads a file that is compressed; `None` for any other PLY.
-pub(super) fn read(path: &Path) -> Result<Option<ReadModel>> {
-    let Some(elements) = Elements::open(path, PACKED[0])? else { return Ok(None) };
-    let bounds = elements.columns("chunk", &BOUNDS)?;
-    let colours = if elements.has("chunk", COLOURS[0]) { Some(elements.columns("chunk", &COLOURS)?) } else { None };
-    let packed = elements.columns("vertex", &PACKED)?;
-    let (count, chunks) = (packed.rows(), bounds.rows());
+/// Reads a compressed file, whose element `vertex` is open.
+pub(super) fn read(path: &Path, vertex: Table) -> Result<ReadModel> {
+    let bounds = bounds(path)?;
+    let (count, chunks) = (vertex.count(), bounds.len() as u64);
     if chunks < count.div_ceil(CHUNK) {
         let problem =
             format!("has {chunks} chunks for {count} Gaussians; expected one for each {CHUNK}; export it again");
         return Err(Error::data(path, "header", problem));
     }
-    let degree = (1..=3).rev().find(|&degree| elements.has("sh", &format!("f_rest_{}", values(degree) - 1)));
-    let degree = degree.unwrap_or(0);
-    let names: Vec<String> = (0..values(degree)).map(|index| format!("f_rest_{index}")).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let harmonics = if degree > 0 { Some(elements.columns("sh", &names)?) } else { None };
-    if harmonics.as_ref().is_some_and(|columns| columns.rows() != count) {
-        return Err(Error::data(path, "header", "the elements `sh` and `vertex` differ in length; export it again"));
-    }
-    let mut rows = Rows::new(degree as u32, false, false);
-    let mut rest = vec![[0.0; 3]; values(degree) / 3];
-    for index in 0..count {
-        let chunk = index / CHUNK;
-        let [place, spin, size, colour] = packed.row::<4>(index).map(|value| value as u32);
-        let bound = bounds.row::<12>(chunk);
-        let shade = colours.as_ref().map_or([0.0, 0.0, 0.0, 1.0, 1.0, 1.0], |columns| columns.row::<6>(chunk));
+    let (degree, codes) = harmonics(path, count)?;
+    let mut rows = Rows::new(degree, false, false);
+    let mut rest = vec![[0.0; 3]; coefficients(degree)];
+    let antialiased = super::is_antialiased(vertex.comments());
+    vertex.for_each(&PACKED, |index, row| {
+        let [place, spin, size, colour] = [0, 1, 2, 3].map(|column| row[column] as u32);
+        let bound = &bounds[(index / CHUNK) as usize];
         let within = |share: [f64; 3], at: usize| {
             [0, 1, 2].map(|axis| bound[at + axis] + share[axis] * (bound[at + 3 + axis] - bound[at + axis]))
         };
         let [r, g, b, alpha] = colour.to_be_bytes();
-        let tint = [r, g, b].map(|byte| f64::from(byte) / 255.0);
-        if let Some(columns) = &harmonics {
-            let third = rest.len();
-            for (k, triple) in rest.iter_mut().enumerate() {
-                *triple = [0, 1, 2].map(|channel| harmonic(columns.value(index, channel * third + k) as u8));
-            }
+        let third = rest.len();
+        for (k, triple) in rest.iter_mut().enumerate() {
+            let first = 3 * third * index as usize + k;
+            *triple = [0, 1, 2].map(|channel| harmonic(codes[first + channel * third]));
         }
         rows.push(&Row {
             position: within(thirds(place), 0),
             scale: within(thirds(size), 6).map(|value| value as f32),
             quat: quat(spin),
             opacity: logit_of_byte(alpha),
-            sh0: [0, 1, 2].map(|c| sh0_of(shade[c] + tint[c] * (shade[3 + c] - shade[c]))),
+            sh0: within([r, g, b].map(|byte| f64::from(byte) / 255.0), 12).map(sh0_of),
             rest: &rest,
             ..Row::default()
         });
-    }
+        Ok(())
+    })?;
     let mut read = rows.finish(path, None)?;
-    read.gaussians.antialiased = super::is_antialiased(elements.comments());
-    Ok(Some(read))
+    read.gaussians.antialiased = antialiased;
+    Ok(read)
 }
 
-/// Number of values above degree 0.
-fn values(degree: usize) -> usize {
-    3 * ((degree + 1) * (degree + 1) - 1)
+/// Reads the bounds of each chunk; colours are from 0 to 1 without bounds of their own.
+fn bounds(path: &Path) -> Result<Vec<[f64; 18]>> {
+    let problem = "has no element `chunk`; a compressed PLY has `chunk` and `vertex`";
+    let chunk = Table::open_element(path, "chunk")?.ok_or_else(|| Error::data(path, "header", problem))?;
+    let names = if chunk.has(COLOURS[0]) { [&BOUNDS[..], &COLOURS].concat() } else { BOUNDS.to_vec() };
+    let mut all = Vec::new();
+    chunk.for_each(&names, |_, row| {
+        let mut bounds = [0.0; 18];
+        bounds[15..].fill(1.0);
+        bounds[..row.len()].copy_from_slice(row);
+        all.push(bounds);
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+/// Reads the degree of the harmonics, and their bytes, channel by channel for each of `count` Gaussians.
+fn harmonics(path: &Path, count: u64) -> Result<(u32, Vec<u8>)> {
+    let mut codes = Vec::new();
+    let Some(table) = Table::open_element(path, "sh")? else { return Ok((0, codes)) };
+    let has = |degree: &u32| table.has(&format!("f_rest_{}", 3 * coefficients(*degree) - 1));
+    let Some(degree) = (1..=3).rev().find(has) else { return Ok((0, codes)) };
+    if table.count() != count {
+        return Err(Error::data(path, "header", "the elements `sh` and `vertex` differ in length; export it again"));
+    }
+    let names: Vec<String> = (0..3 * coefficients(degree)).map(|index| format!("f_rest_{index}")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    table.for_each(&names, |_, row| {
+        codes.extend(row.iter().map(|&value| value as u8));
+        Ok(())
+    })?;
+    Ok((degree, codes))
 }
 
 /// Three shares in 11, 10 and 11 bits.
@@ -103,13 +120,7 @@ fn thirds(packed: u32) -> [f64; 3] {
 fn quat(packed: u32) -> [f64; 4] {
     let small = [20, 10, 0].map(|shift| (f64::from(packed >> shift & 1023) / 1023.0 - 0.5) * SQRT_2);
     let largest = (1.0 - small.iter().map(|v| v * v).sum::<f64>()).max(0.0).sqrt();
-    let [a, b, c] = small;
-    match packed >> 30 {
-        0 => [largest, a, b, c],
-        1 => [a, largest, b, c],
-        2 => [a, b, largest, c],
-        _ => [a, b, c, largest],
-    }
+    with_largest(largest, packed >> 30, small)
 }
 
 /// A coefficient from -4 to 4.

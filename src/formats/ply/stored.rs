@@ -12,11 +12,14 @@ use std::path::{Path, PathBuf};
 /// A 3DGS PLY whose rows have fixed places.
 #[derive(Clone, Debug)]
 pub struct StoredModel {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     columns: Columns,
-    count: u64,
+    /// Number of rows, those included that cannot be rendered.
+    pub(crate) count: u64,
+    pub(crate) sh_degree: u32,
+    pub(crate) has_labels: bool,
     /// World position of the file's (0, 0, 0).
-    origin: DVec3,
+    pub(crate) origin: DVec3,
     notes: Vec<String>,
     antialiased: bool,
 }
@@ -26,12 +29,15 @@ impl StoredModel {
     /// another type.
     pub fn open(path: &Path) -> Result<Option<Self>> {
         // A pipe is read once.
-        if !path.is_file() || packed::is_packed(path)? {
+        if !path.is_file() {
             return Ok(None);
         }
         let table = Table::open(path)?;
+        if packed::is_packed(&table) {
+            return Ok(None);
+        }
         let columns = Columns::of(path, &table)?;
-        if columns.edited || !["x", "y", "z"].iter().all(|name| table.is_single(name)) {
+        if columns.state.is_some() || !["x", "y", "z"].iter().all(|name| table.is_single(name)) {
             return Ok(None);
         }
         let (count, antialiased, mut notes) = (table.count(), is_antialiased(table.comments()), Vec::new());
@@ -39,48 +45,27 @@ impl StoredModel {
             Some(origin) => origin,
             None => crate::origin::read(path, count, &mut notes)?,
         };
-        let has_places = table.places_of_rows(&columns.names())?.is_some();
-        Ok(has_places.then(|| Self { path: path.to_owned(), columns, count, origin, notes, antialiased }))
-    }
-
-    /// The file.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Number of rows, those included that cannot be rendered.
-    pub fn count(&self) -> u64 {
-        self.count
-    }
-
-    /// Degree of the spherical harmonics.
-    pub fn sh_degree(&self) -> u32 {
-        self.columns.sh_degree
-    }
-
-    /// Returns true if rows have labels.
-    pub fn has_labels(&self) -> bool {
-        self.columns.have_labels()
-    }
-
-    /// World position of the file's (0, 0, 0).
-    pub fn origin(&self) -> DVec3 {
-        self.origin
+        let has_places = table.stored_rows(&columns.names())?.is_some();
+        let (path, sh_degree, has_labels) = (path.to_owned(), columns.sh_degree, columns.have_labels());
+        Ok(has_places.then(|| Self { path, columns, count, sh_degree, has_labels, origin, notes, antialiased }))
     }
 
     /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.
-    pub fn scan(&self, mut see: impl FnMut(u64, &Row) -> Result<()>) -> Result<Vec<String>> {
+    pub fn scan(&self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
         let (path, columns) = (&self.path, &self.columns);
         let (mut decoder, mut sieve) = (Decoder::new(path, columns), Sieve::default());
-        let odd =
-            Table::open(path)?.for_each(&columns.names(), |index, values| match decoder.row(index, values)? {
-                Some(row) if sieve.rotation_of(&row).is_some() => see(index, &row),
-                _ => Ok(()),
-            })?;
+        let each = |index: u64, values: &[f64]| {
+            let row = decoder.row(index, values)?;
+            if let Some(row) = row.filter(|row| sieve.rotation_of(row).is_some()) {
+                see(index, &row);
+            }
+            Ok(())
+        };
+        let extra_bytes = Table::open(path)?.for_each(&columns.names(), each)?;
         let mut notes = self.notes.clone();
         notes.extend(sieve.note());
         notes.extend(decoder.notes());
-        add_notes(&mut notes, sieve.looks_activated(), odd.extra_bytes);
+        add_notes(&mut notes, sieve.looks_activated(), extra_bytes);
         Ok(notes)
     }
 
@@ -88,10 +73,10 @@ impl StoredModel {
     pub fn rows(&self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         let (path, columns) = (&self.path, &self.columns);
         let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, columns));
-        let Some(mut places) = Table::open(path)?.places_of_rows(&columns.names())? else {
+        let Some(stored) = Table::open(path)?.stored_rows(&columns.names())? else {
             return Err(Error::data(path, "header", "another file took the place of the model; start again"));
         };
-        places.for_some(numbers, |index, values| {
+        stored.for_some(numbers, |index, values| {
             if let Some(row) = decoder.row(index, values)? {
                 rows.push(&row);
             }

@@ -78,7 +78,7 @@ fn header(export: &Export, count: usize) -> Header {
 fn write_row(export: &Export, row: usize, bytes: &mut Vec<u8>, out: &mut dyn Write) -> io::Result<()> {
     bytes.clear();
     let g = export.model;
-    let triples = export.rest(row);
+    let triples = export.model.rest(row);
     let head = export.position(row).into_iter().chain([0.0; 3]).chain(g.sh0[row]);
     let channels = (0..3).flat_map(|channel| triples.iter().map(move |triple| triple[channel]));
     let tail = [g.opacities[row]].into_iter().chain(g.scales[row]).chain(g.quats[row]);

@@ -1,118 +1,68 @@
-//! The `vertex` element of a PLY file as rows of selected columns.
+//! An element of a PLY file as rows of selected columns.
 
+use super::header::{layout_of, read_header};
 use super::stored::StoredRows;
-use labelgs_files::kind::name_of_content;
 use labelgs_files::read::{self, Source};
 use labelgs_scene::{Error, Result};
-use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
+use ply_rs_bw::ply::{ElementDef, Encoding, PropertyType, ScalarType};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Most bytes of a header; that of a 3DGS file has about 1.5 KiB.
-const HEADER_MAX: u64 = 64 * 1024;
-/// The byte order mark that some editors of text write first.
-const BOM: &[u8] = b"\xEF\xBB\xBF";
 /// Most bytes in a line of an ascii row.
 const LINE_MAX: u64 = 64 * 1024;
 
-/// An open PLY file after its header, before its `vertex` rows.
+/// An open PLY file after its header, before the rows of an element.
 pub struct Table {
     path: PathBuf,
     file: BufReader<Source>,
     encoding: Encoding,
     comments: Vec<String>,
-    vertex: ElementDef,
-    /// Elements before `vertex`; their rows are skipped.
+    element: ElementDef,
+    /// Elements before it; their rows are skipped.
     before: Vec<ElementDef>,
+    /// True if another element follows.
     after: bool,
     header_bytes: u64,
     file_bytes: u64,
 }
 
-/// A column: its offset in a row and its type.
+/// A column: its place among the properties, its offset in a binary row, and its type.
 pub(super) struct Column {
     index: usize,
-    offset: usize,
-    scalar: ScalarType,
-}
-
-impl Column {
-    /// Returns the value in a row.
-    pub(super) fn value(&self, row: &[u8], big_endian: bool) -> f64 {
-        decode(&self.scalar, &row[self.offset..], big_endian)
-    }
-}
-
-fn size_of(scalar: &ScalarType) -> usize {
-    match scalar {
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    }
-}
-
-/// Decodes the scalar at the start of `bytes`; f64 holds every PLY scalar exactly.
-pub(super) fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
-    macro_rules! number {
-        ($type:ty, $bytes:expr) => {{
-            let mut raw = [0u8; size_of::<$type>()];
-            raw.copy_from_slice(&$bytes[..size_of::<$type>()]);
-            if big_endian { <$type>::from_be_bytes(raw) as f64 } else { <$type>::from_le_bytes(raw) as f64 }
-        }};
-    }
-    use std::mem::size_of;
-    match scalar {
-        ScalarType::Char => number!(i8, bytes),
-        ScalarType::UChar => number!(u8, bytes),
-        ScalarType::Short => number!(i16, bytes),
-        ScalarType::UShort => number!(u16, bytes),
-        ScalarType::Int => number!(i32, bytes),
-        ScalarType::UInt => number!(u32, bytes),
-        ScalarType::Float => number!(f32, bytes),
-        ScalarType::Double => number!(f64, bytes),
-    }
+    pub(super) offset: usize,
+    pub(super) scalar: ScalarType,
 }
 
 impl Table {
-    /// Opens `path` and reads its header.
+    /// Opens the element `vertex` of a file.
     pub fn open(path: &Path) -> Result<Self> {
+        let problem = "has no element `vertex`; this is not a file of Gaussians or points";
+        Self::open_element(path, "vertex")?.ok_or_else(|| Error::data(path, "header", problem))
+    }
+
+    /// Opens an element of a file, if it has it.
+    pub fn open_element(path: &Path, name: &str) -> Result<Option<Self>> {
         let mut file = read::open(path)?;
         let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
         let (header, header_bytes) = read_header(path, &mut file)?;
-        let mut elements: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();
-        if elements.iter().any(|element| element.properties.contains_key("packed_position")) {
-            let cure = "a compressed PLY, which is read as a model only; convert it to a plain PLY first";
-            return Err(Error::data(path, "header", cure));
-        }
-        let Some(at) = elements.iter().position(|element| element.name == "vertex") else {
-            return Err(Error::data(
-                path,
-                "header",
-                "has no element `vertex`; this is not a file of Gaussians or points",
-            ));
-        };
-        let after = elements.len() > at + 1;
-        let vertex = elements.swap_remove(at);
-        elements.truncate(at);
-        let header_bytes = header_bytes as u64;
-        Ok(Self {
-            path: path.to_owned(),
-            file,
-            encoding: header.encoding,
-            comments: header.comments,
-            vertex,
-            before: elements,
-            after,
-            header_bytes,
-            file_bytes,
-        })
+        let mut before: Vec<ElementDef> = header.elements.into_iter().map(|(_, element)| element).collect();
+        let Some(at) = before.iter().position(|element| element.name == name) else { return Ok(None) };
+        let after = before.len() > at + 1;
+        let element = before.swap_remove(at);
+        before.truncate(at);
+        let (path, header_bytes) = (path.to_owned(), header_bytes as u64);
+        let (encoding, comments) = (header.encoding, header.comments);
+        Ok(Some(Self { path, file, encoding, comments, element, before, after, header_bytes, file_bytes }))
     }
 
-    /// Returns the names of the vertex properties in file order.
+    /// Returns the names of the properties in file order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.vertex.properties.iter().map(|(_, property)| property.name.as_str())
+        self.element.properties.values().map(|property| property.name.as_str())
+    }
+
+    /// Returns true if the element has a property.
+    pub fn has(&self, name: &str) -> bool {
+        self.element.properties.contains_key(name)
     }
 
     /// Returns the comments of the header.
@@ -122,7 +72,7 @@ impl Table {
 
     /// Returns the largest value of a property of integers, and `None` for one of floats or lists.
     pub fn integer_max(&self, name: &str) -> Option<f64> {
-        match self.vertex.properties.get(name)?.data_type {
+        match self.element.properties.get(name)?.data_type {
             PropertyType::Scalar(ScalarType::UShort) => Some(f64::from(u16::MAX)),
             PropertyType::Scalar(ScalarType::Float | ScalarType::Double) | PropertyType::List(..) => None,
             // Wider integers hold bytes too.
@@ -130,107 +80,86 @@ impl Table {
         }
     }
 
-    /// Calls `row` with the values of `columns` for each vertex, as f64, in order.
-    pub fn for_each(mut self, columns: &[&str], mut row: impl FnMut(u64, &[f64]) -> Result<()>) -> Result<Notes> {
-        let located = self.locate(columns)?;
-        match self.encoding {
-            Encoding::Ascii => self.ascii_rows(&located, &mut row),
-            Encoding::BinaryBigEndian => self.binary_rows(&located, true, &mut row),
-            Encoding::BinaryLittleEndian => self.binary_rows(&located, false, &mut row),
+    /// Returns the number of rows that the header promises.
+    pub fn count(&self) -> u64 {
+        self.element.count as u64
+    }
+
+    /// Returns true if the property exists and is `float`.
+    pub fn is_single(&self, name: &str) -> bool {
+        let property = self.element.properties.get(name);
+        property.is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(ScalarType::Float)))
+    }
+
+    /// Calls `see` with number and values of `columns` of each row, as f64, in order. Returns the number of bytes after the
+    /// last declared element.
+    pub fn for_each(mut self, columns: &[&str], mut see: impl FnMut(u64, &[f64]) -> Result<()>) -> Result<u64> {
+        let (columns, count) = (self.locate(columns)?, self.count());
+        if self.encoding == Encoding::Ascii {
+            return self.ascii_rows(&columns, &mut see).map(|()| 0);
         }
+        let (rows, extra_bytes) = self.binary_rows(columns)?;
+        rows.for_some(0..count, see)?;
+        Ok(extra_bytes)
+    }
+
+    /// Returns access to the rows in any order, with the values of `columns`; `None` for text, whose rows have no fixed
+    /// places.
+    pub fn stored_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
+        if self.encoding == Encoding::Ascii {
+            return Ok(None);
+        }
+        let columns = self.locate(columns)?;
+        self.binary_rows(columns).map(|(rows, _)| Some(rows))
     }
 
     fn locate(&self, columns: &[&str]) -> Result<Vec<Column>> {
-        let missing: Vec<&str> = columns.iter().copied().filter(|&c| !self.vertex.properties.contains_key(c)).collect();
+        let missing: Vec<&str> = columns.iter().copied().filter(|&column| !self.has(column)).collect();
         if !missing.is_empty() {
-            let problem = format!("`vertex` lacks the properties {}", missing.join(" "));
+            let problem = format!("`{}` lacks the properties {}", self.element.name, missing.join(" "));
             return Err(Error::data(&self.path, "header", problem));
         }
-        let layout = layout_of(&self.path, &self.vertex)?;
+        let (layout, _) = layout_of(&self.path, &self.element)?;
         let column = |name: &&str| {
-            let index = self.vertex.properties.keys().position(|key| key == name).unwrap_or_default();
+            let index = self.element.properties.keys().position(|key| key == name).unwrap_or_default();
             Column { index, offset: layout[index].0, scalar: layout[index].1.clone() }
         };
         Ok(columns.iter().map(column).collect())
     }
 
-    fn binary_rows(
-        &mut self,
-        columns: &[Column],
-        big_endian: bool,
-        row: &mut impl FnMut(u64, &[f64]) -> Result<()>,
-    ) -> Result<Notes> {
-        let (skip, stride) = self.places()?;
-        self.file.seek_relative(skip as i64).map_err(Error::read(&self.path))?;
-        let mut bytes = vec![0u8; stride];
-        let mut values = vec![0.0; columns.len()];
-        for index in 0..self.vertex.count as u64 {
-            self.file.read_exact(&mut bytes).map_err(Error::read(&self.path))?;
-            for (value, column) in values.iter_mut().zip(columns) {
-                *value = column.value(&bytes, big_endian);
-            }
-            row(index, &values)?;
-        }
-        let needed = self.header_bytes + skip + stride as u64 * self.vertex.count as u64;
-        Ok(Notes { extra_bytes: if self.after { 0 } else { self.file_bytes - needed } })
-    }
-
-    /// Returns the bytes between the header and the first row of a binary file, and the bytes of a row. Fails if the file is
-    /// too short for its rows.
-    fn places(&self) -> Result<(u64, usize)> {
-        let mut skip = 0u128;
+    /// Returns the rows of a binary file, and the number of bytes after the last declared element. Fails if the file is too
+    /// short.
+    fn binary_rows(mut self, columns: Vec<Column>) -> Result<(StoredRows, u64)> {
+        let (mut skip, count, (_, stride)) = (0, self.count(), layout_of(&self.path, &self.element)?);
         for element in &self.before {
-            skip += stride_of(&layout_of(&self.path, element)?) as u128 * element.count as u128;
+            skip += layout_of(&self.path, element)?.1 as u128 * element.count as u128;
         }
-        let stride = stride_of(&layout_of(&self.path, &self.vertex)?);
-        let needed = u128::from(self.header_bytes) + skip + stride as u128 * self.vertex.count as u128;
+        let needed = u128::from(self.header_bytes) + skip + stride as u128 * u128::from(count);
         if needed > u128::from(self.file_bytes) {
             let problem = format!(
-                "the header promises {} vertices of {stride} bytes, which takes {needed} bytes; the file has {}; \
+                "the header promises {count} rows of {stride} bytes of `{}`, which ends at byte {needed}; the file has {}; \
                  it was cut short or its header is wrong",
-                self.vertex.count, self.file_bytes
+                self.element.name, self.file_bytes
             );
             return Err(Error::data(&self.path, "header", problem));
         }
-        Ok((skip as u64, stride))
+        self.file.seek_relative(skip as i64).map_err(Error::read(&self.path))?;
+        let extra_bytes = if self.after { 0 } else { self.file_bytes - needed as u64 };
+        let big_endian = self.encoding == Encoding::BinaryBigEndian;
+        Ok((StoredRows { path: self.path, file: self.file, stride, columns, big_endian }, extra_bytes))
     }
 
-    /// Returns access to the rows in any order, with the values of `columns`; `None` for text, whose rows have no fixed
-    /// places.
-    pub fn places_of_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
-        let big_endian = match self.encoding {
-            Encoding::Ascii => return Ok(None),
-            Encoding::BinaryBigEndian => true,
-            Encoding::BinaryLittleEndian => false,
-        };
-        let (columns, (skip, stride)) = (self.locate(columns)?, self.places()?);
-        let first = self.header_bytes + skip;
-        Ok(Some(StoredRows { path: self.path, file: self.file, first, stride, columns, big_endian }))
-    }
-
-    /// Returns the number of rows that the header promises.
-    pub fn count(&self) -> u64 {
-        self.vertex.count as u64
-    }
-
-    /// Returns true if the property exists and is `float`.
-    pub fn is_single(&self, name: &str) -> bool {
-        self.vertex
-            .properties
-            .get(name)
-            .is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(ScalarType::Float)))
-    }
-
-    fn ascii_rows(&mut self, columns: &[Column], row: &mut impl FnMut(u64, &[f64]) -> Result<()>) -> Result<Notes> {
+    fn ascii_rows(&mut self, columns: &[Column], see: &mut impl FnMut(u64, &[f64]) -> Result<()>) -> Result<()> {
         let skip: u128 = self.before.iter().map(|element| element.count as u128).sum();
         let mut line = Vec::new();
         for _ in 0..skip {
-            self.line(&mut line, "an element before `vertex`")?;
+            self.line(&mut line, &format!("an element before `{}`", self.element.name))?;
         }
-        let (width, mut values) = (self.vertex.properties.len(), vec![0.0; columns.len()]);
-        for index in 0..self.vertex.count as u64 {
-            self.line(&mut line, &format!("vertex {index}"))?;
-            let problem = |problem: String| Error::data(&self.path, format!("vertex {index}"), problem);
+        let (width, mut values) = (self.element.properties.len(), vec![0.0; columns.len()]);
+        for index in 0..self.count() {
+            let place = format!("{} {index}", self.element.name);
+            self.line(&mut line, &place)?;
+            let problem = |problem: String| Error::data(&self.path, place.as_str(), problem);
             let text = str::from_utf8(&line).map_err(|_| problem("is not text".into()))?;
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
             if words.len() != width {
@@ -240,9 +169,9 @@ impl Table {
                 let word = words[column.index];
                 *value = word.parse().map_err(|_| problem(format!("`{word}` is not a number")))?;
             }
-            row(index, &values)?;
+            see(index, &values)?;
         }
-        Ok(Notes { extra_bytes: 0 })
+        Ok(())
     }
 
     /// Reads the next line that is not empty.
@@ -262,95 +191,4 @@ impl Table {
             }
         }
     }
-}
-
-pub struct Notes {
-    /// Number of bytes after the last declared element.
-    pub extra_bytes: u64,
-}
-
-/// Reads and parses the header; returns its length too.
-pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<(Header, usize)> {
-    let text = header_bytes(path, file)?;
-    Ok((parse_header(path, &text)?, text.len()))
-}
-
-/// Reads the header including the `end_header` line, at most [`HEADER_MAX`] bytes.
-fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
-    let content = name_of_content(file.fill_buf().map_err(Error::read(path))?);
-    let mut text = Vec::new();
-    let mut limited = file.take(HEADER_MAX);
-    loop {
-        let start = text.len();
-        let read = limited.read_until(b'\n', &mut text).map_err(Error::read(path))?;
-        let line = text[start..].trim_ascii_end();
-        if start == 0 && line.strip_prefix(BOM).unwrap_or(line) != b"ply" {
-            if line.starts_with(b"ply\r") {
-                let problem = "its lines end with CR alone, as on old Macs; export it again with LF";
-                return Err(Error::data(path, "header", problem));
-            }
-            let unknown = || "does not start with `ply`; this is not a PLY file".to_owned();
-            return Err(Error::data(path, "byte 0", content.map_or_else(unknown, |content| content.told("a PLY"))));
-        }
-        if line == b"end_header" && text.ends_with(b"\n") {
-            return Ok(text);
-        }
-        if read == 0 {
-            let problem = format!("no `end_header` line within the first {} bytes", text.len());
-            return Err(Error::data(path, "header", problem));
-        }
-    }
-}
-
-/// Returns the header with one space between words and without the byte order mark. Comments are free: bytes that are no
-/// UTF-8, as in names of users and folders, are replaced.
-fn plain(text: &[u8]) -> Option<String> {
-    let mut to = String::with_capacity(text.len());
-    for line in text.strip_prefix(BOM).unwrap_or(text).split(|&byte| byte == b'\n') {
-        let line = line.trim_ascii();
-        if line.starts_with(b"comment") || line.starts_with(b"obj_info") {
-            to += &String::from_utf8_lossy(line).replace(['\0', '\r'], " ");
-        } else {
-            let line = str::from_utf8(line).ok().filter(|line| !line.contains('\0'))?;
-            to += &line.split_ascii_whitespace().collect::<Vec<_>>().join(" ");
-        }
-        if !to.ends_with('\n') {
-            to.push('\n');
-        }
-    }
-    Some(to)
-}
-
-fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
-    let problem = |problem: String| Error::data(path, "header", problem);
-    let text = plain(text).ok_or_else(|| problem("a name of an element or a property is not text".into()))?;
-    let header = Parser::<DefaultElement>::new()
-        .read_header(&mut Reader::new(text.as_bytes()))
-        .map_err(|error| problem(error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
-    // The crate keeps the last of two properties with the same name, which would move the later columns.
-    let lines = |word: &str| text.lines().filter(|line| line.split(' ').next() == Some(word)).count();
-    let kept: usize = header.elements.values().map(|element| element.properties.len()).sum();
-    if lines("property") != kept || lines("element") != header.elements.len() {
-        return Err(problem("declares an element or a property twice".into()));
-    }
-    Ok(header)
-}
-
-/// Returns the offset and scalar type of each property of a binary row. Refuses lists.
-pub(super) fn layout_of(path: &Path, element: &ElementDef) -> Result<Vec<(usize, ScalarType)>> {
-    let mut offset = 0;
-    let mut layout = Vec::with_capacity(element.properties.len());
-    for property in element.properties.values() {
-        let PropertyType::Scalar(scalar) = &property.data_type else {
-            let problem = format!("list property `{}` in element `{}` is not supported", property.name, element.name);
-            return Err(Error::data(path, "header", problem));
-        };
-        layout.push((offset, scalar.clone()));
-        offset += size_of(scalar);
-    }
-    Ok(layout)
-}
-
-pub(super) fn stride_of(layout: &[(usize, ScalarType)]) -> usize {
-    layout.last().map_or(0, |(offset, scalar)| offset + size_of(scalar))
 }

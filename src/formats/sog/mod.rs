@@ -10,8 +10,13 @@ mod write;
 use super::format::ModelFormat;
 
 /// The format by its ending.
-pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: "SOG", endings: &[".sog"], read: read::read, write: Some(write::WRITER) };
+pub(super) const FORMAT: ModelFormat = ModelFormat {
+    name: "SOG",
+    endings: &[".sog"],
+    contents: &["a zip archive"],
+    read: read::read,
+    write: Some(write::WRITER),
+};
 
 /// Values in a codebook.
 const CODEBOOK: usize = 256;
@@ -21,8 +26,3 @@ const PALETTE_ROW: usize = 64;
 const ROTATION: u8 = 252;
 /// Picture with labels: red and green are the id, blue is the confidence.
 const LABELS: &str = "labels.webp";
-
-/// Coefficients above degree 0.
-fn coefficients(bands: u32) -> usize {
-    ((bands + 1) * (bands + 1) - 1) as usize
-}

@@ -2,11 +2,12 @@
 
 use super::archive::{Archive, Picture};
 use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
-use super::{CODEBOOK, PALETTE_ROW, ROTATION, coefficients};
+use super::{CODEBOOK, PALETTE_ROW, ROTATION};
 use crate::format::ReadModel;
 use crate::rows::{Row, Rows};
-use crate::values::logit_of_byte;
+use crate::values::{logit_of_byte, with_largest};
 use labelgs_files::read as file;
+use labelgs_scene::harmonics::coefficients;
 use labelgs_scene::{Error, Result};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
@@ -126,10 +127,5 @@ fn quat([a, b, c, which]: [u8; 4]) -> [f64; 4] {
     }
     let [a, b, c] = [a, b, c].map(|value| (f64::from(value) / 255.0 * 2.0 - 1.0) / SQRT_2);
     let largest = (1.0 - a * a - b * b - c * c).max(0.0).sqrt();
-    match which - ROTATION {
-        0 => [largest, a, b, c],
-        1 => [a, largest, b, c],
-        2 => [a, b, largest, c],
-        _ => [a, b, c, largest],
-    }
+    with_largest(largest, u32::from(which - ROTATION), [a, b, c])
 }

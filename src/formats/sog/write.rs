@@ -3,9 +3,10 @@
 use super::meta::{
     ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION,
 };
-use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, archive, cluster, coefficients};
+use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, archive, cluster};
 use crate::format::{Export, ModelWriter};
-use crate::values::{byte, opacity_byte};
+use crate::values::{byte, opacity_byte, place_of_largest, unit};
+use labelgs_scene::harmonics::coefficients;
 use labelgs_scene::{Error, Result};
 use std::f32::consts::SQRT_2;
 use std::io::{self, Write};
@@ -119,9 +120,8 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
 
 /// A rotation: the three smaller components, and which one is the largest.
 fn rotation(quat: [f32; 4]) -> [u8; 4] {
-    let length = quat.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
-    let unit = quat.map(|value| (f64::from(value) / length) as f32);
-    let largest = (0..4).fold(0, |best, at| if unit[at].abs() > unit[best].abs() { at } else { best });
+    let unit = unit(quat);
+    let largest = place_of_largest(unit);
     let sign = if unit[largest] < 0.0 { -SQRT_2 } else { SQRT_2 };
     let mut texel = [0, 0, 0, ROTATION + largest as u8];
     let others = (0..4).filter(|&at| at != largest);
@@ -152,7 +152,7 @@ fn extras(
 /// The palette of harmonics.
 fn palette(export: &Export, rows: &[usize], (width, height): (usize, usize), add: &mut Add) -> io::Result<Palette> {
     let bands = export.model.sh_degree;
-    let values: Vec<f32> = rows.iter().flat_map(|&row| export.rest(row).as_flattened()).copied().collect();
+    let values: Vec<f32> = rows.iter().flat_map(|&row| export.model.rest(row).as_flattened()).copied().collect();
     // As other writers choose it: 64 Ki entries at most, fewer than Gaussians.
     let size = ((rows.len() as f64 / 1024.0).log2().floor().exp2().min(64.0) * 1024.0) as usize;
     let (centres, of) = cluster::vectors(&values, 3 * coefficients(bands), size.max(1));

@@ -12,12 +12,18 @@ mod write;
 
 use super::format::ModelFormat;
 use super::turn::Signs;
+use labelgs_scene::harmonics::coefficients;
 pub(super) use read::read_bytes;
 pub(super) use write::{losses, write_v3};
 
 /// The format by its ending.
-pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: "SPZ", endings: &[".spz"], read: read::read, write: Some(write::WRITER) };
+pub(super) const FORMAT: ModelFormat = ModelFormat {
+    name: "SPZ",
+    endings: &[".spz"],
+    contents: &["an SPZ", "a file packed by gzip"],
+    read: read::read,
+    write: Some(write::WRITER),
+};
 
 /// First bytes of a header: `NGSP`.
 const MAGIC: u32 = 0x5053_474E;
@@ -32,7 +38,6 @@ const BITS_MAX: u32 = 23;
 
 /// Bytes of each plane per Gaussian: positions, alphas, colours, scales, rotations, harmonics.
 fn planes(version: u32, sh_degree: u32) -> [usize; 6] {
-    let rest = ((sh_degree + 1) * (sh_degree + 1) - 1) as usize;
     let positions = if version == 1 { 6 } else { 9 };
-    [positions, 1, 3, 3, if version < 3 { 3 } else { 4 }, rest * 3]
+    [positions, 1, 3, 3, if version < 3 { 3 } else { 4 }, 3 * coefficients(sh_degree)]
 }

@@ -1,6 +1,6 @@
 //! The values of SPZ as bytes, and back.
 
-use crate::values::byte;
+use crate::values::{byte, place_of_largest, unit};
 
 /// Coefficients 1 to 3 keep 5 bits, higher ones 4, as other writers do: the rest compresses away.
 const SH_STEPS: [i32; 2] = [8, 16];
@@ -51,10 +51,9 @@ pub(super) fn place(bytes: &[u8], bits: u32) -> f64 {
 
 /// The rotation (w, x, y, z) in four bytes: which component is the largest, and the three others in 10 bits each.
 pub(super) fn rotation(quat: [f32; 4]) -> [u8; 4] {
-    let [w, x, y, z] = quat.map(f64::from);
-    let length = (w * w + x * x + y * y + z * z).sqrt();
-    let unit = [x, y, z, w].map(|value| (value / length) as f32);
-    let largest = (0..4).fold(0, |best, at| if unit[at].abs() > unit[best].abs() { at } else { best });
+    let [w, x, y, z] = unit(quat);
+    let unit = [x, y, z, w];
+    let largest = place_of_largest(unit);
     let mut packed = largest as u32;
     for at in (0..4).filter(|&at| at != largest) {
         let is_negative = (unit[at] < 0.0) != (unit[largest] < 0.0);

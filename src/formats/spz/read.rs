@@ -9,6 +9,7 @@ use crate::values::logit_of_byte;
 use flate2::read::GzDecoder;
 use half::f16;
 use labelgs_files::read as file;
+use labelgs_scene::harmonics::coefficients;
 use labelgs_scene::{Error, Result};
 use std::io::Read;
 use std::path::Path;
@@ -70,10 +71,9 @@ pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
 fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -> Result<ReadModel> {
     let widths = super::planes(header.version, header.sh_degree);
     let degree = header.sh_degree.min(3);
-    let kept = ((degree + 1) * (degree + 1) - 1) as usize;
     let axes = records.axes.signs;
     let mut rows = Rows::new(degree, records.labels.is_some(), records.confidence.is_some());
-    let mut rest = vec![[0.0; 3]; kept];
+    let mut rest = vec![[0.0; 3]; coefficients(degree)];
     for index in 0..header.count {
         let at = |plane: usize| &planes[plane][index * widths[plane]..][..widths[plane]];
         let (place, spin, harmonics) = (at(0), at(4), at(5));

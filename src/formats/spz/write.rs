@@ -55,7 +55,7 @@ pub fn losses(export: &Export) -> Result<Vec<String>> {
     let cut = [
         (count(&|row| outside(&g.scales[row], -10.03, 5.97)), "sizes beyond e^-10 to e^5.94"),
         (count(&|row| outside(&g.sh0[row], -3.34, 3.34)), "colours beyond -0.44 to 1.44"),
-        (count(&|row| outside(export.rest(row).as_flattened(), -1.07, 1.06)), "harmonics beyond -1 to 1"),
+        (count(&|row| outside(export.model.rest(row).as_flattened(), -1.07, 1.06)), "harmonics beyond -1 to 1"),
     ];
     for (count, what) in cut.into_iter().filter(|cut| cut.0 > 0) {
         losses.push(format!("{count} of {} Gaussians have {what}, which are cut off", export.rows.len()));
@@ -87,7 +87,7 @@ fn encode(export: &Export) -> [Vec<u8>; 6] {
         to[3].extend(g.scales[row].map(pack::scale_byte));
         to[4].extend(pack::rotation(AXES.quat(g.quats[row])));
         rest.clear();
-        rest.extend_from_slice(export.rest(row));
+        rest.extend_from_slice(export.model.rest(row));
         AXES.rest(&mut rest);
         to[5].extend(rest.iter().enumerate().flat_map(|(k, triple)| triple.map(|value| pack::harmonic(k, value))));
     }

@@ -15,6 +15,9 @@
 //! Every system may cause `SHORT` and `INTERRUPTED` at any time: it transfers only a part or nothing, and the call must
 //! be repeated. They must not change any result.
 
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::{Error, StrDeserializer};
 use std::io;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -22,7 +25,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// Effect of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum Kind {
     /// The device is lost.
     DeviceLost,
@@ -109,19 +113,8 @@ fn parse(text: &str) -> Option<Fault> {
     let mut parts = text.split(':');
     let (site, first, kind) = (parts.next()?, parts.next()?.parse::<u64>().ok()?, parts.next()?);
     let count = parts.next().map_or(Some(1), |count| count.parse().ok())?;
-    let kind = match kind {
-        "DEVICE_LOST" => Kind::DeviceLost,
-        "HOST_MEMORY" => Kind::HostMemory,
-        "DEVICE_MEMORY" => Kind::DeviceMemory,
-        "INITIALIZATION" => Kind::Initialization,
-        "NO_SPACE" => Kind::NoSpace,
-        "IO" => Kind::Io,
-        "SHORT" => Kind::Short,
-        "INTERRUPTED" => Kind::Interrupted,
-        "NUMBER" => Kind::Number,
-        "SLOW" => Kind::Slow,
-        _ => return None,
-    };
+    let kind: StrDeserializer<Error> = kind.into_deserializer();
+    let kind = Kind::deserialize(kind).ok()?;
     let events = first..first.saturating_add(count);
     Some(Fault { site: site.to_owned(), events, seen: AtomicU64::new(0), kind })
 }

@@ -1,5 +1,7 @@
 //! Parsers for the values of flags.
 
+use std::str::FromStr;
+
 /// Colours by name, as on web pages.
 const COLOURS: [(&str, u32); 18] = [
     ("black", 0x000000),
@@ -34,9 +36,13 @@ pub fn colour(text: &str) -> Result<[f32; 3], String> {
             "`{text}` is not a colour; expected a name such as red, #ff0000, or R,G,B from 0 to 1 each, such as 1,0,0"
         )
     };
-    let parts = text.split(',').map(|part| part.trim().parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value)));
-    let parts: Vec<f32> = parts.collect::<Option<_>>().ok_or_else(wrong)?;
-    parts.try_into().map_err(|_| wrong())
+    numbers::<f32, 3>(text).filter(|parts| parts.iter().all(|part| (0.0..=1.0).contains(part))).ok_or_else(wrong)
+}
+
+/// Returns the numbers in a text with commas between.
+fn numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let numbers: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    numbers?.try_into().ok()
 }
 
 /// Returns the bytes of `#rrggbb` or `#rgb`; the sign may lack.
@@ -109,10 +115,10 @@ pub(super) fn switch(text: &str) -> Result<bool, String> {
 /// Parses two corners of a box in space, the smaller coordinates first.
 pub fn corners(text: &str) -> Result<[f64; 6], String> {
     let wrong = || format!("`{text}` is not a box; expected x0,y0,z0,x1,y1,z1, the smaller corner first");
-    let numbers = text.split(',').map(|part| part.trim().parse().ok().filter(|value: &f64| value.is_finite()));
-    let numbers: Vec<f64> = numbers.collect::<Option<_>>().ok_or_else(wrong)?;
-    let corners: [f64; 6] = numbers.try_into().map_err(|_| wrong())?;
-    if (0..3).all(|axis| corners[axis] <= corners[axis + 3]) { Ok(corners) } else { Err(wrong()) }
+    let is_box = |corners: &[f64; 6]| {
+        corners.iter().all(|value| value.is_finite()) && (0..3).all(|axis| corners[axis] <= corners[axis + 3])
+    };
+    numbers(text).filter(is_box).ok_or_else(wrong)
 }
 
 /// Parses a number of objects, or `all`.

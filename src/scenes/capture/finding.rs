@@ -1,6 +1,7 @@
 //! What a scan finds: kinds, texts, cures.
 
 use labelgs_scene::Flaw;
+use labelgs_scene::words::name_of;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -32,19 +33,8 @@ pub enum Fault {
 
 impl Fault {
     /// Returns the display name.
-    pub fn text(self) -> &'static str {
-        match self {
-            Self::LeftOut => "left out",
-            Self::Unposed => "unposed",
-            Self::Frame => "frame",
-            Self::Behind => "behind",
-            Self::Reprojection => "reprojection",
-            Self::Blur => "blur",
-            Self::Exposure => "exposure",
-            Self::WhiteBalance => "white balance",
-            Self::Alone => "alone",
-            Self::Scale => "scale",
-        }
+    pub fn text(self) -> String {
+        name_of(&self).replace('-', " ")
     }
 
     /// Returns what to do about it.

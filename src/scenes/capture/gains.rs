@@ -12,15 +12,15 @@ use rayon::prelude::*;
 /// Fewest shared points for a gain.
 const POINTS_MIN: usize = 20;
 /// Pixels darker or brighter than these say nothing about exposure.
-const DARK: f64 = 0.04;
-const BRIGHT: f64 = 0.95;
+const BRIGHTNESS_MIN: f64 = 0.04;
+const BRIGHTNESS_MAX: f64 = 0.95;
 /// Rounds of reweighted least squares, and of conjugate gradients in each.
 const ROUNDS: usize = 15;
 const DESCENTS: usize = 60;
 /// Differences of logarithms below this have equal weight.
-const EQUAL: f64 = 0.02;
+const DIFFERENCE_MIN: f64 = 0.02;
 /// Weight of a gain of 1, against 1 / |difference| for each point: a handful of points that disagree do not make a gain.
-const PRIOR: f64 = 100.0;
+const PRIOR_WEIGHT: f64 = 100.0;
 
 /// Brightness of a photo relative to the mean of all photos.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ fn samples(view: &View, marks: &[Mark]) -> Result<Vec<Sample>> {
         let texel = photo.rgba[(y * photo.width + x) as usize];
         let [r, g, b] = [texel[0], texel[1], texel[2]].map(|value| f64::from(value) / 255.0);
         let values = [super::photos::grey(texel), r, g, b];
-        let tells = texel[3] == 255 && values.iter().all(|value| (DARK..=BRIGHT).contains(value));
+        let tells = texel[3] == 255 && values.iter().all(|value| (BRIGHTNESS_MIN..=BRIGHTNESS_MAX).contains(value));
         tells.then(|| (point, values.map(f64::ln)))
     };
     Ok(marks.iter().filter_map(sample).collect())
@@ -85,7 +85,7 @@ fn point_means(entries: &[Entry], points: usize, of: impl Fn(&Entry) -> f64) -> 
 /// Weighted sums over the entries of each view of the difference from their point's mean, and the prior's part.
 fn apart(entries: &[Entry], points: usize, logs: &[f64], of: impl Fn(&Entry) -> f64) -> Vec<f64> {
     let means = point_means(entries, points, &of);
-    let mut sums: Vec<f64> = logs.iter().map(|log| PRIOR * log).collect();
+    let mut sums: Vec<f64> = logs.iter().map(|log| PRIOR_WEIGHT * log).collect();
     entries.iter().for_each(|entry| sums[entry.view] += entry.weight * (of(entry) - means[entry.point]));
     sums
 }
@@ -127,7 +127,7 @@ fn relative(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec<Optio
         descend(&entries, points, &mut logs);
         let means = point_means(&entries, points, |entry| entry.value - logs[entry.view]);
         for entry in &mut entries {
-            entry.weight = 1.0 / (entry.value - logs[entry.view] - means[entry.point]).abs().max(EQUAL);
+            entry.weight = 1.0 / (entry.value - logs[entry.view] - means[entry.point]).abs().max(DIFFERENCE_MIN);
         }
     }
     let count = known.iter().filter(|&&known| known).count().max(1) as f64;

@@ -16,9 +16,9 @@ const ERROR_OF_ALL: f64 = 1.5;
 /// Extents outside of which numbers of a scene look wrong, world units.
 const EXTENTS: (f64, f64) = (1e-3, 1e5);
 /// Most of an extent, in median distances of the cameras from their middle.
-const SPREAD: f64 = 4.0;
+const EXTENT_MEDIANS_MAX: f64 = 4.0;
 /// Points farther than this from the cameras are stray, scene extents.
-const STRAY: f64 = 1000.0;
+const STRAY_EXTENTS: f64 = 1000.0;
 
 /// Where the points of a photo are, by its pose.
 #[derive(Clone, Copy, Debug, Default)]
@@ -87,10 +87,12 @@ pub(super) fn scale(dataset: &Dataset) -> Vec<Finding> {
     let middle = |axis: usize| median(centres.iter().map(|centre| centre[axis])).unwrap_or(0.0);
     let centre = DVec3::new(middle(0), middle(1), middle(2));
     let radius = median(centres.iter().map(|at| at.distance(centre))).filter(|&radius| radius > 0.0);
-    let far = STRAY * radius.map_or(extent, |radius| extent.min(SPREAD * radius));
+    let far = STRAY_EXTENTS * radius.map_or(extent, |radius| extent.min(EXTENT_MEDIANS_MAX * radius));
     let stray = dataset.points.iter().filter(|point| point.position.distance(centre) > far).count();
     if stray > 0 {
-        add(format!("{stray} points are more than {STRAY} times as far away as the cameras are from each other"));
+        add(format!(
+            "{stray} points are more than {STRAY_EXTENTS} times as far away as the cameras are from each other"
+        ));
     }
     found
 }

@@ -1,6 +1,6 @@
 //! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
 
-use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
+use super::model::{CameraRecord, ImageRecord, unknown_model};
 use crate::lens;
 use glam::{DVec2, DVec3};
 use labelgs_files::read;
@@ -121,19 +121,19 @@ pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRe
         let (quaternion, translation) = (source.f64s()?, source.f64s()?);
         let (camera, name) = (source.u32()?, source.name()?);
         let observations = source.u64()?;
-        let mut points = Vec::new();
+        let mut observed = Vec::new();
         if with_observations {
             for _ in 0..observations {
                 let (pixel, point) = (DVec2::from_array(source.f64s()?), source.u64()?);
                 // All bits set: an image feature without a point.
                 if point != u64::MAX {
-                    points.push((pixel, point));
+                    observed.push((pixel, point));
                 }
             }
         } else {
             source.skip(observations, 24, "observations")?;
         }
-        Ok(ImageRecord { id, quaternion, translation, camera, name, observed: Observed { points } })
+        Ok(ImageRecord { id, quaternion, translation, camera, name, observed })
     })
 }
 

@@ -8,9 +8,8 @@ mod model;
 mod text;
 pub mod write;
 
-use super::lens::Lens;
 use super::listed_path::Place;
-use super::listing::{FAR, Listed, Listing, check_camera, require_some};
+use super::listing::{DISTANCE_MAX, Listed, Listing, check_camera, require_some};
 use super::pose_convention::Native;
 use crate::points;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -159,7 +158,7 @@ pub fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Li
     let Some(points) = files.points(&mut Vec::new())? else { return Ok(BTreeMap::new()) };
     let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
     let seen = |(listed, image): (Listed, ImageRecord)| {
-        let points = image.observed.points.into_iter();
+        let points = image.observed.into_iter();
         let points = points.filter_map(|(pixel, id)| Some((pixel, *places.get(&id)?))).collect();
         (listed.name.clone(), (listed, points))
     };
@@ -168,10 +167,10 @@ pub fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Li
 
 fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
     let before = points.len();
-    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= FAR);
+    points.retain(|point| point.position.is_finite() && point.position.abs().max_element() <= DISTANCE_MAX);
     if points.len() < before {
         notes.push(format!(
-            "left out {} of {before} points whose position is not finite or beyond {FAR:e}",
+            "left out {} of {before} points whose position is not finite or beyond {DISTANCE_MAX:e}",
             before - points.len()
         ));
     }
@@ -190,71 +189,41 @@ fn join(
             return Err(Error::data(cameras_path, format!("camera {}", camera.id), "is listed twice"));
         }
     }
+    let camera = |image: ImageRecord| {
+        let place = format!("image {} (`{}`)", image.id, image.name);
+        let unlisted = || format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
+        let record = by_id.get(&image.camera).ok_or_else(|| Error::data(images_path, place.as_str(), unlisted()))?;
+        let (camera, lens) = record.intrinsics(cameras_path)?;
+        check_camera(cameras_path, &format!("camera {}", record.id), &camera, &lens)?;
+        let [w, x, y, z] = image.quaternion;
+        let quaternion = DQuat::from_xyzw(x, y, z, w);
+        let length = quaternion.length();
+        if !(length.is_finite() && length > 1e-9) {
+            let problem = "has a rotation that is zero or not finite; adjust it again, or remove the image";
+            return Err(Error::data(images_path, place, problem));
+        }
+        let (rotation, translation) = (DMat3::from_quat(quaternion.normalize()), DVec3::from_array(image.translation));
+        let camera = Camera { rotation, translation, ..camera };
+        check_camera(images_path, &place, &camera, &lens)?;
+        Ok((camera, lens, place, image))
+    };
     let (mut ids, mut names) = (HashSet::new(), HashSet::new());
     let mut found = Views { views: Vec::with_capacity(images.len()), bad: Vec::new() };
     for image in images {
-        let image = match image {
-            Ok(image) => image,
+        let (camera, lens, place, image) = match image.and_then(camera) {
+            Ok(posed) => posed,
             Err(error) => {
                 found.bad.push(error);
                 continue;
             }
-        };
-        let place = format!("image {} (`{}`)", image.id, image.name);
-        let twice = || Error::data(images_path, place.as_str(), "has an id or a name that was listed before");
-        if !ids.insert(image.id) {
-            return Err(twice());
-        }
-        let Some(camera) = by_id.get(&image.camera) else {
-            let problem = format!("uses camera {}, which {} does not list", image.camera, cameras_path.display());
-            found.bad.push(Error::data(images_path, place.as_str(), problem));
-            continue;
         };
         let file = scene.resolve(images_path, &image.name)?;
-        let posed = |(camera, lens): (Camera, Lens)| match posed(camera, &image) {
-            Ok(camera) => Ok((camera, lens)),
-            Err(problem) => {
-                let problem = format!("{problem}; adjust it again, or remove the image");
-                Err(Error::data(images_path, place.as_str(), problem))
-            }
-        };
-        let (camera, lens) = match intrinsics(cameras_path, camera).and_then(posed) {
-            Ok(found) => found,
-            Err(error) => {
-                found.bad.push(error);
-                continue;
-            }
-        };
-        if !names.insert(file.name.clone()) {
-            return Err(twice());
+        if !ids.insert(image.id) || !names.insert(file.name.clone()) {
+            return Err(Error::data(images_path, place, "has an id or a name that was listed before"));
         }
         let photo = scene.photos.find(&["images", "."], &file.path);
         found.views.push((Listed { name: file.name, photo, camera, lens, test: None }, image));
     }
     require_some(found.views.len(), &mut found.bad)?;
     Ok(found)
-}
-
-/// Returns the camera of a record, without a pose, and its lens.
-fn intrinsics(path: &Path, record: &CameraRecord) -> Result<(Camera, Lens)> {
-    let (camera, lens) = record.intrinsics(path)?;
-    check_camera(path, &format!("camera {}", record.id), &camera, &lens)?;
-    Ok((camera, lens))
-}
-
-/// Returns the camera with the pose of an image, or what is wrong with the pose.
-fn posed(camera: Camera, image: &ImageRecord) -> Result<Camera, String> {
-    let [w, x, y, z] = image.quaternion;
-    let quaternion = DQuat::from_xyzw(x, y, z, w);
-    let (length, translation) = (quaternion.length(), DVec3::from_array(image.translation));
-    if !(length.is_finite() && length > 1e-9) {
-        return Err("has a rotation that is zero or not finite".to_owned());
-    }
-    if !translation.is_finite() {
-        return Err("the pose is not finite".to_owned());
-    }
-    if translation.length() > FAR {
-        return Err(format!("the camera is farther than {FAR:e} from the origin"));
-    }
-    Ok(Camera { rotation: DMat3::from_quat(quaternion.normalize()), translation, ..camera })
 }

@@ -1,7 +1,7 @@
 //! Records of a COLMAP model, and its camera models.
 
 use crate::lens::{self, CameraModel, Lens};
-use glam::{DMat3, DVec2, DVec3};
+use glam::DVec2;
 use labelgs_scene::{Camera, Error, Result};
 use std::fmt::Display;
 use std::path::Path;
@@ -15,12 +15,6 @@ pub(super) struct CameraRecord {
     pub(super) parameters: Vec<f64>,
 }
 
-/// Points of a reconstruction as its images show them.
-pub struct Observed {
-    /// Position in the photo, px, and id of the point.
-    pub points: Vec<(DVec2, u64)>,
-}
-
 /// A line of `images`.
 pub(super) struct ImageRecord {
     pub(super) id: u32,
@@ -29,8 +23,8 @@ pub(super) struct ImageRecord {
     pub(super) translation: [f64; 3],
     pub(super) camera: u32,
     pub(super) name: String,
-    /// Empty unless asked for.
-    pub(super) observed: Observed,
+    /// Places in the photo, px, and the points there by id; empty unless asked for.
+    pub(super) observed: Vec<(DVec2, u64)>,
 }
 
 /// Makes the error for a camera model that COLMAP has not.
@@ -58,8 +52,6 @@ impl CameraRecord {
             let problem = format!("{name} of {width} x {height} px has the parameters {p:?}; expected its size again");
             return Err(Error::data(path, place, problem));
         }
-        let [fx, fy, cx, cy] = self.model.intrinsics(p);
-        let camera = Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height };
-        Ok((camera, of_list(&p[before..])))
+        Ok((Camera::at_origin(self.model.intrinsics(p), (width, height)), of_list(&p[before..])))
     }
 }

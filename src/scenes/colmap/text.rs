@@ -1,6 +1,6 @@
 //! The text files: one record per line; `#` starts a comment.
 
-use super::model::{CameraRecord, ImageRecord, Observed, unknown_model};
+use super::model::{CameraRecord, ImageRecord, unknown_model};
 use crate::lens;
 use glam::{DVec2, DVec3};
 use labelgs_files::read;
@@ -149,14 +149,14 @@ fn image(path: &Path, (number, line): (usize, String), observations: Option<(usi
     if name.is_empty() {
         return Err(words.error("the line ends where the image name is expected"));
     }
-    let mut observed = Observed { points: Vec::new() };
+    let mut observed = Vec::new();
     if let Some((number, line)) = observations {
         let mut words = Words { path, number, rest: line.trim() };
         while !words.rest.trim().is_empty() {
             let pixel = DVec2::from_array(words.numbers("position in the photo")?);
             let point: i64 = words.number("point id")?;
             // -1: an image feature without a point.
-            observed.points.extend(u64::try_from(point).ok().map(|point| (pixel, point)));
+            observed.extend(u64::try_from(point).ok().map(|point| (pixel, point)));
         }
     }
     Ok(ImageRecord { id, quaternion, translation, camera, name, observed })

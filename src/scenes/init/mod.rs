@@ -76,12 +76,7 @@ pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u
     let mut far = from_points(&points, &distances2, dataset.extent());
     let shift = far.origin - model.origin;
     far.means.iter_mut().for_each(|mean| *mean = (DVec3::from(mean.map(f64::from)) + shift).as_vec3().to_array());
-    model.means.append(&mut far.means);
-    model.quats.append(&mut far.quats);
-    model.scales.append(&mut far.scales);
-    model.opacities.append(&mut far.opacities);
-    model.sh0.append(&mut far.sh0);
-    model.sh_rest.append(&mut far.sh_rest);
+    model.append(far);
     Ok(())
 }
 

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 /// Number of batches of candidates without enough points before the tests are relaxed.
 const BATCHES: usize = 24;
 /// Share of the points that may lie anywhere before the cameras if photos place the others.
-const ANYWHERE: f64 = 0.2;
+const ANYWHERE_SHARE: f64 = 0.2;
 /// Largest colour difference from the background for a background pixel.
 const BACKGROUND_TOLERANCE: u8 = 3;
 /// Number of views whose border is examined.
@@ -50,7 +50,7 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
     let mut points = Vec::with_capacity(count);
     if test.backdrop.is_none() {
         let found = Sweep::new(views, region.depths())?.points(&mut random, count);
-        points.extend(found.into_iter().take(((1.0 - ANYWHERE) * count as f64) as usize));
+        points.extend(found.into_iter().take(((1.0 - ANYWHERE_SHARE) * count as f64) as usize));
     }
     // Relax the tests until enough points pass: first free space, then two cameras, one, none.
     loop {

@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Radius of the sphere, in scene extents, and in distances of the points: at least this much of this quantile.
-const RADIUS: f64 = 2.5;
-const BEYOND: f64 = 1.0;
-const FARTHEST: f64 = 0.99;
+const RADIUS_EXTENTS: f64 = 2.5;
+const RADIUS_DISTANCES: f64 = 1.0;
+const DISTANCE_QUANTILE: f64 = 0.99;
 /// A photo is divided into cells with this many along its longer side. It looks past the points in cells without one.
 const CELLS: u32 = 16;
 /// Fewest views that see a point of the sphere.
@@ -64,9 +64,9 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64
     }
     let centre = views.iter().map(|view| view.camera.centre()).sum::<DVec3>() / views.len() as f64;
     let mut distances: Vec<f64> = points.iter().map(|point| point.position.distance(centre)).collect();
-    let at = (FARTHEST * distances.len() as f64) as usize;
+    let at = (DISTANCE_QUANTILE * distances.len() as f64) as usize;
     let far = if at < distances.len() { *distances.select_nth_unstable_by(at, f64::total_cmp).1 } else { 0.0 };
-    let radius = (RADIUS * dataset.extent()).max(BEYOND * far);
+    let radius = (RADIUS_EXTENTS * dataset.extent()).max(RADIUS_DISTANCES * far);
     let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points, views.len())).collect();
     let place = |index: usize| centre + radius * even_direction(index, count);
     // The photos come one after the other, because not all of them may be in memory.

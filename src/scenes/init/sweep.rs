@@ -12,15 +12,15 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 /// Longest side of the compared photos, px: neighbouring depths are about a pixel apart.
-const LONGEST: u32 = 160;
+const SIDE_MAX: u32 = 160;
 /// Number of depths per pixel, even in inverse depth.
 const DEPTHS: u32 = 48;
 /// Colour difference of a pixel that counts as unrelated: hidden, or of another surface.
-const UNRELATED: u32 = 48 * 3;
+const DIFFERENCE_MAX: u32 = 48 * 3;
 /// Most photos to compare a pixel with.
-const COMPARED: usize = 24;
+const COMPARED_MAX: usize = 24;
 /// Most tries per point.
-const TRIES: usize = 3;
+const TRIES_MAX: usize = 3;
 
 /// Small photos with their cameras.
 pub(super) struct Sweep {
@@ -33,7 +33,7 @@ impl Sweep {
     pub(super) fn new(views: &[View], depths: (f64, f64)) -> Result<Self> {
         let small = |photo: &Pixels<Photo>, camera: &Camera| {
             let photo = photo.get()?;
-            let (width, height) = bounded_size((photo.width, photo.height), Some(LONGEST));
+            let (width, height) = bounded_size((photo.width, photo.height), Some(SIDE_MAX));
             Ok((camera.resized(width, height), shrink_photo(&photo, width, height)))
         };
         let photos = views.iter().filter_map(|view| Some(small(view.photo.as_ref()?, &view.camera)));
@@ -46,7 +46,7 @@ impl Sweep {
         if self.photos.len() < 2 {
             return points;
         }
-        for _ in 0..TRIES {
+        for _ in 0..TRIES_MAX {
             if points.len() < count {
                 let drawn: Vec<(usize, DVec2, f64)> = (0..count).map(|_| self.pixel(random)).collect();
                 let found: Vec<_> = drawn.par_iter().map(|&(at, pixel, phase)| self.point(at, pixel, phase)).collect();
@@ -86,13 +86,13 @@ impl Sweep {
     /// Returns the mean difference to the photos that see the point, if they are at least `others`.
     fn difference(&self, own: usize, point: &Point, others: usize) -> Option<f64> {
         let (mut sum, mut seen) = (0, 0);
-        let step = self.photos.len().div_ceil(COMPARED);
+        let step = self.photos.len().div_ceil(COMPARED_MAX);
         // Start at the own photo, so that the compared photos vary evenly.
         let compared = (own % step..self.photos.len()).step_by(step).filter(|&index| index != own);
         for (camera, photo) in compared.map(|index| &self.photos[index]) {
             let Some(texel) = camera.sees(point.position).and_then(|pixel| texel(photo, pixel)) else { continue };
             let difference: u32 = (0..3).map(|c| u32::from(texel[c].abs_diff(point.colour[c]))).sum();
-            sum += difference.min(UNRELATED);
+            sum += difference.min(DIFFERENCE_MAX);
             seen += 1;
         }
         (seen >= others).then(|| f64::from(sum) / seen as f64)

@@ -9,7 +9,7 @@ const STEPS: u32 = 4096;
 /// Most steps of Newton's method; a few are enough inside of the range.
 const NEWTON_MAX: u32 = 30;
 /// Distance from the exact place, at focal length 1, at which a ray is found: 1e-8 px of any photo.
-const CLOSE: f64 = 1e-13;
+const ERROR_MAX: f64 = 1e-13;
 
 /// A lens: maps directions in camera axes (x right, y down, z forward) to points of the image plane at focal length 1,
 /// relative to the principal point.
@@ -46,7 +46,7 @@ pub trait Projection: Debug + Sync {
         let error = |at: DVec2| self.project(direction_of(at)) - point;
         let mut left = error(at);
         for _ in 0..NEWTON_MAX {
-            if left.length() <= CLOSE * (1.0 + point.length()) {
+            if left.length() <= ERROR_MAX * (1.0 + point.length()) {
                 break;
             }
             let h = 1e-6;

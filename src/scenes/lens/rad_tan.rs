@@ -1,6 +1,7 @@
 //! The fisheye of Project Aria, COLMAP's RAD_TAN_THIN_PRISM_FISHEYE.
 
 use super::Projection;
+use super::polynomial::tangential;
 use super::projection::angle_of;
 use glam::{DVec2, DVec3};
 
@@ -41,11 +42,8 @@ impl Projection for RadTan {
     fn project(&self, direction: DVec3) -> DVec2 {
         let at = angle_of(direction);
         let at = at * self.radial(at.length_squared());
-        let (x, y, r2, [p0, p1], [s0, s1, s2, s3]) = (at.x, at.y, at.length_squared(), self.tangential, self.prism);
-        at + DVec2::new(
-            2.0 * p1 * x * y + p0 * (r2 + 2.0 * x * x) + r2 * (s0 + r2 * s1),
-            2.0 * p0 * x * y + p1 * (r2 + 2.0 * y * y) + r2 * (s2 + r2 * s3),
-        )
+        let (r2, [p0, p1], [s0, s1, s2, s3]) = (at.length_squared(), self.tangential, self.prism);
+        at + (tangential(at, [p1, p0]) + DVec2::new(r2 * (s0 + r2 * s1), r2 * (s2 + r2 * s3)))
     }
 
     fn radius(&self, angle: f64) -> f64 {

@@ -1,15 +1,12 @@
 //! COLMAP models, binary and text, whole and damaged.
 
 use super::fixtures::*;
+use super::{names, noted, open};
 use glam::{DQuat, DVec3};
 use labelgs_scene::Dataset;
 use labelgs_scene::Error;
 use labelgs_scenes::{self as scenes, LoadOptions};
 use std::fs;
-
-fn open(scene: &Scene) -> labelgs_scene::Result<Dataset> {
-    scenes::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() })
-}
 
 fn check_poses(dataset: &Dataset, names: &[&str]) {
     assert_eq!(dataset.train.len(), names.len());
@@ -43,7 +40,7 @@ fn binary_and_text_read_alike_in_every_folder() {
             }
             let dataset = open(&scene).expect("a scene");
             check_poses(&dataset, &names);
-            let sorted: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+            let sorted = super::names(&dataset.train);
             assert_eq!(sorted, ["b 1.png", "c.png", "sub/a.png"]);
             let camera = &dataset.train[0].camera;
             assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (10.0, 11.0, 5.5, 4.5));
@@ -133,7 +130,7 @@ fn missing_photos_are_skipped_before_the_split() {
     fs::remove_file(scene.path().join("images/00.png")).expect("removed");
     let dataset =
         scenes::open(scene.path(), &LoadOptions { test_every: Some(4), ..LoadOptions::default() }).expect("a scene");
-    let test: Vec<&str> = dataset.test.iter().map(|view| view.name.as_str()).collect();
+    let test = names(&dataset.test);
     assert_eq!(test, ["01.png", "05.png", "09.png"]);
     assert_eq!(dataset.train.len(), 6);
     assert_eq!(dataset.notes.iter().filter(|note| note.contains("1 of 10")).count(), 1);
@@ -222,7 +219,7 @@ fn hostile_records_are_refused() {
     fs::write(&points, not_finite).expect("written");
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.points.len(), 1);
-    assert!(dataset.notes.iter().any(|note| note.contains("1 of 2 points")));
+    noted(&dataset.notes, &["1 of 2 points"]);
     fs::remove_file(&points).expect("removed");
     assert!(open(&scene).expect("a scene without points").points.is_empty());
 }
@@ -314,7 +311,7 @@ fn files_of_a_model_may_have_different_forms() {
                  property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 4 5 6\n");
     let dataset = open(&scene).expect("a scene");
     assert_eq!((dataset.points.len(), dataset.points[0].colour), (1, [4, 5, 6]));
-    assert!(dataset.notes.iter().any(|note| note.contains("points3D.ply")), "{:?}", dataset.notes);
+    noted(&dataset.notes, &["points3D.ply"]);
 }
 
 #[test]
@@ -327,11 +324,7 @@ fn one_broken_pose_leaves_its_photo_out() {
     fs::write(&path, bytes).expect("written");
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.train.len(), 11);
-    assert!(
-        dataset.notes.iter().any(|note| note.contains("1 of 12") && note.contains("00.png")),
-        "{:?}",
-        dataset.notes
-    );
+    noted(&dataset.notes, &["1 of 12", "00.png"]);
     let none = LoadOptions { max_bad_photos: 0.0, ..LoadOptions::default() };
     assert!(refusal(scenes::open(scene.path(), &none)).contains("remove the image"));
 }
@@ -351,7 +344,7 @@ fn one_broken_row_leaves_its_photo_or_point_out() {
         fs::write(&path, of_last(row)).expect("written");
         let dataset = open(&scene).expect("a scene");
         assert_eq!(dataset.all().len(), 11, "{row}");
-        assert!(dataset.notes.iter().any(|note| note.contains("1 of 12")), "{:?}", dataset.notes);
+        noted(&dataset.notes, &["1 of 12"]);
     }
     // A file that ends within a row was cut short, and more may be lost than that row.
     fs::write(&path, of_last("12 0.9 0 0 0 1 2").trim_end()).expect("written");
@@ -362,11 +355,7 @@ fn one_broken_row_leaves_its_photo_or_point_out() {
     fs::write(&path, format!("{text}9 1 2 x 0 0 0\n")).expect("written");
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.points.len(), POINTS.len());
-    assert!(
-        dataset.notes.iter().any(|note| note.contains("1 point left out") && note.contains("`x`")),
-        "{:?}",
-        dataset.notes
-    );
+    noted(&dataset.notes, &["1 point left out", "`x`"]);
 }
 
 #[test]
@@ -377,8 +366,8 @@ fn another_model_is_named_with_its_photos_and_can_be_the_scene() {
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.flaws.len(), 2, "{:?}", dataset.flaws);
     let notes = dataset.notes;
-    assert!(notes.iter().any(|note| note.contains("4 of 5 photos") && note.contains("have no pose")), "{notes:?}");
-    assert!(notes.iter().any(|note| note.contains("with 1 photo;") && note.contains("has 4")), "{notes:?}");
+    noted(&notes, &["4 of 5 photos", "have no pose"]);
+    noted(&notes, &["with 1 photo;", "has 4"]);
     let other = scenes::open(&scene.path().join("sparse/1"), &LoadOptions::default()).expect("a scene");
     assert_eq!(other.all().len(), 4);
 }
@@ -389,10 +378,7 @@ fn a_second_kind_of_scene_is_named() {
     let json = r#"{"fl_x": 10, "frames": [{"file_path": "images/00.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
     scene.write("transforms.json", json);
     let notes = open(&scene).expect("a scene").notes;
-    assert!(
-        notes.iter().any(|note| note.contains("2 photos come") && note.contains("transforms.json with 1 photo")),
-        "{notes:?}"
-    );
+    noted(&notes, &["2 photos come", "transforms.json with 1 photo"]);
     fs::remove_dir_all(scene.path().join("images")).expect("removed");
     assert!(refusal(open(&scene)).contains("or name"));
 }

@@ -1,9 +1,10 @@
 //! Depth maps from every kind of file, brought to their photos.
 
+use super::all;
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
 use labelgs_files as files;
 use labelgs_scene::{Dataset, DepthMap, View};
-use labelgs_scenes::{self as scenes, DepthFolder, LoadOptions};
+use labelgs_scenes::{self as scenes, DepthFolder, LoadOptions, Lookup};
 use std::path::Path;
 
 const SIZE: (u32, u32) = (12, 8);
@@ -18,17 +19,20 @@ fn values() -> Vec<f32> {
 }
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> Dataset {
-    let options = LoadOptions { max_resolution, test_every: None, photos: false, ..LoadOptions::default() };
+    let options = LoadOptions { max_resolution, photos: false, ..all() };
     scenes::open(scene.path(), &options).expect("a scene")
+}
+
+fn folder(scene: &Scene) -> labelgs_scene::Result<DepthFolder> {
+    DepthFolder::open(&scene.path().join("depths"), scene.path(), &Lookup::default())
 }
 
 fn read(scene: &Scene) -> labelgs_scene::Result<DepthMap> {
     let dataset = open(scene, None);
-    DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs_scenes::Lookup::default())?
-        .read(&dataset.train[0])
+    folder(scene)?.read(&dataset.train[0])
 }
 
-fn npy(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+pub fn npy(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
     while (header.len() + 11) % 64 != 0 {
         header.push(' ');
@@ -133,13 +137,9 @@ fn a_folder_must_have_all_maps() {
     let scene = simple(3);
     let dataset = open(&scene, None);
     let views: Vec<&View> = dataset.train.iter().collect();
-    let folder = scene.path().join("depths");
-    assert!(
-        refusal(DepthFolder::open(&folder, scene.path(), &labelgs_scenes::Lookup::default()))
-            .contains("no such folder")
-    );
+    assert!(refusal(folder(&scene)).contains("no such folder"));
     scene.write("depths/01.pfm", pfm("-1", f32::to_le_bytes));
-    let depths = DepthFolder::open(&folder, scene.path(), &labelgs_scenes::Lookup::default()).expect("a folder");
+    let depths = folder(&scene).expect("a folder");
     let message = refusal(depths.check_complete(&views));
     assert!(message.contains("2 of 3 photos") && message.contains("00.png, 02.png"), "{message}");
     depths.check_complete(&views[1..2]).expect("01 is there");
@@ -154,9 +154,7 @@ fn maps_follow_the_size_of_the_view() {
     files::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
     assert_eq!(read(&scene).expect("a map").values, values());
     let dataset = open(&scene, Some(6));
-    let folder = DepthFolder::open(&scene.path().join("depths"), scene.path(), &labelgs_scenes::Lookup::default())
-        .expect("a folder");
-    let half = folder.read(&dataset.train[0]).expect("a map");
+    let half = folder(&scene).expect("a folder").read(&dataset.train[0]).expect("a map");
     // The centre of a pixel of half size is a corner of four; the lower right one of them is taken.
     let expected: Vec<f32> = (0..24).map(|i| value((i / 6 * 2 + 1) * 12 + i % 6 * 2 + 1)).collect();
     assert_eq!((half.width, half.height, half.values), (6, 4, expected));
@@ -173,7 +171,7 @@ fn maps_are_undistorted_as_masks_are() {
         png(&scene.at(&format!("{folder}/00.png")), png::BitDepth::Sixteen, png::ColorType::Grayscale, &words());
     }
     let masks = Some(scene.path().join("masks"));
-    let options = LoadOptions { masks, test_every: None, ..LoadOptions::default() };
+    let options = LoadOptions { masks, ..all() };
     let dataset = scenes::open(scene.path(), &options).expect("a scene");
     let ids = dataset.train[0].mask().expect("read").expect("a mask").ids.clone();
     let found = read(&scene).expect("a map").values;

@@ -1,18 +1,15 @@
 //! Photos at other places than the scene lists, photos that are missing, and files that are no photos.
 
 use super::fixtures::*;
+use super::{all, names, open};
 use labelgs_scene::Dataset;
 use labelgs_scene::Error;
 use labelgs_scenes::{self as scenes, LoadOptions, Lookup};
 use std::fs;
 
-fn open_with(scene: &Scene, images: Option<&str>) -> labelgs_scene::Result<Dataset> {
-    let lookup = Lookup { images: images.map(Into::into), ..Lookup::default() };
-    scenes::open(scene.path(), &LoadOptions { lookup, test_every: None, ..LoadOptions::default() })
-}
-
-fn open(scene: &Scene) -> labelgs_scene::Result<Dataset> {
-    open_with(scene, None)
+fn open_with(scene: &Scene, images: &str) -> labelgs_scene::Result<Dataset> {
+    let lookup = Lookup { images: Some(images.into()), ..Lookup::default() };
+    scenes::open(scene.path(), &LoadOptions { lookup, ..all() })
 }
 
 /// A scene whose photos, listed as `images/NAME` or `NAME`, were moved or renamed.
@@ -37,7 +34,7 @@ fn photos_are_found_where_programs_put_them() {
     ];
     for (listed, stored) in cases {
         let dataset = open(&moved(listed, stored)).unwrap_or_else(|error| panic!("{stored:?}: {error}"));
-        let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+        let names = names(&dataset.train);
         assert_eq!(names.len(), 2, "{stored:?}");
         assert!(dataset.train.iter().all(|view| view.photo.is_some()));
     }
@@ -69,9 +66,9 @@ fn the_folder_of_photos_can_be_named() {
     let text = refusal(open(&scene));
     assert!(text.contains("2 of 2") && text.contains("elsewhere (2)") && text.contains("`images`"), "{text}");
     for folder in ["elsewhere".to_owned(), scene.path().join("elsewhere").display().to_string()] {
-        assert_eq!(open_with(&scene, Some(&folder)).expect("a scene").train.len(), 2, "{folder}");
+        assert_eq!(open_with(&scene, &folder).expect("a scene").train.len(), 2, "{folder}");
     }
-    let error = open_with(&scene, Some("nowhere")).expect_err("no folder");
+    let error = open_with(&scene, "nowhere").expect_err("no folder");
     assert!(matches!(error, Error::Usage { .. }));
     assert!(error.to_string().contains("nowhere is no folder"), "{error}");
 }
@@ -86,7 +83,7 @@ fn a_third_of_the_photos_may_lack() {
     remove(4);
     let text = refusal(open(&scene));
     assert!(text.contains("5 of 12") && text.contains("up to 4") && text.contains("`max_bad_photos`"), "{text}");
-    let most = LoadOptions { max_bad_photos: 0.5, test_every: None, ..LoadOptions::default() };
+    let most = LoadOptions { max_bad_photos: 0.5, ..all() };
     assert_eq!(scenes::open(scene.path(), &most).expect("a scene").train.len(), 7);
 }
 

@@ -20,3 +20,27 @@ mod poses; // LLFF and Metashape
 mod rigs;
 mod splits; // held-out views that a data set names
 mod transforms; // transforms.json and its dialects
+
+use labelgs_scene::{Dataset, Result, View};
+use labelgs_scenes::LoadOptions;
+
+/// Options with which nothing is held out.
+fn all() -> LoadOptions {
+    LoadOptions { test_every: None, ..LoadOptions::default() }
+}
+
+/// Opens a scene of which nothing is held out.
+fn open(scene: &fixtures::Scene) -> Result<Dataset> {
+    labelgs_scenes::open(scene.path(), &all())
+}
+
+fn names(views: &[View]) -> Vec<&str> {
+    views.iter().map(|view| view.name.as_str()).collect()
+}
+
+/// Requires a note with all of `parts`.
+#[track_caller]
+fn noted(notes: &[String], parts: &[&str]) {
+    let has = |note: &String| parts.iter().all(|part| note.contains(part));
+    assert!(notes.iter().any(has), "{parts:?}: {notes:?}");
+}

@@ -1,6 +1,7 @@
 //! Id images: encodings, names, sizes.
 
 use super::fixtures::*;
+use super::{all, noted};
 use labelgs_masks::read_mask;
 use labelgs_scene::Dataset;
 use labelgs_scenes::{self as scenes, LoadOptions};
@@ -20,7 +21,7 @@ fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDep
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs_scene::Result<Dataset> {
     let masks = Some(scene.path().join("masks"));
-    scenes::open(scene.path(), &LoadOptions { masks, max_resolution, test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { masks, max_resolution, ..all() })
 }
 
 #[test]
@@ -126,10 +127,7 @@ fn masks_without_objects_are_noted() {
         let masks = Some(scene.path().join("masks"));
         scenes::open(scene.path(), &LoadOptions { masks, ..LoadOptions::default() }).expect("a scene").notes
     };
-    let has = |text: &str| {
-        let notes = notes();
-        assert!(notes.iter().any(|note| note.contains(text)), "{text}: {notes:?}");
-    };
+    let has = |text: &str| noted(&notes(), &[text]);
     let files: Vec<String> = (0..10).map(|at| format!("masks/{at:02}.png")).collect();
     // The first and the ninth are held out.
     flat(&scene, &files[0], 1);
@@ -202,7 +200,7 @@ fn masks_are_found_by_every_naming() {
         dataset.train.iter().find(|v| v.name == name).and_then(|v| v.mask().expect("read")).map(|m| m.ids[0])
     };
     assert_eq!(names.map(id), [Some(1), Some(2), Some(3), Some(4), Some(5), None]);
-    assert!(dataset.notes.iter().any(|note| note.contains("1 of 6 photos have no mask: right/e.png")));
+    noted(&dataset.notes, &["1 of 6 photos have no mask: right/e.png"]);
     fs::remove_dir_all(scene.path().join("masks")).expect("removed");
     assert!(refusal(open(&scene, None)).contains("no such folder"));
     fs::create_dir(scene.path().join("masks")).expect("made");
@@ -221,7 +219,7 @@ fn other_sizes_are_scaled_by_nearest_id() {
         assert_eq!((mask.width, mask.height), size);
         assert_eq!(mask.objects(), [7, 200]);
         assert!((0..size.1).all(|y| mask.at(0, y) == 7 && mask.at(size.0 - 1, y) == 200));
-        assert!(dataset.notes.iter().any(|note| note.contains("1 mask of another size")));
+        noted(&dataset.notes, &["1 mask of another size"]);
     }
     png(&path, (12, 12), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 144]);
     assert!(refusal(open(&scene, None)).contains("12 x 12"));
@@ -245,7 +243,7 @@ fn ignored_pixels_have_no_weight() {
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &half);
     let open = |scene: &Scene| {
         let ignore = Some(scene.path().join("ignore"));
-        scenes::open(scene.path(), &LoadOptions { ignore, test_every: None, ..LoadOptions::default() })
+        scenes::open(scene.path(), &LoadOptions { ignore, ..all() })
     };
     let dataset = open(&scene).expect("a scene");
     let alphas = |view: usize| {
@@ -254,8 +252,7 @@ fn ignored_pixels_have_no_weight() {
     };
     assert!(alphas(0).iter().enumerate().all(|(at, &alpha)| alpha == if at % 12 < 6 { 0 } else { 255 }));
     assert!(alphas(1).iter().all(|&alpha| alpha == 255), "a photo without a picture counts as a whole");
-    let note = "1 of 2 photos have no picture of what to ignore: 01.png";
-    assert!(dataset.notes.iter().any(|found| found == note), "{:?}", dataset.notes);
+    noted(&dataset.notes, &["1 of 2 photos have no picture of what to ignore: 01.png"]);
     // Colours serve too; opacity says nothing.
     let colours: Vec<u8> = half.iter().flat_map(|&value| [0, value, 0, 255]).collect();
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Rgba, png::BitDepth::Eight, &colours);
@@ -265,7 +262,7 @@ fn ignored_pixels_have_no_weight() {
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[255; 24]);
     let rest = open(&scene).expect("a scene");
     assert_eq!(rest.train.iter().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["01.png"]);
-    assert!(rest.notes.iter().any(|note| note.contains("1 views are skipped, because 00.png have no pixel")));
+    noted(&rest.notes, &["1 views are skipped, because 00.png have no pixel"]);
     png(&scene.at("ignore/01.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 24]);
     assert!(refusal(open(&scene)).contains("no pixel that counts"));
     fs::remove_file(scene.at("ignore/01.png")).expect("removed");

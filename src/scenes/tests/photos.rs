@@ -1,5 +1,6 @@
 //! Photos: decoding, sizes, averaging, undistortion.
 
+use super::all;
 use super::fixtures::*;
 use glam::DVec2;
 use labelgs_files::image::{photo_size, write_png_grey16};
@@ -11,7 +12,7 @@ use labelgs_scenes::{self as scenes, LoadOptions};
 use std::fs;
 
 fn open(scene: &Scene, max_resolution: Option<u32>) -> labelgs_scene::Result<Dataset> {
-    scenes::open(scene.path(), &LoadOptions { max_resolution, test_every: None, ..LoadOptions::default() })
+    scenes::open(scene.path(), &LoadOptions { max_resolution, ..all() })
 }
 
 #[test]
@@ -155,8 +156,7 @@ fn undistortion_samples_where_the_model_says() {
         let ids: Vec<u16> = (0..size.1).flat_map(|y| (0..size.0).map(move |x| (y * size.0 + x + 1) as u16)).collect();
         write_png_grey16(scene.at("masks/a.png"), size.0, size.1, &ids).expect("written");
         let masks = Some(scene.path().join("masks"));
-        let dataset = scenes::open(scene.path(), &LoadOptions { masks, test_every: None, ..LoadOptions::default() })
-            .expect("a scene");
+        let dataset = scenes::open(scene.path(), &LoadOptions { masks, ..all() }).expect("a scene");
         let view = &dataset.train[0];
         let (camera, photo) = (&view.camera, view.photo().expect("a photo"));
         let mask = view.mask().expect("read").expect("a mask");

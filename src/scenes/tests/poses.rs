@@ -1,14 +1,15 @@
 //! Poses of LLFF and Metashape, and the dialects of `transforms.json`.
 
 use super::fixtures::*;
+use super::{all, names, noted};
 use glam::{DVec2, DVec3};
 use labelgs_scene::{Camera, Dataset};
 use labelgs_scenes::window::windows;
-use labelgs_scenes::{self as scenes, LoadOptions};
+use labelgs_scenes::{self as scenes, Lookup};
 use std::path::Path;
 
 fn open(scene: &Path) -> labelgs_scene::Result<Dataset> {
-    scenes::open(scene, &LoadOptions { test_every: None, ..LoadOptions::default() })
+    scenes::open(scene, &all())
 }
 
 /// A camera at (1, 2, 3) that looks along x of the world, with y of the world up.
@@ -20,10 +21,8 @@ fn check_pose(camera: &Camera) {
 }
 
 fn npy(shape: &str, values: &[f64]) -> Vec<u8> {
-    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
-    let mut bytes = [b"\x93NUMPY\x01\x00".as_slice(), &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
-    values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
-    bytes
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    super::depths::npy("<f8", "False", shape, &bytes)
 }
 
 /// Down, right, backwards, centre, and height, width, focal length as columns; then two depths.
@@ -44,7 +43,7 @@ fn poses_of_llff_turn_to_opencv() {
     scene.write("images/notes.txt", "no photo");
     for place in [scene.path().to_owned(), scene.path().join("poses_bounds.npy")] {
         let dataset = open(&place).expect("a scene");
-        let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+        let names = names(&dataset.train);
         assert_eq!(names, ["0.png", "1.png"]);
         let camera = &dataset.train[0].camera;
         check_pose(camera);
@@ -106,6 +105,12 @@ fn of_camera(label: &str, transform: &str) -> String {
     )
 }
 
+/// Where the photo `a.png` shows a point in axes of its camera.
+fn pixel(scene: &Scene, point: DVec3) -> DVec2 {
+    let windows = windows(scene.path(), &Lookup::default()).expect("windows");
+    windows["a.png"].optics.pixel(point).expect("seen")
+}
+
 #[test]
 fn cameras_of_metashape_are_read_with_their_lens() {
     let group = format!(r#"<group id="0">{}</group>"#, of_camera("b.png", POSE));
@@ -115,10 +120,10 @@ fn cameras_of_metashape_are_read_with_their_lens() {
         let scene = metashape(SENSOR, &[&of_camera("a", POSE), &group, odd].concat(), more);
         for place in [scene.path().to_owned(), scene.path().join("cameras.xml")] {
             let dataset = open(&place).expect("a scene");
-            let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+            let names = names(&dataset.train);
             assert_eq!(names, ["a.png", "b.png"]);
             for what in ["1 camera of", "disabled", "without a pose"] {
-                assert!(dataset.notes.iter().any(|note| note.contains(what)), "{:?}", dataset.notes);
+                noted(&dataset.notes, &[what]);
             }
             let camera = &dataset.train[0].camera;
             check_pose(camera);
@@ -130,10 +135,7 @@ fn cameras_of_metashape_are_read_with_their_lens() {
         let bent_x = x * radial + 0.002 * (r2 + 2.0 * x * x) + 2.0 * -0.003 * x * y;
         let bent_y = y * radial + -0.003 * (r2 + 2.0 * y * y) + 2.0 * 0.002 * x * y;
         let expected = DVec2::new(6.0 + 0.5 + bent_x * 10.0 + bent_x * 0.5 + bent_y * 0.2, 4.0 - 0.25 + bent_y * 10.0);
-        let found = windows(scene.path(), &labelgs_scenes::Lookup::default()).expect("windows")["a.png"]
-            .optics
-            .pixel(DVec3::new(x, y, 1.0))
-            .expect("seen");
+        let found = pixel(&scene, DVec3::new(x, y, 1.0));
         assert!(found.distance(expected) < 1e-12, "{found} {expected}");
     }
 }
@@ -149,10 +151,7 @@ fn metashape_has_fisheyes_and_panoramas() {
     let a2 = at.length_squared();
     let radial = 1.0 + 0.1 * a2 + 0.01 * a2 * a2 + 0.001 * a2.powi(3);
     let bent = at.y * radial - 0.003 * (a2 + 2.0 * at.y * at.y) + 2.0 * 0.002 * at.x * at.y;
-    let found = windows(scene.path(), &labelgs_scenes::Lookup::default()).expect("windows")["a.png"]
-        .optics
-        .pixel(DVec3::new(x, y, 1.0))
-        .expect("seen");
+    let found = pixel(&scene, DVec3::new(x, y, 1.0));
     assert!((found.y - (3.75 + bent * 10.0)).abs() < 1e-12, "{found}");
     let spherical = r#"<sensor id="0" type="spherical"><resolution width="12" height="8"/></sensor>"#;
     let dataset = open(metashape(spherical, &of_camera("a", POSE), "").path()).expect("a scene");
@@ -180,11 +179,7 @@ fn slaves_of_a_rig_follow_their_master() {
         let world = rotation.transpose() * (in_master - translation);
         assert!(slave_view.camera.to_camera(world).distance(point) < 1e-9, "{point}");
     }
-    assert!(
-        dataset.notes.iter().any(|note| note.contains("1 camera of") && note.contains("rig")),
-        "{:?}",
-        dataset.notes
-    );
+    noted(&dataset.notes, &["1 camera of", "rig"]);
     // What is not mounted is named; a pose of its own counts.
     let unmounted = [SENSOR, &slave_sensor(r#"<rotation fixed="true"/><location fixed="true"/>"#)].concat();
     let text = refusal(open(metashape(&unmounted, &cameras, "").path()));

@@ -1,6 +1,7 @@
 //! `transforms.json` of Blender, instant-ngp and nerfstudio.
 
 use super::fixtures::*;
+use super::{names, noted};
 use glam::DVec3;
 use labelgs_scene::Dataset;
 use labelgs_scenes::{self as scenes, LoadOptions};
@@ -30,7 +31,7 @@ fn blender_uses_the_given_split_and_blends_alpha() {
     scene.write("transforms_test.json", text(&["./test/r_0"]));
     let options = LoadOptions { background: [1.0, 1.0, 0.0], test_every: Some(2), ..LoadOptions::default() };
     let dataset = scenes::open(scene.path(), &options).expect("a scene");
-    let names: Vec<&str> = dataset.train.iter().map(|view| view.name.as_str()).collect();
+    let names = names(&dataset.train);
     assert_eq!((names, dataset.test[0].name.as_str()), (vec!["train/r_0.png", "train/r_10.png"], "test/r_0.png"));
     let view = &dataset.train[0];
     let focal = 2.0 / 0.5f64.tan();
@@ -72,13 +73,12 @@ fn frames_override_the_file() {
     let global =
         r#""fl_x": 10.0, "w": 12.0, "h": 8.0, "cx": 6.5, "cy": 4.5, "camera_model": "OPENCV", "aabb_scale": 4"#;
     scene.write("transforms.json", format!(r#"{{{global}, "frames": [{}]}}"#, frames.join(",")));
-    let dataset =
-        scenes::open(scene.path(), &LoadOptions { test_every: None, ..LoadOptions::default() }).expect("a scene");
+    let dataset = super::open(&scene).expect("a scene");
     let [a, b] = &dataset.train[..] else { panic!("two views") };
     assert_eq!((a.camera.fx, a.camera.fy, a.camera.cx, a.camera.cy), (20.0, 21.0, 5.0, 3.0));
     assert_eq!((b.camera.fx, b.camera.fy, b.camera.cx, b.camera.cy), (10.0, 10.0, 6.5, 4.5));
-    assert!(dataset.notes.iter().any(|note| note.contains("second time")));
-    assert!(dataset.notes.iter().any(|note| note.contains("1 of 3 listed photos do not exist")));
+    noted(&dataset.notes, &["second time"]);
+    noted(&dataset.notes, &["1 of 3 listed photos do not exist"]);
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn lenses_have_the_names_of_nerfstudio_and_instant_ngp() {
         assert!((camera.fx - 10.0).abs() < 1e-6 && f64::from(camera.width) == width.round(), "{camera:?}");
     }
     let faces = views(r#""camera_model": "EQUIRECTANGULAR", "fl_x": 3, "cx": 1,"#);
-    let names: Vec<&str> = faces.iter().map(|view| view.name.as_str()).collect();
+    let names = names(&faces);
     assert_eq!(names, ["a.back.png", "a.down.png", "a.front.png", "a.left.png", "a.right.png", "a.up.png"]);
     assert!(faces.iter().all(|view| view.camera.width == view.camera.height));
     // Each coefficient bends the view.
@@ -192,8 +192,7 @@ fn a_broken_frame_leaves_its_photo_out() {
         let mut frames: Vec<String> = (0..12).map(|index| frame(&format!("images/{index}.png"), "")).collect();
         frames[3] = broken.to_owned();
         scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{}]}}"#, frames.join(",")));
-        let all = LoadOptions { test_every: None, ..LoadOptions::default() };
-        scenes::open(scene.path(), &all).expect("a scene")
+        super::open(&scene).expect("a scene")
     };
     let nan = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,NaN,-Infinity]");
     let zero = frame("images/3.png", "").replace("[0,0,1,0]", "[0,0,0,0]");
@@ -226,7 +225,7 @@ fn keys_of_other_programs_are_used_or_named() {
     let turned = r#"[[0,1,0,0],[0,0,1,0],[1,0,0,0],[5,6,7,1]]"#;
     let of = |matrix: &str| open(r#""fl_x": 10,"#, &a("").replace(IDENTITY, matrix));
     let transposed = of(turned);
-    assert!(transposed.notes.iter().any(|note| note.contains("transposed")), "{:?}", transposed.notes);
+    noted(&transposed.notes, &["transposed"]);
     assert_eq!(camera(transposed), camera(of(usual)));
     // Mitsuba's cameras look along z, with x to the left.
     let mitsuba = camera(open(r#""fl_x": 10, "from_mitsuba": true,"#, &a("")));
@@ -240,7 +239,7 @@ fn keys_of_other_programs_are_used_or_named() {
     assert_eq!(open(r#""latlong": true,"#, &a("")).train.len(), 6);
     for (key, value) in [("rolling_shutter", "[0, 0, 0, 0.1]"), ("white_transparent", "true"), ("time", "0.5")] {
         let notes = open(&format!(r#""fl_x": 10, "{key}": {value},"#), &a("")).notes;
-        assert!(notes.iter().any(|note| note.contains(&format!("\"{key}\""))), "{notes:?}");
+        noted(&notes, &[&format!("\"{key}\"")]);
     }
     let quiet =
         open(r#""fl_x": 10, "rolling_shutter": [0, 0, 0], "white_transparent": false, "aabb_scale": 4,"#, &a(""));
@@ -269,5 +268,5 @@ fn points_that_no_key_names_are_used_and_named() {
     scene.write("sparse_pc.ply", points);
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.points[0].colour, [255, 1, 0]);
-    assert!(dataset.notes.iter().any(|note| note.contains("sparse_pc.ply")), "{:?}", dataset.notes);
+    noted(&dataset.notes, &["sparse_pc.ply"]);
 }

@@ -23,7 +23,9 @@ pub(super) fn listed(
     };
     let (rotation, translation) = pose(path, place, frame, &intrinsics)?;
     let mut camera = match lens {
-        Lens::Equirectangular => panorama(size),
+        Lens::Equirectangular => {
+            Camera::at_origin(Equirectangular::intrinsics(f64::from(size.0), f64::from(size.1)), size)
+        }
         _ => camera(path, place, &intrinsics, size)?,
     };
     (camera.rotation, camera.translation) = (rotation, translation);
@@ -77,16 +79,10 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
     Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
 }
 
-/// Makes the intrinsics of a panorama, which follow from its size.
-fn panorama((width, height): (u32, u32)) -> Camera {
-    let [fx, fy, cx, cy] = Equirectangular::intrinsics(f64::from(width), f64::from(height));
-    Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height }
-}
-
 /// Makes the intrinsics, at an identity pose. Focal lengths come from `fl_x`, `fl_y` or the fields of view; a missing
 /// one equals the other. The default principal point is the image centre.
-fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32)) -> Result<Camera> {
-    let (w, h) = (f64::from(width), f64::from(height));
+fn camera(path: &Path, place: &str, i: &Intrinsics, size: (u32, u32)) -> Result<Camera> {
+    let (w, h) = (f64::from(size.0), f64::from(size.1));
     // The tangent is periodic: degrees, for example, would pass as some angle in radians.
     for (name, angle) in [("camera_angle_x", i.camera_angle_x), ("camera_angle_y", i.camera_angle_y)] {
         if let Some(angle) = angle.filter(|angle| !(*angle > 0.0 && *angle < std::f64::consts::PI)) {
@@ -106,8 +102,7 @@ fn camera(path: &Path, place: &str, i: &Intrinsics, (width, height): (u32, u32))
             return Err(Error::data(path, place, problem));
         }
     };
-    let (cx, cy) = (i.cx.unwrap_or(w / 2.0), i.cy.unwrap_or(h / 2.0));
-    Ok(Camera { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height })
+    Ok(Camera::at_origin([fx, fy, i.cx.unwrap_or(w / 2.0), i.cy.unwrap_or(h / 2.0)], size))
 }
 
 /// Converts the rows of a 3x4 or 4x4 matrix.

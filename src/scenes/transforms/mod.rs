@@ -12,7 +12,6 @@ use super::listing::{Listed, Listing};
 use super::pose_convention::Native;
 use super::split::Split;
 use file::{Frame, Transforms};
-use labelgs_scene::words::counted;
 use labelgs_scene::{Error, Result};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -95,20 +94,14 @@ fn read_frames(
         return Err(refused.swap_remove(0));
     }
     listing.bad.append(&mut refused);
-    if repeated > 0 {
-        let what = counted(repeated, "frame");
-        listing.notes.push(format!("{what} of {} list a photo a second time and are skipped", path.display()));
-    }
     let bad = frames.iter().filter(|frame| frame.is_bad == Some(true)).count();
-    if bad > 0 {
-        listing.notes.push(format!("{} marked \"is_bad\" are left out", counted(bad, "frame")));
-    }
     let transposed = frames.iter().filter(|frame| frame::is_transposed(&frame.transform_matrix)).count();
-    if transposed > 0 {
-        let what = counted(transposed, "frame");
-        let file = path.display();
-        listing.notes.push(format!("{what} of {file} with the position in the last row of the matrix: transposed"));
-    }
+    let counts = [
+        (repeated, "that list a photo a second time are skipped"),
+        (bad, "marked \"is_bad\" are left out"),
+        (transposed, "with the position in the last row of the matrix: transposed"),
+    ];
+    listing.note_counts(path, "frame", &counts);
     Ok(frames)
 }
 

@@ -3,7 +3,7 @@
 use super::file::Transforms;
 use super::frame::affine;
 use crate::listed_path::Place;
-use crate::listing::{FAR, Listed};
+use crate::listing::{DISTANCE_MAX, Listed};
 use crate::points;
 use labelgs_scene::{Camera, Error, Point, Result};
 use std::path::Path;
@@ -53,8 +53,8 @@ fn in_the_frame_of(
     };
     let moved = points.iter().map(|p| Point { position: matrix.transform_point3(p.position), ..*p });
     let moved: Vec<Point> = moved.collect();
-    if !moved.iter().all(|point| point.position.abs().max_element() <= FAR) {
-        let problem = format!("moves points beyond {FAR:e}; expected a rotation and a moderate scale");
+    if !moved.iter().all(|point| point.position.abs().max_element() <= DISTANCE_MAX) {
+        let problem = format!("moves points beyond {DISTANCE_MAX:e}; expected a rotation and a moderate scale");
         return Err(Error::data(path, "applied_transform", problem));
     }
     if seen(views, &moved) as f64 > 1.2 * seen(views, &points) as f64 {

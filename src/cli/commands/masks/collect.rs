@@ -2,7 +2,8 @@
 
 use super::{files_of_photos, write_mask};
 use crate::cli::support::{Context, ReadArgs};
-use crate::masks::mask::{mask_size_fits, read_mask};
+use crate::files::resize::same_aspect;
+use crate::masks::mask::read_mask;
 use crate::scene::LabelMap;
 use crate::scenes::frames::{Frame, Frames};
 use crate::scenes::window::{Window, ids_of_photo, windows};
@@ -95,7 +96,7 @@ fn windows_of(args: &CollectArgs, video: &Frames) -> Result<BTreeMap<String, Win
 fn ids_of(source: &Path, frame: &Frame) -> Result<LabelMap> {
     let ids = read_mask(source)?;
     let (found, expected) = ((ids.width, ids.height), (frame.camera.width, frame.camera.height));
-    if !mask_size_fits(found, expected) {
+    if !same_aspect(found, expected) {
         let problem = format!(
             "has {} x {} px and its frame {} x {} px, which is another shape; track the frames in their own size",
             found.0, found.1, expected.0, expected.1
