@@ -39,8 +39,7 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
         note_missing(root, ignore, &names, "picture of what to ignore", &mut notes)?;
     }
     let recipe = |view: &Listed| {
-        let of =
-            |files: &Option<PhotoFiles>| files.as_ref().and_then(|files| files.find(&view.name)).map(Path::to_owned);
+        let of = |files: &Option<PhotoFiles>| files.as_ref()?.find(&view.name).map(Path::to_owned);
         Arc::new(Recipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], options))
     };
     let recipes: Vec<Arc<Recipe>> = views.iter().map(recipe).collect();

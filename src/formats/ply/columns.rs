@@ -58,6 +58,9 @@ pub(super) struct Columns {
     notes: Vec<String>,
 }
 
+/// What becomes of discs.
+const FLAT: &str = "the third axis is 1e-6 thick, and discs are drawn as such Gaussians";
+
 impl Columns {
     /// Finds them in a header.
     pub(super) fn of(path: &Path, table: &Table) -> Result<Self> {
@@ -104,8 +107,8 @@ impl Columns {
         let (confidence, state) = (place("label_confidence", label.is_some()), place("state", label.is_none()));
         let missing: Vec<&str> = wanted.iter().map(String::as_str).filter(|name| !has(name)).collect();
         if !missing.is_empty() {
-            let cure = "export it from its trainer as a 3DGS PLY";
-            return bad(format!("`vertex` lacks the properties {}; {cure}", missing.join(" ")));
+            let lacks = missing.join(" ");
+            return bad(format!("`vertex` lacks the properties {lacks}; export it from its trainer as a 3DGS PLY"));
         }
         let mut notes = Vec::new();
         if filter.is_some() {
@@ -114,8 +117,7 @@ impl Columns {
             ));
         }
         if flat {
-            let thin = "the third axis is 1e-6 thick, and discs are drawn as such Gaussians";
-            notes.push(format!("has no `scale_2`, as 2DGS: {thin}"));
+            notes.push(format!("has no `scale_2`, as 2DGS: {FLAT}"));
         }
         if stored > kept {
             notes.push("harmonics of degree 4 were left out; labelgs has 3 degrees".into());

@@ -47,7 +47,7 @@ impl StoredModel {
         };
         let has_places = table.stored_rows(&columns.names())?.is_some();
         let (path, sh_degree, has_labels) = (path.to_owned(), columns.sh_degree, columns.have_labels());
-        Ok(has_places.then(|| Self { path, columns, count, sh_degree, has_labels, origin, notes, antialiased }))
+        Ok(has_places.then_some(Self { path, columns, count, sh_degree, has_labels, origin, notes, antialiased }))
     }
 
     /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.
