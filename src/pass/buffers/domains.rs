@@ -150,7 +150,7 @@ mod tests {
         for (domain, expected) in [(Domain::GAUSSIANS, 7), (Domain::LAYER_TILES, 5), (Domain::SHARED_ROWS, 3)] {
             assert!(matches!(domain.count, Count::At(place) if counts[place] == expected), "{domain:?} in {counts:?}");
         }
-        assert!(Domain::SHARED_ROWS.is_optional && !Domain::GAUSSIANS.is_optional);
+        const { assert!(Domain::SHARED_ROWS.is_optional && !Domain::GAUSSIANS.is_optional) };
         assert_eq!((Domain::LAYERS.cure)(5), "at most 5 layers fit; lower `label_samples` or use another device");
     }
 }

@@ -65,7 +65,7 @@ pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
         fixture.engine.raw_mut().upload(Buf::SCALES, 0, 0, &before)?;
         fixture.input.update = true;
         fixture.config.antialias = true;
-        fixture.engine.set_extension(BudgetStrategy::default().extension(), SMOOTH);
+        fixture.engine.set_extension(BudgetStrategy.extension(), SMOOTH);
         fixture.train_with(passes)?;
         let after = fixture.get::<[f32; 4]>(Buf::SCALES, before.len())?;
         Ok((fixture.rows(PARAMETERS, before.len())?, before, after, fixture.scene.camera))

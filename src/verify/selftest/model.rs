@@ -231,7 +231,7 @@ pub fn fog(fixture: &mut Fixture) -> Result<Judge> {
     fixture.view.near = NEAR;
     fixture.free_space = Some((other, OTHER_NEAR));
     fixture.input.update = true;
-    fixture.engine.set_extension(BudgetStrategy::default().extension(), FREE_SPACE);
+    fixture.engine.set_extension(BudgetStrategy.extension(), FREE_SPACE);
     fixture.train_with(FREE_SPACE)?;
     let count = fixture.scene.gaussians.len();
     let (stats, rows) = (fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?, fixture.rows(PARAMETERS, count)?);
