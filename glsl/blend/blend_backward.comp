@@ -5,6 +5,7 @@
 #include "dispatch.glsl"
 #include "record.glsl"
 #include "blend_tile.glsl"
+#include "transposed_sums.glsl"
 // blend_backward — walk one tile of one layer back to front; write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
@@ -156,9 +157,8 @@ void main() {
         TileSplat mine = TileSplat(r0.x - corner.x, r0.y - corner.y, r0.z, r0.w, r1.x, r1.y, vec3(r1.zw, r2.x), 0.0);
 #ifdef CHANNEL
         uint carried = channel_of_splat(index, r2.y);
-        float ol = 0.0;
 #endif
-        float o0 = 0.0, ox = 0.0, oy = 0.0, oxx = 0.0, oxy = 0.0, oyy = 0.0, or_ = 0.0, og = 0.0, ob = 0.0;
+        float sums[SUMS] = float[SUMS](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (uint back = count; back > 0u; back--) {
             uint j = back - 1u;
             TileSplat s = broadcast(mine, j);
@@ -197,23 +197,14 @@ void main() {
 #endif
             }
             float my = m1 + qy0 * m0, myy = m2 + qy0 * (2.0 * m1 + qy0 * m0);
-            vec3 low = subgroup_sum(vec3(m0, m0 * qx, my)), high = subgroup_sum(vec3(m0 * qx * qx, my * qx, myy));
-            vec3 colour = subgroup_sum(vec3(vr, vg, vb));
-            bool me = lane == j;
-            o0 = me ? low.x : o0;
-            ox = me ? low.y : ox;
-            oy = me ? low.z : oy;
-            oxx = me ? high.x : oxx;
-            oxy = me ? high.y : oxy;
-            oyy = me ? high.z : oyy;
-            or_ = me ? colour.x : or_;
-            og = me ? colour.y : og;
-            ob = me ? colour.z : ob;
-#ifdef CHANNEL
-            float of_channel = subgroup_sum(ml);
-            ol = me ? of_channel : ol;
+            // Values 0 to 9: six moments, the colour, the channel.
+#ifndef CHANNEL
+            float ml = vb;
 #endif
+            add_transposed(vec3(m0, my, my * qx), vec3(m0 * qx, m0 * qx * qx, myy), vec2(vr, vb), vec2(vg, ml), j, sums);
         }
+        return_sums(sums);
+        float o0 = sums[0], ox = sums[1], oy = sums[2], oxx = sums[3], oxy = sums[4], oyy = sums[5];
         // convert moments about the tile's centre to gradients of the lane's own splat
         vec2 d = vec2(mine.x, mine.y) - centre;
         vec3 conic = conic_from_exponent(vec3(mine.a, mine.b, mine.c));
@@ -224,10 +215,10 @@ void main() {
         if (lane < count) {
             v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
 #ifdef CHANNEL
-            o0 += ol; // not in the moments above: shapes and places follow the photo
+            o0 += sums[9]; // not in the moments above: shapes and places follow the photo
 #endif
-            v_instances_b[instance] = vec4(-0.5 * Syy, o0, or_, og);
-            v_instances_c[instance] = vec4(ob, uintBitsToFloat(u.stamp), 0.0, 0.0);
+            v_instances_b[instance] = vec4(-0.5 * Syy, o0, sums[6], sums[7]);
+            v_instances_c[instance] = vec4(sums[8], uintBitsToFloat(u.stamp), 0.0, 0.0);
         }
     }
 #ifdef SEGMENTED

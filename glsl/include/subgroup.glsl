@@ -33,6 +33,10 @@ float subgroup_shuffle(float v, uint lane) {
     return uintBitsToFloat(subgroup_shuffle(floatBitsToUint(v), lane));
 }
 
+vec2 subgroup_shuffle(vec2 v, uint lane) {
+    return uintBitsToFloat(subgroup_shuffle(uvec3(floatBitsToUint(v), 0u), lane)).xy;
+}
+
 vec3 subgroup_shuffle(vec3 v, uint lane) {
     return uintBitsToFloat(subgroup_shuffle(floatBitsToUint(v), lane));
 }
