@@ -113,7 +113,7 @@ fn segments_change_no_bit() {
         let model = trainer.model().expect("model");
         (model, trainer.engine_mut().capacity().segments)
     };
-    let ((whole, one), (parts, many)) = (run(40_960), run(16));
+    let ((whole, one), (parts, many)) = (run(40_960), run(64));
     assert!(one == 1 && many > 2, "{one} and {many} segments");
     assert_eq!(whole, parts);
 }
@@ -123,7 +123,7 @@ fn segments_change_no_bit() {
 fn segments_of_narrow_pictures_fit_their_buffer() {
     for (width, height) in [(3, 200), (1, 150), (200, 3)] {
         let Some(turn) = device() else { return };
-        let shape = KernelShape { segment_length: 16, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { segment_length: 64, ..KernelShape::of(turn.capabilities()) };
         let made = scene(61, &Shape { gaussians: 400, width, height, scales: (0.3, 1.5), ..Shape::default() });
         // Guards behind the buffers are checked after each run.
         let mut fixture = Fixture::with_options(turn, made, true, shape, readable());
