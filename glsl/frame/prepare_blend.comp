@@ -10,8 +10,6 @@
 // Mirror:  none (bookkeeping; tests/train/overflow.rs)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
-layout(constant_id = 4) const uint LONGEST_LIST = 65536; // longest list that the recorded segments can walk
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
 INOUT(2, uint, dispatch_args);
@@ -19,8 +17,8 @@ INOUT1(3, uint, failure);
 
 void main() {
     uint layers = counters.layer_tile_count;
-    uint failed = (layers > LAYER_TILE_CAPACITY ? FAILED_LAYER_TILES : 0u)
-        | (counters.longest_list > LONGEST_LIST ? FAILED_SEGMENTS : 0u);
+    uint failed = (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
+        | (counters.longest_list > step.longest_list ? FAILED_SEGMENTS : 0u);
     failure |= failed;
     uvec3 groups = folded_groups(failed != 0u ? 0u : step.tile_count + layers);
     dispatch_args[ARGS_BLEND] = groups.x;

@@ -9,8 +9,6 @@ layout(local_size_x_id = 0) in;
 // lavapipe ends all loops of an invocation after 65,535 rounds in total. Several dispatches (SEGMENTED) walk a list
 // longer than a segment, and pass on the state of the pixels through memory.
 #ifdef SEGMENTED
-layout(constant_id = 12) const uint SEGMENT = 0;
-layout(constant_id = 13) const uint SEGMENTS = 1;
 layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
 #endif
 

@@ -1,7 +1,5 @@
 // Number of items of a kernel; its source is fixed per recording.
 
-layout(constant_id = 5) const uint COUNT_SOURCE = 0;
-
 const uint COUNT_GAUSSIANS = 0u;
 const uint COUNT_SPLATS = 1u;
 const uint COUNT_INSTANCES = 2u;

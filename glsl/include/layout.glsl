@@ -15,6 +15,7 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
+#extension GL_KHR_shader_subgroup_ballot : require
 
 #define STORAGE(number, access) layout(scalar, set = 0, binding = number) access buffer
 
@@ -25,6 +26,24 @@
 #define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }
 #define WRITE1(number, T, name) STORAGE(number, writeonly) name##_block { T name; }
 #define INOUT1(number, T, name) STORAGE(number, ) name##_block { T name; }
+
+// Words of a pass that all its invocations share: passes that differ in them alone are compiled once. On the Rust side they are
+// like specialisation constants.
+layout(push_constant, scalar) uniform PassWords {
+    uint COUNT_SOURCE; // what the items are (count.glsl)
+    uint LANES;        // of a sort or scan over all workgroups
+    uint SHIFT;        // of a digit
+    uint TOTAL;        // counter of a scan: 0 visible, 1 instances, 2 layer tiles, 3 densified
+    uint CELLS;        // totals of a sort
+    uint SEGMENT;      // of long lists (blend_tile.glsl),
+    uint SEGMENTS;     // and their number
+    uint WALK;         // walk of a tile for its labels,
+    uint WALKS;        // and their number
+    uint SWEEP_SLOT;   // the pass among those of a step that look back (sweep.glsl)
+    uint SWEEP_HELD;   // for tests: 1 + the partition that tells nothing
+    uint SORT_SLOT;    // first pass of the sort of the keys that are written
+    uint PARTIALS;     // sums of the loss
+};
 
 #ifdef TEXEL
 #define FETCH4(number, name) layout(set = 0, binding = number) uniform textureBuffer name

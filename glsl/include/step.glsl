@@ -40,6 +40,9 @@ struct StepUniforms {
     float noise;            // factor of random moves, 1 / world unit
     uint seed;
     uint vote_columns;      // labels that a sweep counts at once
+    uint instance_capacity; // (splat, tile) pairs,
+    uint layer_tile_capacity; // tiles of object layers,
+    uint longest_list;      // and splats of a tile that fit
     float finest;           // least deviation of a Gaussian at depth 1 of this view (smooth)
 };
 

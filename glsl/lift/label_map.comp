@@ -7,7 +7,7 @@
 // label_map — the label with the largest sum of blending weights in each pixel; 0, no label, is one of them.
 // Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk sums four labels of a
 //          tile, in order of appearance, and the rest together. Where the rest could still win in a pixel, the next
-//          walk (specialisation constant ROUND) sums the next four labels that such pixels see.
+//          walk (WALK) sums the next four labels that such pixels see.
 // Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3];
 //          gaussian_from_splat [V]; labels [N]
 // Writes:  label_map [P] label, with LABEL_OPEN where the rest could win; label_weights [P] its sum;
@@ -17,8 +17,7 @@
 //          is no smaller than that of any label in it: a decided pixel has the label of one walk with all labels.
 // Mirror:  src/verify/reference/lift.rs::label_map
 
-layout(constant_id = 15) const uint ROUND = 0;
-layout(constant_id = 16) const uint ROUNDS = 1;
+layout(constant_id = 15) const uint LATER = 0; // 1: not the first walk
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
 FETCHU(2, tile_starts);
@@ -55,7 +54,7 @@ void main() {
     uint opens = 0u;
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         open[k] = t.x < u.width && t.y0 + k < u.height;
-        if (ROUND > 0u && open[k]) {
+        if (LATER != 0u && open[k]) {
             open[k] = (label_map[(t.y0 + k) * u.width + t.x] & LABEL_OPEN) != 0u;
         }
         opens |= open[k] ? 1u : 0u;
@@ -63,13 +62,13 @@ void main() {
         sum[k] = vec4(0.0);
         rest[k] = 0.0;
     }
-    if (ROUND > 0u && subgroup_max(opens) == 0u) {
+    if (LATER != 0u && subgroup_max(opens) == 0u) {
         return;
     }
     uvec4 table = uvec4(FREE), earlier[LABEL_ROUNDS];
     [[unroll]] for (uint r = 0u; r < LABEL_ROUNDS; r++) {
         earlier[r] = uvec4(FREE);
-        if (r < ROUND) {
+        if (LATER != 0u && r < WALK) {
             earlier[r] = label_tables[tile * LABEL_ROUNDS + r];
         }
     }
@@ -80,7 +79,7 @@ void main() {
     uint end = min(begin + SEGMENT_LENGTH, list_end);
     uint kept = tile * (TILE_WIDTH * TILE_HEIGHT) + lane;
     if (SEGMENT > 0u) {
-        table = label_tables[tile * LABEL_ROUNDS + ROUND];
+        table = label_tables[tile * LABEL_ROUNDS + WALK];
         [[unroll]] for (uint k = 0u; k < ROWS; k++) {
             sum[k] = segment_colours[kept + k * SUBGROUP_SIZE];
             uvec4 more = segment_rest[kept + k * SUBGROUP_SIZE];
@@ -104,8 +103,8 @@ void main() {
         uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, min(base + lane, end - 1u)));
         vec4 r0 = fetch4(splats, 3u * index), r1 = fetch4(splats, 3u * index + 1u);
         uint own = fetchu(labels, fetchu(gaussian_from_splat, index)) & LABEL_MASK;
-        [[unroll]] for (uint r = 0u; r < LABEL_ROUNDS; r++) {
-            if (r < ROUND) {
+        if (LATER != 0u) {
+            [[unroll]] for (uint r = 0u; r < LABEL_ROUNDS; r++) {
                 own = any(equal(uvec4(own), earlier[r])) ? SUMMED : own;
             }
         }
@@ -150,7 +149,7 @@ void main() {
         }
     }
     if (lane == 0u) {
-        label_tables[tile * LABEL_ROUNDS + ROUND] = table;
+        label_tables[tile * LABEL_ROUNDS + WALK] = table;
     }
 #ifdef SEGMENTED
     if (SEGMENT + 1u < SEGMENTS) {
@@ -166,8 +165,8 @@ void main() {
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         if (open[k]) {
             uint p = (t.y0 + k) * u.width + t.x;
-            uint label = ROUND > 0u ? label_map[p] & LABEL_MASK : 0u;
-            float best = ROUND > 0u ? label_weights[p] : 0.0;
+            uint label = LATER != 0u ? label_map[p] & LABEL_MASK : 0u;
+            float best = LATER != 0u ? label_weights[p] : 0.0;
             [[unroll]] for (uint q = 0u; q < 4u; q++) {
                 bool wins = sum[k][q] > best || (sum[k][q] == best && best > 0.0 && table[q] < label);
                 label = wins ? table[q] : label;
@@ -180,7 +179,7 @@ void main() {
             undecided |= more ? 1u : 0u;
         }
     }
-    if (ROUND + 1u == ROUNDS && subgroup_max(undecided) != 0u && lane == 0u) {
+    if (WALK + 1u == WALKS && subgroup_max(undecided) != 0u && lane == 0u) {
         atomicAdd(counters.undecided_tiles, 1u);
     }
 }

@@ -6,7 +6,7 @@
 #include "blend_tile.glsl"
 // vote — sum, for each Gaussian and each label, the blending weights of the Gaussian in the pixels of that label.
 // Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk counts four labels
-//          of the tile; tiles with more labels are walked again (specialisation constant ROUND).
+//          of the tile; tiles with more labels are walked again (WALK).
 // Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
 //          view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes; vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits, VOTE_ONE for a pixel of weight 1, times the column's weight
@@ -15,7 +15,6 @@
 // Order:   a tile's sum has a fixed order and is rounded once; the order of integer sums does not matter.
 // Mirror:  src/verify/reference/lift.rs::vote
 
-layout(constant_id = 15) const uint ROUND = 0;
 layout(constant_id = 16) const uint ALONE = 0; // 1: each Gaussian as if nothing were in front of it
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);
@@ -61,7 +60,7 @@ void main() {
         own[k] = inside ? fetchu(view_labels, (t.y0 + k) * u.width + t.x) : VOTE_NONE;
     }
     uint from = 0u;
-    for (uint skipped = 0u; skipped < ROUND * LABELS_PER_WALK && from != VOTE_NONE; skipped++) {
+    for (uint skipped = 0u; skipped < WALK * LABELS_PER_WALK && from != VOTE_NONE; skipped++) {
         uint found = next_label(own, from);
         from = found == VOTE_NONE ? VOTE_NONE : found + 1u;
     }

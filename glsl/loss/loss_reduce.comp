@@ -4,23 +4,23 @@
 #include "step.glsl"
 // loss_reduce — sum the loss partials of the photo and (variant labels) of the object layers.
 // Work:    one workgroup of one subgroup; lane i sums every W-th value, then a butterfly.
-// Reads:   loss_partials [PARTIALS]; variant labels: layer_loss [counters.layer_tile_count];
+// Reads:   loss_partials [PARTIALS]; variant labels: step; layer_loss [counters.layer_tile_count];
 //          variant disagreement: step; disagreement [T]
 // Writes:  counters.loss_l1, loss_ssim, loss_label
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/verify/reference/loss.rs::photo_loss
 
 #include "subgroup.glsl"
-layout(constant_id = 6) const uint PARTIALS = 1;
 layout(local_size_x_id = 0) in;
 READ(0, vec2, loss_partials);
 INOUT1(1, Counters, counters);
+#if defined(LABELS) || defined(DISAGREEMENT)
+READ1(2, StepUniforms, step);
+#endif
 #ifdef LABELS
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
-READ(2, float, layer_loss);
+READ(3, float, layer_loss);
 #endif
 #ifdef DISAGREEMENT
-READ1(2, StepUniforms, step);
 READ(3, float, disagreement);
 #endif
 
@@ -33,7 +33,7 @@ void main() {
     float l1 = subgroup_sum(sum.x), ssim = subgroup_sum(sum.y), label = 0.0;
 #ifdef LABELS
     // If there are more layer tiles than capacity, the step has failed and its loss is unused.
-    uint count = min(counters.layer_tile_count, LAYER_TILE_CAPACITY);
+    uint count = min(counters.layer_tile_count, step.layer_tile_capacity);
     for (uint i = lane; i < count; i += SUBGROUP_SIZE) {
         label += layer_loss[i];
     }

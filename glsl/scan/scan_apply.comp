@@ -12,7 +12,6 @@
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 6) const uint LANES = 64;
 layout(local_size_x_id = 0) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);

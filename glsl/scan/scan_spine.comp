@@ -11,8 +11,6 @@
 // Mirror:  src/verify/reference/scan.rs::exclusive_scan
 
 #include "subgroup.glsl"
-layout(constant_id = 6) const uint LANES = 64;
-layout(constant_id = 7) const uint TOTAL = 0; // 0 visible, 1 instances, 2 layer tiles, 3 densified
 layout(local_size_x_id = 0) in;
 INOUT(0, uint, partials);
 INOUT1(1, Counters, counters);

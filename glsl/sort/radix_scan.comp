@@ -9,7 +9,6 @@
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 #include "subgroup.glsl"
-layout(constant_id = 6) const uint CELLS = 1024;
 layout(local_size_x_id = 0) in;
 INOUT(0, uint, totals);
 

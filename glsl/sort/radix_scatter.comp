@@ -12,8 +12,6 @@
 // Mirror:  src/verify/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
-layout(constant_id = 6) const uint LANES = 32;
-layout(constant_id = 8) const uint SHIFT = 0;
 layout(constant_id = 9) const uint DIGIT_BITS = 8;
 layout(constant_id = 10) const uint IDENTITY = 0;
 layout(local_size_x_id = 0) in;

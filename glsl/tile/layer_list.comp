@@ -10,7 +10,6 @@
 // Mirror:  src/verify/reference/scan.rs::compact
 
 layout(local_size_x = 64) in;
-layout(constant_id = 3) const uint LAYER_TILE_CAPACITY = 65536;
 READ1(0, StepUniforms, step);
 READ1(1, uint, failure);
 FETCHU(2, layer_occupied);
@@ -21,7 +20,7 @@ void main() {
     uint t = linear_group_id() * 64u + gl_LocalInvocationID.x;
     if (t < step.tile_count * (step.layer_count + 1u) && failure == 0u && fetchu(layer_occupied, t) != 0u) {
         uint to = fetchu(layer_offsets, t);
-        if (to < LAYER_TILE_CAPACITY) {
+        if (to < step.layer_tile_capacity) {
             layer_tiles[to] = t;
         }
     }

@@ -103,9 +103,19 @@ impl Engine {
             self.write_shared(frame, &train.shared)?;
         }
         let (gaussian_count, trained_count) = (self.gaussian_count, self.trained_count());
+        let word = |room: u64| u32::try_from(room).unwrap_or(u32::MAX);
+        // Uniforms of a step may be older than a densification after it. Capacities are here and not in the kernels, so that
+        // growth compiles nothing.
+        let counts = StepUniforms {
+            gaussian_count,
+            trained_count,
+            instance_capacity: word(self.capacity.instances),
+            layer_tile_capacity: word(self.capacity.layer_tiles),
+            longest_list: word(self.capacity.segments.max(1) * u64::from(self.shape.segment_length)),
+            stamp: self.stamp,
+            ..*uniforms
+        };
         let sched = &mut self.sched;
-        // Uniforms of a step may be older than a densification after it.
-        let counts = StepUniforms { gaussian_count, trained_count, stamp: self.stamp, ..*uniforms };
         sched.upload(Buf::STEP, frame, 0, &[counts])?;
         match input {
             Input::Uniforms(_) => Ok(()),

@@ -3,7 +3,7 @@
 use super::call::vk_call;
 use super::{Gpu, lock};
 use crate::error::{Error, Result};
-use crate::shaders::{BindingDesc, BindingKind, ShaderDesc};
+use crate::shaders::{BindingDesc, BindingKind, PUSHED_WORDS, ShaderDesc};
 use ash::vk;
 use std::sync::Arc;
 
@@ -13,6 +13,7 @@ pub(crate) struct PipelineKey {
     name: &'static str,
     /// Address of the SPIR-V: tests may have two shaders with the same name.
     spirv: usize,
+    /// Values of the specialisation constants.
     spec: Vec<u32>,
     subgroup_size: Option<u32>,
 }
@@ -27,10 +28,11 @@ pub(crate) struct Pipeline {
 }
 
 impl Gpu {
-    /// Returns the pipeline of a shader; creates it on first use. `spec` is empty for the default constants.
+    /// Returns the pipeline of a shader; creates it on first use. `spec` has the constants of a pass and is empty for the
+    /// defaults.
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
-        let spec =
-            if spec.is_empty() { shader.spec.iter().map(|constant| constant.default).collect() } else { spec.to_vec() };
+        let specialised = shader.spec.iter().enumerate().filter(|(_, constant)| !constant.is_pushed);
+        let spec = specialised.map(|(place, constant)| spec.get(place).copied().unwrap_or(constant.default)).collect();
         let subgroup_size = self.pinned(shader, self.subgroup_size());
         let spirv = shader.spirv.as_ptr() as usize;
         let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size };
@@ -132,8 +134,12 @@ impl Pipeline {
         self.set_layout = vk_call("vkCreateDescriptorSetLayout", || unsafe {
             self.device.create_descriptor_set_layout(&info, None)
         })?;
-        let layouts = [self.set_layout];
-        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
+        let (layouts, pushed) = ([self.set_layout], [vk::PushConstantRange {
+            stage_flags: vk::ShaderStageFlags::COMPUTE,
+            offset: 0,
+            size: 4 * PUSHED_WORDS as u32,
+        }]);
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(&pushed);
         // SAFETY: same as above.
         self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;
         Ok(())
@@ -147,7 +153,8 @@ impl Pipeline {
         (size, full): (Option<u32>, bool),
         flags: vk::PipelineCreateFlags,
     ) -> Result<()> {
-        let entries = self.shader.spec.iter().enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
+        let constants = self.shader.spec.iter().filter(|constant| !constant.is_pushed);
+        let entries = constants.enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
             constant_id: constant.id,
             offset: index as u32 * 4,
             size: 4,

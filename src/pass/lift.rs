@@ -27,7 +27,7 @@ pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, labels: Buf::LABELS, label_map: Buf::LABEL_MAP,
             label_weights: Buf::LABEL_WEIGHTS, label_tables: Buf::LABEL_TABLES, segment_colours: Buf::SEGMENT_COLOURS,
             segment_rest: Buf::SEGMENT_REST,
-        } [round: round, rounds: rounds, segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        } [later: u32::from(round > 0), walk: round, walks: rounds, segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }
 }
 
@@ -41,6 +41,6 @@ pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32, alone: bool) {
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, view_labels: Buf::VIEW_LABELS, vote_weights: Buf::VOTE_WEIGHTS,
             votes_low: Buf::VOTES_LOW, votes_high: Buf::VOTES_HIGH, segment_colours: Buf::SEGMENT_COLOURS,
-        } [round: round, alone: alone.into(), segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        } [walk: round, alone: alone.into(), segment: segment], args(constants::ARGS_BLEND));
     }
 }

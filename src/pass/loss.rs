@@ -66,11 +66,10 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
 }
 
 fn reduce(b: &mut Builder, partials: u32) {
-    let layer_tiles = b.capacity.layer_tiles as u32;
     pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
         disagreement: Buf::DISAGREEMENT,
-    } [layer_tile_capacity: layer_tiles, partials: partials], ONE);
+    } [partials: partials], ONE);
 }
 
 /// Number of partial loss sums of an image: one for each subgroup of each strip.

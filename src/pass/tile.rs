@@ -11,11 +11,10 @@ use crate::shaders::constants;
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer with
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
-    let instances = b.capacity.instances as u32;
     b.list.stage = Stage::TILE;
     pass!(b, prepare_instances {
-        counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-    } [instance_capacity: instances], ONE);
+        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
+    } [], ONE);
     pass!(b, emit_instances(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
@@ -27,11 +26,9 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
-    let layer_tiles = b.capacity.layer_tiles as u32;
-    let longest = b.shape.segment_length * b.capacity.segments as u32;
     pass!(b, prepare_blend {
         step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-    } [layer_tile_capacity: layer_tiles, longest_list: longest], ONE);
+    } [], ONE);
     pairs
 }
 
@@ -45,9 +42,8 @@ fn tile_ranges(b: &mut Builder, keys: Buf) {
         return;
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
-    let layer_tiles = b.capacity.layer_tiles as u32;
     pass!(b, layer_list {
         step: Buf::STEP, failure: Buf::FAILURE, layer_occupied: Buf::LAYER_OCCUPIED,
         layer_offsets: Buf::LAYER_OFFSETS, layer_tiles: Buf::LAYER_TILES,
-    } [layer_tile_capacity: layer_tiles], groups);
+    } [], groups);
 }

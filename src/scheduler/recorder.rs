@@ -7,6 +7,7 @@
 #![expect(clippy::disallowed_methods, reason = "the place that records dispatches and barriers")]
 
 use crate::error::{Error, Result};
+use crate::shaders::PUSHED_WORDS;
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Pipeline, QueryPool, vk_call};
 use crate::scheduler::plan::{Use, Uses};
 use ash::vk;
@@ -102,8 +103,14 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Runs a shader.
-    pub(super) fn dispatch(&self, pipeline: &Pipeline, set: vk::DescriptorSet, groups: &Groups<'_>) -> Result<()> {
+    /// Runs a shader with pushed words.
+    pub(super) fn dispatch(
+        &self,
+        pipeline: &Pipeline,
+        set: vk::DescriptorSet,
+        pushed: &[u32; PUSHED_WORDS],
+        groups: &Groups<'_>,
+    ) -> Result<()> {
         let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits().plan);
         match groups {
             Groups::Count(count) if count.iter().zip(&limits.max_groups).any(|(count, limit)| count > limit) => {
@@ -120,6 +127,8 @@ impl<'a> Recorder<'a> {
         unsafe {
             raw.cmd_bind_pipeline(command, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             raw.cmd_bind_descriptor_sets(command, vk::PipelineBindPoint::COMPUTE, pipeline.layout(), 0, &[set], &[]);
+            let words = bytemuck::cast_slice(pushed);
+            raw.cmd_push_constants(command, pipeline.layout(), vk::ShaderStageFlags::COMPUTE, 0, words);
             match groups {
                 Groups::Count([x, y, z]) => raw.cmd_dispatch(command, *x, *y, *z),
                 Groups::Indirect(buffer, offset) => raw.cmd_dispatch_indirect(command, buffer.raw(), *offset),

@@ -7,7 +7,7 @@ use super::storage::Storage;
 use crate::error::{Error, Result};
 use crate::gpu::{Binding, BufferView, CommandBuffer, DescriptorPool, Gpu, Markers, QueryPool};
 use crate::scheduler::plan::{Buf, Class, Grid, PassDecl, Plan, TexelFormat, Uses, Work};
-use crate::shaders::BindingKind;
+use crate::shaders::{BindingKind, PUSHED_WORDS};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -125,7 +125,11 @@ impl Writer<'_> {
                 Groups::Indirect(buffer, offset + u64::from(inner))
             }
         };
-        self.recorder.dispatch(&pipeline, set, &groups)
+        let mut pushed = [0; PUSHED_WORDS];
+        for (constant, &word) in pass.shader.spec.iter().zip(&pass.spec).filter(|(constant, _)| constant.is_pushed) {
+            pushed[constant.id as usize] = word;
+        }
+        self.recorder.dispatch(&pipeline, set, &pushed, &groups)
     }
 }
 

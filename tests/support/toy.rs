@@ -40,7 +40,7 @@ pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access,
 
 /// Adds specialisation constants (name, id, default), and leaks the description.
 pub fn finish(mut shader: ShaderDesc, spec: &[(&'static str, u32, u32)]) -> &'static ShaderDesc {
-    let spec = spec.iter().map(|&(name, id, default)| SpecDesc { name, id, default });
+    let spec = spec.iter().map(|&(name, id, default)| SpecDesc { name, id, is_pushed: false, default });
     shader.spec = Box::leak(spec.collect::<Vec<_>>().into_boxed_slice());
     Box::leak(Box::new(shader))
 }

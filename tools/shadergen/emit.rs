@@ -182,8 +182,8 @@ fn emit_spec(out: &mut String, siblings: &[&Shader]) {
     }
     let fields: Vec<Named> = constants
         .iter()
-        .map(|SpecConstant { name, id, rust, .. }| {
-            let doc = format!("`{name}`, constant_id {id}.");
+        .map(|SpecConstant { name, id, is_pushed, rust, .. }| {
+            let doc = format!("`{name}`, {} {id}.", if *is_pushed { "pushed word" } else { "constant_id" });
             Named { doc, glsl: name.clone(), field: name.to_lowercase(), rust }
         })
         .collect();
@@ -221,8 +221,11 @@ fn emit_variant(out: &mut String, shader: &Shader, variant: &Variant) {
         );
     }
     put!(out, "        ],\n        spec: &[");
-    for SpecConstant { name, id, default, .. } in &interface.spec {
-        put!(out, "            super::SpecDesc {{ name: {name:?}, id: {id}, default: {default} }},");
+    for SpecConstant { name, id, is_pushed, default, .. } in &interface.spec {
+        put!(
+            out,
+            "            super::SpecDesc {{ name: {name:?}, id: {id}, is_pushed: {is_pushed}, default: {default} }},"
+        );
     }
     put!(out, "        ],");
     let local_size = interface.local_size.map_join(|size| format!("super::LocalSize::{size:?}"));

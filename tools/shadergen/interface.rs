@@ -72,13 +72,15 @@ pub struct Struct {
     pub bytes: u32,
 }
 
-/// One specialisation constant.
+/// One constant of a pass: a specialisation constant, or a word that is pushed before the dispatch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SpecConstant {
     /// GLSL name, or `LOCAL_SIZE_X` and so on.
     pub name: String,
-    /// constant_id.
+    /// constant_id, or the index of the pushed word.
     pub id: u32,
+    /// Whether it is pushed.
+    pub is_pushed: bool,
     /// `u32`, `i32`, `f32` or `bool`.
     pub rust: &'static str,
     /// Bits of the default.
@@ -114,7 +116,7 @@ pub struct Problem {
 pub struct Interface {
     /// In the order of binding numbers.
     pub bindings: Vec<Binding>,
-    /// In the order of ids.
+    /// Specialisation constants in the order of ids, then pushed words that are used.
     pub spec: Vec<SpecConstant>,
     /// Struct types used in blocks, by name.
     pub structs: BTreeMap<String, Struct>,

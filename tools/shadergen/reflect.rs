@@ -19,6 +19,7 @@ pub fn interface(module: &Module) -> Interface {
     let mut reflector = Reflector::new(module);
     reflector.bindings();
     reflector.spec_constants();
+    reflector.pushed_words();
     reflector.interface.local_size = reflector.local_size();
     reflector.interface.uses_subgroups = module.capabilities.iter().any(|instruction| {
         matches!(instruction.operands.first(), Some(Operand::Capability(capability))
@@ -107,9 +108,9 @@ impl<'a> Reflector<'a> {
             match class {
                 StorageClass::StorageBuffer => self.storage(id, pointee),
                 StorageClass::UniformConstant => self.texel(id, pointee),
-                StorageClass::Uniform | StorageClass::PushConstant => {
+                StorageClass::Uniform => {
                     let name = self.name(pointee);
-                    let rule = "uniform blocks and push constants are not supported; use a readonly buffer (READ1)";
+                    let rule = "uniform blocks are not supported; use a readonly buffer (READ1)";
                     self.problem(&name, rule);
                 }
                 _ => {}
@@ -251,7 +252,7 @@ impl<'a> Reflector<'a> {
             if name.is_empty() {
                 name = self.local_size_name(id);
             }
-            let entry = SpecConstant { name, id: spec_id, rust, default };
+            let entry = SpecConstant { name, id: spec_id, is_pushed: false, rust, default };
             // `layout(local_size_x_id = 0)` beside a constant of id 0 gives two values; the named one is the constant.
             match found.get(&spec_id) {
                 Some(old) if !old.name.starts_with("LOCAL_SIZE_") => {}
@@ -259,6 +260,31 @@ impl<'a> Reflector<'a> {
             }
         }
         self.interface.spec = found.into_values().collect();
+    }
+
+    /// Members of the block of pushed words that some function reads.
+    fn pushed_words(&mut self) {
+        let module = self.module;
+        let is_pushed = |value: &&Instruction| {
+            value.class.opcode == Op::Variable
+                && matches!(value.operands.first(), Some(Operand::StorageClass(StorageClass::PushConstant)))
+        };
+        let Some(variable) = module.types_global_values.iter().find(is_pushed) else { return };
+        let pointer = variable.result_type.and_then(|pointer| self.values.get(&pointer));
+        let (id, block) = (variable.result_id.unwrap_or(0), pointer.map_or(0, |pointer| word(pointer, 1)));
+        let chains = module.functions.iter().flat_map(|function| function.all_inst_iter());
+        let read: BTreeSet<u32> = chains
+            .filter(|instruction| instruction.class.opcode == Op::AccessChain && word(instruction, 0) == id)
+            .filter_map(|chain| Some(word(self.values.get(&word(chain, 1))?, 0)))
+            .collect();
+        for member in read {
+            let name = self.member_names.get(&(block, member)).copied().unwrap_or("").to_owned();
+            let ty = self.values.get(&block).map(|block| word(block, member as usize));
+            if self.spec_type(ty) != "u32" || self.member_decoration(block, member, Decoration::Offset) != Some(4 * member) {
+                self.problem(&name, format!("`{name}` is pushed; it must be a uint"));
+            }
+            self.interface.spec.push(SpecConstant { name, id: member, is_pushed: true, rust: "u32", default: 0 });
+        }
     }
 
     fn spec_type(&self, ty: Option<Word>) -> &'static str {
