@@ -2,6 +2,7 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
+#include "dispatch.glsl"
 // prepare_instances — detect an overflow of the buffers of (splat, tile) pairs; on overflow, no pairs are written.
 // Work:    one invocation.
 // Reads:   step; counters.instance_count (the need, even beyond capacity)
@@ -9,6 +10,7 @@
 // Mirror:  none (bookkeeping; tests/train/overflow.rs)
 
 layout(local_size_x = 1) in;
+layout(constant_id = 18) const uint SWEEP_ITEMS = 16;
 INOUT1(0, Counters, counters);
 INOUT(1, uint, dispatch_args);
 INOUT1(2, uint, failure);
@@ -20,4 +22,7 @@ void main() {
         failure |= FAILED_INSTANCES;
         dispatch_args[ARGS_SPLATS] = 0u;
     }
+    uvec3 partitions = folded_groups(failure != 0u ? 0u : (needed + SWEEP_LANES * SWEEP_ITEMS - 1u) / (SWEEP_LANES * SWEEP_ITEMS));
+    dispatch_args[ARGS_SWEEP_INSTANCES] = partitions.x;
+    dispatch_args[ARGS_SWEEP_INSTANCES + 1u] = partitions.y;
 }

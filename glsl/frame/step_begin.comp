@@ -10,6 +10,7 @@
 // Mirror:  none (bookkeeping; every later pass fails without it)
 
 layout(local_size_x = 1) in;
+layout(constant_id = 18) const uint SWEEP_ITEMS = 16;
 READ1(0, StepUniforms, step);
 WRITE1(1, Counters, counters);
 WRITE(2, uint, dispatch_args);
@@ -18,6 +19,10 @@ void put(uint at, uvec3 groups) {
     dispatch_args[at] = groups.x;
     dispatch_args[at + 1u] = groups.y;
     dispatch_args[at + 2u] = groups.z;
+}
+
+uint partitions(uint items) {
+    return (items + SWEEP_LANES * SWEEP_ITEMS - 1u) / (SWEEP_LANES * SWEEP_ITEMS);
 }
 
 void main() {
@@ -29,5 +34,9 @@ void main() {
     put(ARGS_SH3, folded_groups((n * 6u + 63u) / 64u));
     put(ARGS_TILES, folded_groups((step.tile_count * (step.layer_count + 1u) + 63u) / 64u));
     put(ARGS_SPLATS, uvec3(0u, 1u, 1u));
+    put(ARGS_SWEEP_GAUSSIANS, folded_groups(partitions(n)));
+    put(ARGS_SWEEP_SPLATS, uvec3(0u, 1u, 1u));
+    put(ARGS_SWEEP_INSTANCES, uvec3(0u, 1u, 1u));
+    put(ARGS_SWEEP_TILES, folded_groups(partitions(step.tile_count * (step.layer_count + 1u))));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
 }

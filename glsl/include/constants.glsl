@@ -53,6 +53,15 @@ const uint VOTE_NONE = 0xffffffffu;         // column of a pixel without votes
 const float VOTE_ONE = 65536.0;              // scale of the fixed-point votes for labels
 const uint KEY_INVISIBLE = 0xffffffffu;
 
+// The buffer `sweep` (sweep.glsl): tickets, then histograms of the sorts, then the words of each partition.
+const uint SWEEP_LANES = 256u;               // invocations of a workgroup
+const uint SWEEP_DIGITS = 256u;              // most values of a digit
+const uint SWEEP_SORTS = 16u;                // most passes of the sorts of a step: slots 0 and up; scans have the slots above
+const uint SWEEP_SCANS = 8u;                 // most scans of a step
+const uint SWEEP_HISTOGRAMS = 32u;           // first word of the histograms, and of the partitions:
+const uint SWEEP_WORDS = SWEEP_HISTOGRAMS + SWEEP_SORTS * SWEEP_DIGITS;
+const uint SWEEP_STRIDE = 2u * SWEEP_DIGITS + SWEEP_SCANS; // words of a partition: two passes of a sort in turn, and the scans
+
 // Factors of the real spherical harmonics (sh.glsl).
 const float SH_C0 = 0.28209479177387814;
 const float SH_C1 = 0.48860251190291992;
@@ -73,3 +82,7 @@ const uint ARGS_SH1 = 9u;
 const uint ARGS_SH2 = 12u;
 const uint ARGS_SH3 = 15u;
 const uint ARGS_TILES = 18u;
+const uint ARGS_SWEEP_GAUSSIANS = 21u;       // partitions of a sweep
+const uint ARGS_SWEEP_SPLATS = 24u;
+const uint ARGS_SWEEP_INSTANCES = 27u;
+const uint ARGS_SWEEP_TILES = 30u;

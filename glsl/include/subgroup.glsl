@@ -7,8 +7,10 @@
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 
+#ifndef EXCHANGE_LANES
+#define EXCHANGE_LANES 64u // the largest workgroup with subgroup operations
+#endif
 #ifdef EMULATED
-const uint EXCHANGE_LANES = 64u; // the largest workgroup with subgroup operations
 // Exchanges use the two halves in turn. One barrier each is then enough: no invocation writes to a half again before
 // all have read it, because the exchange between has a barrier too.
 shared uvec3 exchange[2u * EXCHANGE_LANES];
@@ -17,6 +19,13 @@ uint exchange_half = 0u;
 uint subgroup_lane() {
     return gl_LocalInvocationIndex % SUBGROUP_SIZE;
 }
+
+uint subgroup_id() {
+    return gl_LocalInvocationIndex / SUBGROUP_SIZE;
+}
+
+// Makes what the lanes wrote to shared memory visible to their subgroup.
+#define subgroup_fence() barrier()
 
 uvec3 subgroup_shuffle(uvec3 v, uint lane) {
     exchange_half = EXCHANGE_LANES - exchange_half;
@@ -45,7 +54,7 @@ vec3 subgroup_shuffle(vec3 v, uint lane) {
 
 uint subgroup_exclusive_add(uint v) {
     uint sum = v;
-    [[unroll]] for (uint distance = 1u; distance < EXCHANGE_LANES; distance *= 2u) {
+    [[unroll]] for (uint distance = 1u; distance < 64u; distance *= 2u) {
         if (distance < SUBGROUP_SIZE) {
             uint before = subgroup_shuffle(sum, subgroup_lane() - min(distance, subgroup_lane()));
             sum += subgroup_lane() >= distance ? before : 0u;
@@ -54,10 +63,26 @@ uint subgroup_exclusive_add(uint v) {
     return sum - v;
 }
 
+// A bit for each lane.
+uvec2 subgroup_ballot(bool v) {
+    uint lane = subgroup_lane();
+    uvec3 bits = uvec3(v && lane < 32u ? 1u << lane : 0u, v && lane >= 32u ? 1u << (lane - 32u) : 0u, 0u);
+    [[unroll]] for (uint distance = 1u; distance < 64u; distance *= 2u) {
+        if (distance < SUBGROUP_SIZE) {
+            bits |= subgroup_shuffle(bits, lane ^ distance);
+        }
+    }
+    return bits.xy;
+}
+
 bool subgroup_elect() {
     return subgroup_lane() == 0u;
 }
 #else
+#define subgroup_lane() gl_SubgroupInvocationID
+#define subgroup_id() gl_SubgroupID
+#define subgroup_ballot(v) subgroupBallot(v).xy
+#define subgroup_fence() subgroupMemoryBarrierShared(); subgroupBarrier()
 #define subgroup_shuffle(v, lane) subgroupShuffle(v, lane)
 #define subgroup_shuffle_xor(v, distance) subgroupShuffleXor(v, distance)
 #define subgroup_exclusive_add(v) subgroupExclusiveAdd(v)

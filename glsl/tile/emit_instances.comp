@@ -10,7 +10,7 @@
 //          those of its object layer; keys are layer * tile_count + tile.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
-// Writes:  tile_keys [I]; splat_from_instance [I]
+// Writes:  tile_keys [I]; splat_from_instance [I]; variant sweep: sweep (histograms of the digits of the keys)
 // Mirror:  src/verify/reference/tile.rs::emit_instances
 
 layout(local_size_x = 64) in;
@@ -27,13 +27,26 @@ FETCHU(8, gaussian_from_splat);
 FETCHU(9, labels);
 FETCHU(10, layer_from_label);
 #endif
+#ifdef SWEEP
+INOUT(11, uint, sweep);
+layout(constant_id = 9) const uint DIGIT_BITS = 8;
+layout(constant_id = 22) const uint KEY_BITS = 32;
+const uint BINS = (KEY_BITS + DIGIT_BITS - 1u) / DIGIT_BITS << DIGIT_BITS;
+shared uint bins[BINS];
+#endif
 
-void main() {
-    StepUniforms u = step;
-    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (s >= counters.visible_count || failure != 0u) {
-        return;
+void put(uint at, uint key, uint splat) {
+    tile_keys[at] = key;
+    splat_from_instance[at] = splat;
+#ifdef SWEEP
+    for (uint shift = 0u; shift < KEY_BITS; shift += DIGIT_BITS) {
+        atomicAdd(bins[(shift / DIGIT_BITS << DIGIT_BITS) + bitfieldExtract(key, int(shift), int(DIGIT_BITS))], 1u);
     }
+#endif
+}
+
+void emit(uint s) {
+    StepUniforms u = step;
     uint total = fetchu(tiles_touched, s);
     uint layer = 0u;
 #ifdef LABELS
@@ -51,12 +64,10 @@ void main() {
     for (uint k = 0u; k < rect.count; k++) {
         if (written < count && tile_touched(u, tx, ty, r0.xy, q, r1.y)) {
             uint tile = ty * u.tiles_x + tx;
-            tile_keys[first + written] = tile;
-            splat_from_instance[first + written] = s;
+            put(first + written, tile, s);
 #ifdef LABELS
             if (layer != 0u) {
-                tile_keys[first + count + written] = layer * u.tile_count + tile;
-                splat_from_instance[first + count + written] = s;
+                put(first + count + written, layer * u.tile_count + tile, s);
             }
 #endif
             written++;
@@ -65,4 +76,25 @@ void main() {
         tx = wrap ? rect.x_min : tx + 1u;
         ty += wrap ? 1u : 0u;
     }
+}
+
+void main() {
+    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
+#ifdef SWEEP
+    for (uint b = gl_LocalInvocationID.x; b < BINS; b += 64u) {
+        bins[b] = 0u;
+    }
+    barrier();
+#endif
+    if (s < counters.visible_count && failure == 0u) {
+        emit(s);
+    }
+#ifdef SWEEP
+    barrier();
+    for (uint b = gl_LocalInvocationID.x; b < BINS; b += 64u) {
+        if (bins[b] > 0u) {
+            atomicAdd(sweep[sweep_bin(SORT_SLOT, b, DIGIT_BITS)], bins[b]);
+        }
+    }
+#endif
 }

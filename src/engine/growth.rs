@@ -78,6 +78,10 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
     let jobs = capacity.virtual_tiles / capacity.layers.max(1) + capacity.layer_tiles;
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
+    capacity.sweep_cells = shape.sweep_cells(instances.max(capacity.gaussians).max(capacity.virtual_tiles));
+    if shape.sweeps() {
+        return;
+    }
     capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
     capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;
     capacity.sort_totals = capacity.sort_cells / u64::from(shape.subgroup);

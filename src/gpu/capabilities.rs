@@ -84,6 +84,11 @@ impl Subgroup {
         self.operations.contains(SUBGROUP_OPERATIONS)
     }
 
+    /// True if the device has ballots, which some kernels use.
+    pub(crate) fn has_ballots(&self) -> bool {
+        self.operations.contains(vk::SubgroupFeatureFlags::BALLOT)
+    }
+
     /// True if the kernels can use subgroups of the device's default size.
     pub(super) fn has_size(&self) -> bool {
         (OWN_SUBGROUP_MIN..=SUBGROUP_MAX).contains(&self.size)

@@ -17,8 +17,19 @@ pub struct Builder<'a> {
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.
     pub counts: bool,
+    /// Passes of sorts, and scans, so far in this list that look back.
+    pub sweeps: Sweeps,
     /// The list so far.
     pub list: PassList,
+}
+
+/// Numbers of passes that look back; each has words of its own in `Buf::SWEEP`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sweeps {
+    /// Passes of sorts.
+    pub sorts: u32,
+    /// Scans.
+    pub scans: u32,
 }
 
 /// Which number of items a scan or sort works on (glsl/include/count.glsl).
@@ -34,16 +45,34 @@ pub enum Count {
     VirtualTiles = 3,
 }
 
+impl Count {
+    /// Grid over partitions of so many items.
+    pub(super) fn partitions(self) -> Grid {
+        args(match self {
+            Self::Gaussians => constants::ARGS_SWEEP_GAUSSIANS,
+            Self::Splats => constants::ARGS_SWEEP_SPLATS,
+            Self::Instances => constants::ARGS_SWEEP_INSTANCES,
+            Self::VirtualTiles => constants::ARGS_SWEEP_TILES,
+        })
+    }
+}
+
 impl<'a> Builder<'a> {
     /// An empty list, without bands of colour.
     pub fn new(name: &str, shape: &'a KernelShape, capacity: &'a Capacity) -> Self {
         let list = PassList { stage: Stage::PROJECT, ..PassList::new(name) };
-        Self { shape, capacity, supervision: Supervision::Photo, sh_degree: 0, counts: false, list }
+        Self { shape, capacity, supervision: Supervision::Photo, sh_degree: 0, counts: false, sweeps: Sweeps::default(), list }
     }
 
     /// Number of dispatches that walk the longest list of a tile, at least 1.
     pub fn segments(&self) -> u32 {
         self.capacity.segments.max(1) as u32
+    }
+
+    /// Slot of the next scan that looks back.
+    pub(super) fn next_scan(&mut self) -> u32 {
+        self.sweeps.scans += 1;
+        constants::SWEEP_SORTS + self.sweeps.scans - 1
     }
 
     /// Appends a pass; [`pass!`](crate::pass) expands to this call. Skips buffers and constants that the variant lacks.

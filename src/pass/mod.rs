@@ -113,6 +113,9 @@ impl Extension for () {}
 
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degree: u32) -> Builder<'a> {
     let mut b = Builder { sh_degree, ..Builder::new(name, shape, capacity) };
+    if shape.sweeps() {
+        b.list.fill(Buf::SWEEP, 0);
+    }
     pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
         build::ONE);
     b

@@ -24,12 +24,17 @@ pub(super) fn visible_splats(b: &mut Builder) {
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
     };
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
-    scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
-    pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
-    pass!(b, compact {
-        step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
-        keys_out: buffers.keys[0], values_out: buffers.values[0], failure: Buf::FAILURE,
-    } [], over_gaussians());
+    if b.shape.sweeps() {
+        scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
+        pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
+    } else {
+        scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
+        pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
+        pass!(b, compact {
+            step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
+            keys_out: buffers.keys[0], values_out: buffers.values[0], failure: Buf::FAILURE,
+        } [], over_gaussians());
+    }
     sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", false);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);

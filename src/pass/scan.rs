@@ -19,7 +19,25 @@ pub enum Total {
 
 /// Writes `offsets[i]` = sum of `values[..i]`, and the sum of all values to the counter `total`.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
-    reduce_then_scan(b, (values, offsets), count, total, false);
+    if !b.shape.sweeps() {
+        return reduce_then_scan(b, (values, offsets), count, total, false);
+    }
+    let slot = b.next_scan();
+    pass!(b, scan_sweep {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, sweep: Buf::SWEEP,
+        offsets: offsets, keys_out: offsets, values_out: offsets,
+    } [count_source: count as u32, total: total as u32, sweep_slot: slot], count.partitions());
+}
+
+/// Writes the visible keys and their Gaussians, in the order of the model, and the number of them to `visible_count`, in one
+/// pass; and the histograms for a sort of these keys by the next passes.
+pub fn compact_by_sweep(b: &mut Builder, keys: Buf, (keys_out, values_out): (Buf, Buf)) {
+    let (slot, sort_slot) = (b.next_scan(), b.sweeps.sorts);
+    pass!(b, scan_sweep(compact: true) {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: keys, sweep: Buf::SWEEP,
+        keys_out: keys_out, values_out: values_out, offsets: keys_out,
+    } [count_source: Count::Gaussians as u32, total: Total::Visible as u32, sweep_slot: slot, sort_slot: sort_slot],
+        Count::Gaussians.partitions());
 }
 
 /// Same as [`scan`]; each key other than `KEY_INVISIBLE` counts as 1.

@@ -2,6 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
+use crate::lab;
+use crate::shaders::constants::{SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +20,8 @@ pub struct KernelShape {
     pub texel: bool,
     /// Bits per digit of the radix sort.
     pub digit_bits: u32,
+    /// Items of an invocation in sorts and scans of one dispatch a pass, which look back; 0 with several dispatches a pass.
+    pub sweep_items: u32,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -44,7 +48,51 @@ impl KernelShape {
     pub fn of(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
         let texel = shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN;
-        Self { texel, emulated: device.subgroup.is_emulated, ..shape }
+        let shape = Self { texel, emulated: device.subgroup.is_emulated, ..shape };
+        let wanted = match lab::var("LABELGS_SORT").as_deref() {
+            Some("sweep") => true,
+            Some("lanes") => false,
+            _ => !device.is_cpu() && !shape.emulated,
+        };
+        if wanted { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
+    }
+
+    /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
+    fn with_sweeps(self, device: &Capabilities) -> Option<Self> {
+        let (limits, subgroup) = (&device.limits, &device.subgroup);
+        let fits = limits.max_invocations.min(limits.max_group_size[0]) >= SWEEP_LANES
+            && SWEEP_LANES / self.subgroup <= subgroup.max_per_group
+            && (self.emulated || subgroup.has_ballots());
+        let shape = self.with_sweeps_of(16);
+        let most = limits.max_shared.checked_sub(shape.sweep_bytes(0))? / (4 * SWEEP_LANES);
+        let items = [16, 8, 4].into_iter().find(|&items| items <= most)?;
+        fits.then(|| self.with_sweeps_of(items))
+    }
+
+    /// Returns this shape with sorts and scans of one dispatch a pass, of so many items an invocation.
+    pub fn with_sweeps_of(self, items: u32) -> Self {
+        Self { sweep_items: items, digit_bits: if self.subgroup >= 16 { 8 } else { 4 }, ..self }
+    }
+
+    /// Shared memory of a pass of the sort that looks back, bytes.
+    fn sweep_bytes(&self, items: u32) -> u32 {
+        let (digits, subgroups) = (1 << self.digit_bits, SWEEP_LANES / self.subgroup);
+        let exchange = if self.emulated { 2 * 12 * SWEEP_LANES } else { 0 };
+        4 * (subgroups * digits + 2 * digits + SWEEP_LANES + 2 * subgroups + 8 + SWEEP_LANES * items) + exchange
+    }
+
+    /// True if sorts and scans take one dispatch a pass.
+    pub fn sweeps(&self) -> bool {
+        self.sweep_items > 0
+    }
+
+    /// Words of `Buf::SWEEP` for so many items.
+    pub fn sweep_cells(&self, items: u64) -> u64 {
+        if !self.sweeps() {
+            return 0;
+        }
+        let partitions = items.div_ceil(u64::from(SWEEP_LANES * self.sweep_items));
+        u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
     }
 
     /// Returns the shape for a subgroup size; `cpu` is true if the device is a processor.
@@ -64,6 +112,7 @@ impl KernelShape {
             tile_height,
             texel: cpu,
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
+            sweep_items: 0,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
@@ -110,6 +159,7 @@ impl KernelShape {
             "TILE_WIDTH" => Some(self.tile_width),
             "TILE_HEIGHT" => Some(self.tile_height),
             "DIGIT_BITS" => Some(self.digit_bits),
+            "SWEEP_ITEMS" => Some(self.sweep_items.max(1)),
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }

@@ -15,15 +15,16 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     pass!(b, prepare_instances {
         step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
     } [], ONE);
-    pass!(b, emit_instances(labels: b.supervision.has_layers()) {
+    let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
+    let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
+    pass!(b, emit_instances(labels: b.supervision.has_layers(), sweep: sweep) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-    } [], over_splats());
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, sweep: Buf::SWEEP,
+    } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
-    let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
     pass!(b, prepare_blend {

@@ -19,5 +19,6 @@ mod orders;
 mod project;
 mod relocate;
 mod step;
+mod sweeps;
 mod tile;
 mod votes;

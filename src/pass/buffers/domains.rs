@@ -119,6 +119,8 @@ domains! {
         "Cells of the totals of the sort.";
     SCAN_LANES scan_lanes: "scan lanes", cures::pairs,
         "Lanes of the scan.";
+    SWEEP_CELLS sweep_cells: "sweep cells", cures::pairs,
+        "Words of the passes that look back, or 0 where sort and scan do without.", optional;
     LOSS_PARTIALS loss_partials: "loss partials", cures::image,
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,

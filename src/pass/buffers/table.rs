@@ -61,7 +61,7 @@ crate::buffers! { cures::whole;
     V_INSTANCES_C "v_instances_c": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::ONE, Class::Persistent, None, "Counts of this step (glsl/include/step.glsl).";
-    DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(21), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
+    DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(33), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
     DEPTH_KEYS "depth_keys": 4, Domain::GAUSSIANS, Class::Step, WORD, "Bits of z, or KEY_INVISIBLE, `[N]`.";
     VISIBLE_OFFSETS "visible_offsets": 4, Domain::GAUSSIANS, Class::Step, WORD, "Index among the visible Gaussians, `[N]`.";
     SPLAT_FROM_GAUSSIAN "splat_from_gaussian": 4, Domain::GAUSSIANS, Class::Step, WORD, "Splat of each Gaussian, or NO_SPLAT, `[N]`.";
@@ -72,6 +72,7 @@ crate::buffers! { cures::whole;
     SCAN_PARTIALS "scan_partials": 4, Domain::SCAN_LANES, Class::Step, None, "Sum of each lane's share in a scan.";
     SORT_HISTOGRAM "sort_histogram": 4, Domain::SORT_CELLS, Class::Step, WORD, "Digit counts of the sort in the lanes before of a workgroup, by digit and lane.";
     SORT_TOTALS "sort_totals": 4, Domain::SORT_TOTALS, Class::Step, WORD, "Digit counts of the sort, by digit and workgroup.";
+    SWEEP "sweep": 4, Domain::SWEEP_CELLS, Class::Step, None, "Tickets and counts of the passes that look back (glsl/include/sweep.glsl).";
     SPLATS "splats": 48, Domain::GAUSSIANS, Class::Step, VEC4, "Projected Gaussians in depth order, `[V, 3 vec4]` (glsl/include/record.glsl).";
     TILES_TOUCHED "tiles_touched": 4, Domain::GAUSSIANS, Class::Step, WORD, "Number of tiles of each splat over all layers, `[V]`.";
     INSTANCE_OFFSETS "instance_offsets": 4, Domain::GAUSSIANS, Class::Step, WORD, "First instance of each splat, `[V]`.";

@@ -115,6 +115,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         scan_lanes: 64,
         sort_cells: 64 * 256,
         sort_totals: 8 * 256,
+        sweep_cells: 0,
         loss_partials: 1024,
         sort_lanes: 64,
         shared_rows: 70,

@@ -1,0 +1,97 @@
+// Passes over partitions of the items, of one dispatch each: a workgroup takes the next partition by a ticket, counts it, and
+// looks back at the counts of the partitions before it (Merrill and Garland, "Single-pass parallel prefix scan with
+// decoupled look-back", 2016). No workgroup needs another one to go on: where a count is late, it counts that partition
+// itself. Counts are exact integers, so results do not depend on timing.
+//
+// The buffer `sweep` is 0 before the step. Its words by partition are those of two passes of a sort, which take turns and clear
+// each other's, one for each digit, and one of each scan.
+
+layout(constant_id = 18) const uint SWEEP_ITEMS = 16;         // items of an invocation
+const uint SWEEP_PARTITION = SWEEP_LANES * SWEEP_ITEMS;
+const uint SWEEP_SUBGROUPS = SWEEP_LANES / SUBGROUP_SIZE;
+
+// A word: two bits for its state, then a sum.
+const uint SWEEP_OWN = 1u << 30u;    // of the partition alone
+const uint SWEEP_PREFIX = 2u << 30u; // of all partitions up to this one
+const uint SWEEP_SUM = (1u << 30u) - 1u;
+const uint SWEEP_SPINS = 64u;        // looks at a word that is not there yet
+
+shared uint sweep_ticket;
+shared uint sweep_late;
+shared uint sweep_found[SWEEP_LANES];
+
+// Counts a partition into sweep_found, by all invocations; each pass has its own.
+void sweep_recount(uint part);
+
+// A sum that does not leave the bits of a word; the largest stands for all above.
+uint sweep_add(uint a, uint b) {
+    return min(a + b, SWEEP_SUM);
+}
+
+// Index of this invocation by subgroup and lane.
+uint sweep_lane() {
+    return subgroup_id() * SUBGROUP_SIZE + subgroup_lane();
+}
+
+// The partition of this workgroup.
+uint sweep_partition() {
+    if (sweep_lane() == 0u) {
+        sweep_ticket = atomicAdd(sweep[SWEEP_SLOT], 1u);
+    }
+    barrier();
+    return sweep_ticket;
+}
+
+// The lane's k-th item: neighbouring lanes have neighbouring items, and those of a subgroup are contiguous.
+uint sweep_item(uint part, uint k) {
+    return part * SWEEP_PARTITION + (subgroup_id() * SWEEP_ITEMS + k) * SUBGROUP_SIZE + subgroup_lane();
+}
+
+// First word of a partition for this pass.
+uint sweep_words(uint part) {
+    uint place = SWEEP_SLOT < SWEEP_SORTS ? SWEEP_SLOT % 2u * SWEEP_DIGITS : 2u * SWEEP_DIGITS + SWEEP_SLOT - SWEEP_SORTS;
+    return SWEEP_WORDS + part * SWEEP_STRIDE + place;
+}
+
+// Tells what the partition has of this invocation's word, if it has one, and returns the sum over the partitions before.
+// Called by all invocations of the workgroup.
+uint sweep_look_back(uint part, bool has_word, uint own) {
+    uint lane = sweep_lane(), word = sweep_words(part) + lane;
+    bool tells = has_word && part + 1u != SWEEP_HELD;
+    if (tells) {
+        atomicExchange(sweep[word], (part == 0u ? SWEEP_PREFIX : SWEEP_OWN) | own);
+    }
+    uint left = has_word ? part : 0u; // partitions that are not in the sum
+    uint sum = 0u;
+    while (true) {
+        for (uint spins = 0u; left > 0u && spins < SWEEP_SPINS;) {
+            uint found = atomicOr(sweep[sweep_words(left - 1u) + lane], 0u);
+            bool is_there = found > SWEEP_SUM;
+            sum = is_there ? sweep_add(sum, found & SWEEP_SUM) : sum;
+            left = (found & SWEEP_PREFIX) != 0u ? 0u : is_there ? left - 1u : left;
+            spins = is_there ? 0u : spins + 1u;
+        }
+        if (lane == 0u) {
+            sweep_late = 0u;
+        }
+        barrier();
+        if (left > 0u) {
+            atomicMax(sweep_late, left);
+        }
+        barrier();
+        uint late = sweep_late;
+        if (late == 0u) {
+            break;
+        }
+        sweep_recount(late - 1u);
+        if (left == late) {
+            sum = sweep_add(sum, sweep_found[lane]);
+            left = late - 1u;
+        }
+        barrier();
+    }
+    if (tells && part > 0u) {
+        atomicExchange(sweep[word], SWEEP_PREFIX | sweep_add(sum, own));
+    }
+    return sum;
+}

@@ -1,0 +1,145 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "count.glsl"
+#include "dispatch.glsl"
+#include "saturate.glsl"
+// scan_sweep — exclusive prefix sum in one dispatch; or (variant compact) lists the visible Gaussians in the order of the model.
+// Work:    one partition of SWEEP_LANES x SWEEP_ITEMS items per workgroup.
+// Reads:   step, counters, failure; values [n] (variant compact: depth keys)
+// Writes:  offsets [n]; counters (the field of TOTAL); sweep
+//          variant compact: keys_out [V] depth bits; values_out [V] Gaussian index; sweep (histograms of the digits of the keys)
+// Order:   exact integers, equal in every run. Sums from 2^30 on become 2^32 - 1 in the counter.
+// Mirror:  src/verify/reference/scan.rs::exclusive_scan, scan.rs::compact
+
+#define EXCHANGE_LANES SWEEP_LANES
+#include "subgroup.glsl"
+layout(local_size_x = SWEEP_LANES) in;
+READ1(0, StepUniforms, step);
+INOUT1(1, Counters, counters);
+READ1(2, uint, failure);
+READ(3, uint, values);
+INOUT(4, uint, sweep);
+#ifdef COMPACT
+WRITE(5, uint, keys_out);
+WRITE(6, uint, values_out);
+layout(constant_id = 9) const uint DIGIT_BITS = 8;
+const uint BINS = (32u / DIGIT_BITS) << DIGIT_BITS;
+shared uint bins[BINS];
+#else
+WRITE(5, uint, offsets);
+#endif
+#include "sweep.glsl"
+
+shared uint sums[SWEEP_SUBGROUPS];
+shared uint prefix;
+
+uint value(uint i, uint n) {
+#ifdef COMPACT
+    return i < n && values[i] != KEY_INVISIBLE ? 1u : 0u;
+#else
+    return i < n ? values[i] : 0u;
+#endif
+}
+
+uint counted_items() {
+    return item_count(step, counters, failure);
+}
+
+void sweep_recount(uint part) {
+    uint n = counted_items(), sum = 0u;
+    for (uint k = 0u; k < SWEEP_ITEMS; k++) {
+        sum = saturating_add(sum, value(sweep_item(part, k), n));
+    }
+    sweep_found[sweep_lane()] = min(sum, SWEEP_SUM);
+    barrier();
+    if (sweep_lane() == 0u) {
+        for (uint i = 1u; i < SWEEP_LANES; i++) {
+            sweep_found[0] = sweep_add(sweep_found[0], sweep_found[i]);
+        }
+    }
+    barrier();
+}
+
+// Sums of the low and the high halves of words, neither of which can overflow, as one sum.
+uint joined(uint low, uint high) {
+    high += low >> 16u;
+    return high >= 0x4000u ? SWEEP_SUM : high << 16u | low & 0xffffu;
+}
+
+void main() {
+    uint n = counted_items(), part = sweep_partition(), lane = sweep_lane();
+    if (part * SWEEP_PARTITION >= n) {
+        return;
+    }
+    uint before[SWEEP_ITEMS];
+    uint low = 0u, high = 0u;
+    [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {
+        uint v = value(sweep_item(part, k), n), last = SUBGROUP_SIZE - 1u;
+        uint v_low = v & 0xffffu, v_high = v >> 16u;
+        uint low_before = subgroup_exclusive_add(v_low), high_before = subgroup_exclusive_add(v_high);
+        before[k] = joined(low + low_before, high + high_before);
+        low += subgroup_shuffle(low_before + v_low, last);
+        high += subgroup_shuffle(high_before + v_high, last);
+    }
+    if (subgroup_lane() == 0u) {
+        sums[subgroup_id()] = joined(low, high);
+    }
+    barrier();
+    uint own = 0u, first = 0u;
+    for (uint s = 0u; s < SWEEP_SUBGROUPS; s++) {
+        first = s == subgroup_id() ? own : first;
+        own = sweep_add(own, sums[s]);
+    }
+    uint found = sweep_look_back(part, lane == 0u, own);
+    if (lane == 0u) {
+        prefix = found;
+        if (part == (n - 1u) / SWEEP_PARTITION) {
+            uint total = sweep_add(found, own);
+            total = total == SWEEP_SUM ? 0xffffffffu : total;
+            if (TOTAL == 0u) {
+                counters.visible_count = total;
+            } else if (TOTAL == 1u) {
+                counters.instance_count = total;
+            } else if (TOTAL == 2u) {
+                counters.layer_tile_count = total;
+            } else {
+                counters.densified_count = total;
+            }
+        }
+    }
+#ifdef COMPACT
+    for (uint b = lane; b < BINS; b += SWEEP_LANES) {
+        bins[b] = 0u;
+    }
+#endif
+    barrier();
+    first = sweep_add(first, prefix);
+    [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {
+        uint i = sweep_item(part, k);
+        if (i < n) {
+            uint to = sweep_add(first, before[k]);
+#ifdef COMPACT
+            uint key = values[i];
+            if (key != KEY_INVISIBLE) {
+                keys_out[to] = key;
+                values_out[to] = i;
+                for (uint shift = 0u; shift < 32u; shift += DIGIT_BITS) {
+                    atomicAdd(bins[((shift / DIGIT_BITS) << DIGIT_BITS) + bitfieldExtract(key, int(shift), int(DIGIT_BITS))], 1u);
+                }
+            }
+#else
+            offsets[i] = to;
+#endif
+        }
+    }
+#ifdef COMPACT
+    barrier();
+    for (uint b = lane; b < BINS; b += SWEEP_LANES) {
+        if (bins[b] > 0u) {
+            atomicAdd(sweep[sweep_bin(SORT_SLOT, b, DIGIT_BITS)], bins[b]);
+        }
+    }
+#endif
+}

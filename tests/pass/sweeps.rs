@@ -1,0 +1,201 @@
+//! Sorts and scans that look back, with subgroups of each size: exact answers, also where a workgroup tells nothing.
+
+use crate::reference::scan::exclusive_scan;
+use crate::reference::sort::radix_sort;
+use crate::support::compare::{check, exact};
+use crate::support::device::{Turn, options};
+use crate::support::scenes::generator;
+use bytemuck::Zeroable;
+use labelgs::engine::{Engine, EngineSize};
+use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::pass::build::Count;
+use labelgs::pass::scan::Total;
+use labelgs::pass::sort::SortBuffers;
+use labelgs::pass::{Builder, KernelShape, scan, sort};
+use labelgs::scheduler::ListId;
+use labelgs::scheduler::plan::{Buf, PassList, Work};
+use labelgs::shaders::constants::{
+    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
+};
+use labelgs::shaders::structs::{Counters, StepUniforms};
+use rand::Rng;
+
+/// Items of an invocation: small, so that few keys make many partitions.
+const ITEMS: u32 = 4;
+/// Partitions of the largest case, and a few keys more.
+const MOST: usize = 6 * (SWEEP_LANES * ITEMS) as usize + 77;
+/// Numbers of items around the borders of partitions.
+const COUNTS: [usize; 6] = [0, 1, 1023, 1024, 1025, MOST];
+
+/// Opens a device with subgroups of each size, through shared memory, and calls `test` with its engine.
+fn each_size(items: usize, mut test: impl FnMut(&mut Engine)) {
+    for size in [4, 8, 16, 32, 64] {
+        let chosen = GpuOptions { subgroup_size: Some(size), emulate_subgroups: true, ..options() };
+        let Ok(gpu) = Gpu::new(&chosen) else { return };
+        let turn = Turn::with(gpu);
+        test(&mut engine(&turn, items));
+    }
+    // And the device's own, with its own ballots.
+    if let Ok(gpu) = Gpu::new(&options()) {
+        let turn = Turn::with(gpu);
+        test(&mut engine(&turn, items));
+    }
+}
+
+fn engine(turn: &Turn, items: usize) -> Engine {
+    let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(ITEMS);
+    let size = EngineSize::new(items as u64, (64, 64));
+    Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts")
+}
+
+/// Records the passes that `declare` adds; partition `held` tells nothing.
+fn list(engine: &mut Engine, held: Option<u32>, declare: impl FnOnce(&mut Builder)) -> ListId {
+    let (shape, capacity) = (*engine.shape(), *engine.capacity());
+    let mut builder = Builder::new("test", &shape, &capacity);
+    declare(&mut builder);
+    let mut list: PassList = builder.list;
+    for work in &mut list.work {
+        let Work::Pass(pass) = work else { continue };
+        let place = pass.shader.spec.iter().position(|constant| constant.name == "SWEEP_HELD").expect("all are sweeps");
+        pass.spec[place] = held.map_or(0, |partition| partition + 1);
+    }
+    engine.raw_mut().prepare(&list).expect("the list is planned")
+}
+
+/// Sets numbers of items and partitions, and what the pass that wrote the keys has counted of them.
+fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
+    let cells = engine.capacity().sweep_cells as usize;
+    let bits = engine.shape().digit_bits;
+    let mut sweep = vec![0_u32; cells];
+    for pass in 0..32 / bits {
+        for key in keys {
+            let digit = key >> (pass * bits) & ((1 << bits) - 1);
+            sweep[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
+        }
+    }
+    let partitions = (count as u32).div_ceil(SWEEP_LANES * ITEMS);
+    let mut args = [0_u32; 33];
+    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS] {
+        args[at as usize..][..3].copy_from_slice(&[partitions, 1, 1]);
+    }
+    let count = count as u32;
+    let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
+    let counters = Counters { visible_count: count, ..Counters::zeroed() };
+    let sched = engine.raw_mut();
+    sched.upload(Buf::SWEEP, 0, 0, &sweep).expect("upload");
+    sched.upload(Buf::DISPATCH_ARGS, 0, 0, &args).expect("upload");
+    sched.upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
+    sched.upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
+}
+
+fn run(engine: &mut Engine, id: ListId) {
+    engine.raw_mut().run(id, 0).expect("run");
+    engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
+}
+
+fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
+    engine.raw_mut().download(buf, 0, 0, count).expect("download")
+}
+
+fn counters(engine: &mut Engine) -> Counters {
+    engine.raw_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
+}
+
+#[test]
+fn a_scan_is_exact_and_saturates() {
+    each_size(MOST, |engine| {
+        for held in [None, Some(0), Some(3)] {
+            let id = list(engine, held, |b| {
+                scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
+            });
+            let mut random = generator(71);
+            for most in [900, u32::MAX / 1000] {
+                for count in COUNTS {
+                    let values: Vec<u32> = (0..count).map(|_| random.random_range(0..most)).collect();
+                    announce(engine, count, &[]);
+                    engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
+                    run(engine, id);
+                    let (mut offsets, mut total) = exclusive_scan(&values);
+                    // A word of a partition has 30 bits of the sum.
+                    const SUM_MAX: u32 = (1 << 30) - 1;
+                    offsets.iter_mut().for_each(|offset| *offset = (*offset).min(SUM_MAX));
+                    total = if total >= SUM_MAX { u32::MAX } else { total };
+                    check("offsets", exact(&get(engine, Buf::INSTANCE_OFFSETS, count), &offsets));
+                    assert_eq!(counters(engine).instance_count, total, "{count} items");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn visible_keys_are_listed_and_sorted() {
+    let buffers = SortBuffers {
+        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+    };
+    each_size(MOST, |engine| {
+        let id = list(engine, Some(2), |b| {
+            scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
+        });
+        let mut random = generator(72);
+        for count in COUNTS {
+            let key = |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
+            let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
+            announce(engine, count, &[]);
+            engine.raw_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
+            run(engine, id);
+            let visible: Vec<u32> = (0..count as u32).filter(|&i| keys[i as usize] != KEY_INVISIBLE).collect();
+            let of: Vec<u32> = visible.iter().map(|&i| keys[i as usize]).collect();
+            assert_eq!(counters(engine).visible_count as usize, if count == 0 { 0 } else { visible.len() });
+            check("values", exact(&get(engine, buffers.values[0], visible.len()), &visible));
+            check("keys", exact(&get(engine, buffers.keys[0], visible.len()), &of));
+            let words = get(engine, Buf::SWEEP, (SWEEP_HISTOGRAMS + 8 * SWEEP_DIGITS) as usize);
+            let bits = engine.shape().digit_bits;
+            for pass in 0..32 / bits {
+                let mut digits = vec![0_u32; 1 << bits];
+                of.iter().for_each(|key| digits[(key >> (pass * bits)) as usize & ((1 << bits) - 1)] += 1);
+                let at = (SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS) as usize;
+                check("digits", exact(&words[at..][..1 << bits], &digits));
+            }
+        }
+    });
+}
+
+/// Keys of all 32 bits, few different ones (equal ones must keep their order), one, ascending ones.
+#[test]
+fn a_sort_is_exact_and_stable() {
+    each_size(MOST, |engine| {
+        for held in [None, Some(0), Some(5)] {
+            let cases = [(MOST, u32::MAX), (MOST, 3), (MOST, 1), (1025, 300), (1, 9), (0, 1)];
+            sort_exactly(engine, held, &cases);
+        }
+    });
+}
+
+/// Sorts keys and compares. Cases are (number of keys, number of distinct keys); the first one is sorted in ascending order too.
+fn sort_exactly(engine: &mut Engine, held: Option<u32>, cases: &[(usize, u32)]) {
+    let buffers = SortBuffers {
+        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
+        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+    };
+    let mut found = None;
+    let id = list(engine, held, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, "by depth", false)));
+    let (keys_out, values_out) = found.expect("the sort was declared");
+    let mut random = generator(73);
+    for (case, &(count, different)) in cases.iter().enumerate() {
+        let mut keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
+        if case == 0 {
+            keys.sort_unstable();
+        }
+        let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+        announce(engine, count, &keys);
+        engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        engine.raw_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
+        run(engine, id);
+        let order = radix_sort(&keys);
+        let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
+        check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
+        check("values", exact(&get(engine, values_out, count), &by_order(&values)));
+    }
+}
