@@ -5,8 +5,8 @@ use super::project::{normalised, rotation, sigmoid};
 use super::rules::{GRADIENT_MAX, wide};
 use super::splat::Splat;
 use super::{Model, Row, Rules};
-use crate::scene::Camera;
 use glam::DVec3;
+use labelgs_scene::Camera;
 
 /// Input of densification.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 //! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; a test of the engine
 //! compares the two (`tests/verify/constants.rs`).
 
-use crate::scene::Zone;
 use glam::DVec3;
+use labelgs_scene::Zone;
 
 /// Larger gradients are dropped: their square overflows in Adam.
 pub const GRADIENT_MAX: f32 = 1e18;
