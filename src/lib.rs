@@ -88,6 +88,7 @@ pub use labelgs_edit as edit;
 pub use labelgs_files as files;
 pub use labelgs_formats as formats;
 pub use labelgs_masks as masks;
+pub use labelgs_reference as reference;
 pub use labelgs_scene::{self as scene, Error, Result, Setting};
 pub use labelgs_scenes as scenes;
 pub use labelgs_synth as synth;

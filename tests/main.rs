@@ -5,7 +5,7 @@
     reason = "the rules of files and lengths are those of the library"
 )]
 
-use labelgs::verify::reference;
+use labelgs::reference;
 
 #[allow(dead_code, reason = "not every helper is always in use")]
 mod support;

@@ -22,7 +22,7 @@
 //          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only.
 //          A known depth D has the same sum, with d = min(|z / D - 1|, 1) and a background of 1.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
+// Mirror:  src/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
 
 READ1(0, StepUniforms, step);
 FETCHU(1, tile_starts);

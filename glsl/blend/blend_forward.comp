@@ -21,7 +21,7 @@ layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
 //          Layers: eq. 8 and 9, black background, and an L1 term of alpha against the mask; the L1 gradient of a layer
 //          is local to the pixel, so its sign is stored here. Lift: eq. 6 and 7.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/blend.rs::blend_forward
+// Mirror:  src/reference/blend.rs::blend_forward
 
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);

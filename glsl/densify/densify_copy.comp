@@ -9,7 +9,7 @@
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
 // Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned
 //          parents; frozen ones have none.
-// Mirror:  src/verify/reference/densify.rs::densify
+// Mirror:  src/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 16) const uint MOMENTS = 0;

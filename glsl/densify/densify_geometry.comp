@@ -12,7 +12,7 @@
 // Writes:  means, scales, quats [new N]
 // Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS); stack: r copies at one place with
 //          1 - (1 - o')^r = o and the light of the one (3DGS-MCMC, see stack).
-// Mirror:  src/verify/reference/densify.rs::densify
+// Mirror:  src/reference/densify.rs::densify
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -8,7 +8,7 @@
 // Work:    64 old Gaussians per workgroup.
 // Reads:   step; old_labels [N]; densify_actions [N]; child_offsets [N]
 // Writes:  labels [new N]
-// Mirror:  src/verify/reference/densify.rs::densify
+// Mirror:  src/reference/densify.rs::densify
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -9,7 +9,7 @@
 // Reads:   step; means, scales [N]; densify_stats [trained] (sum, count)
 // Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)
 // Math:    method of 3DGS; the size test for children uses their size after the split.
-// Mirror:  src/verify/reference/densify.rs::mark
+// Mirror:  src/reference/densify.rs::mark
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

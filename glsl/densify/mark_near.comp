@@ -12,7 +12,7 @@
 // Math:    0 <= z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
 //          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
 //          On the way the camera keeps its direction, so that each condition is linear in the share t of the way.
-// Mirror:  src/verify/reference/densify.rs::is_near
+// Mirror:  src/reference/densify.rs::is_near
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -11,7 +11,7 @@
 // Writes:  densify_actions [N]; children_counts [N]: from weights to numbers of copies; counters.cloned_count
 // Math:    systematic sampling: even steps through the sum of the weights, from a random start. With the Gaussian itself
 //          a stack has at most RELOCATE_MOST copies (3DGS-MCMC). Draws where nothing grows and of frozen ones are void.
-// Mirror:  src/verify/reference/relocate.rs::copies
+// Mirror:  src/reference/relocate.rs::copies
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -12,7 +12,7 @@
 //          no more where nothing grows and for frozen ones; counters.pruned_count
 // Math:    3DGS-MCMC: an opacity below prune_opacity is dead, the others are drawn in proportion to their opacity.
 //          Whole weights have an exact prefix sum.
-// Mirror:  src/verify/reference/relocate.rs::weights
+// Mirror:  src/reference/relocate.rs::weights
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -12,7 +12,7 @@
 //          densify_stats [N] += (|scene v_mean2d| in NDC units, 1) of trained ones
 // Math:    the statistic uses the scene layer only, without the label loss.
 // Order:   fixed, bitwise reproducible; no atomics.
-// Mirror:  src/verify/reference/blend.rs::blend_backward, densify.rs::accumulate
+// Mirror:  src/reference/blend.rs::blend_backward, densify.rs::accumulate
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

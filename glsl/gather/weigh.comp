@@ -11,7 +11,7 @@
 // Math:    the picture is linear in the colours of the splats, and the factors are the blending weights: the gradient of
 //          the sum of all pixels with respect to a splat's red is the sum of its weights.
 // Order:   fixed, bitwise reproducible; no atomics.
-// Mirror:  src/verify/reference/lift.rs::vote
+// Mirror:  src/reference/lift.rs::vote
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

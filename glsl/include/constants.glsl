@@ -1,5 +1,5 @@
 // All constants of the algorithm. The build exports them to Rust. The f64 reference has its own copy, so that a slip
-// here shows; a test compares the two (src/verify/reference/rules.rs).
+// here shows; a test compares the two (tests/verify/constants.rs).
 // Only the kernel benchmark (tools/bench/kernels/modes.rs) replaces a constant by a macro.
 
 #ifndef ALPHA_MIN

@@ -15,7 +15,7 @@
 // Math:    L(v) = argmax over k of the sum of alpha_j T_j over j with B_j = k, the smaller k of equals; 0 without weight
 // Order:   a label's sum adds in the order of the list, in whichever walk. Rounding is monotone, so the sum of the rest
 //          is no smaller than that of any label in it: a decided pixel has the label of one walk with all labels.
-// Mirror:  src/verify/reference/lift.rs::label_map
+// Mirror:  src/reference/lift.rs::label_map
 
 layout(constant_id = 15) const uint LATER = 0; // 1: not the first walk
 READ1(0, StepUniforms, step);

@@ -8,7 +8,7 @@
 // Reads:   step, failure; label_keys [N]
 // Writes:  labels [N] of Gaussians with a key; label_keys [N] = 0
 // Math:    LabelGS eq. 6 and 7; without the filter, the larger weight wins, then the larger label.
-// Mirror:  src/verify/reference/lift.rs::lift
+// Mirror:  src/reference/lift.rs::lift
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

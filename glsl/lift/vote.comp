@@ -13,7 +13,7 @@
 // Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (the sums of FlashSplat; every contributor counts);
 //          with ALONE, of alpha_j
 // Order:   a tile's sum has a fixed order and is rounded once; the order of integer sums does not matter.
-// Mirror:  src/verify/reference/lift.rs::vote
+// Mirror:  src/reference/lift.rs::vote
 
 layout(constant_id = 16) const uint ALONE = 0; // 1: each Gaussian as if nothing were in front of it
 READ1(0, StepUniforms, step);

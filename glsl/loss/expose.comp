@@ -8,7 +8,7 @@
 // Reads:   step; step_rows [ROW], the first row of the photo; shared_parameters [S]
 // Writes:  image [P] rgb, in place
 // Math:    exposure.glsl. Nothing but the photo loss reads it: the backward walk needs the transmittance only.
-// Mirror:  src/verify/reference/exposure.rs::exposed
+// Mirror:  src/reference/exposure.rs::exposed
 
 layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;

@@ -9,7 +9,7 @@
 // Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)], EXPOSURE_ROWS each: r, g, b, 0
 // Math:    of exposure.glsl; without the channels that are above 1 where the photo is saturated
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/exposure.rs::backward
+// Mirror:  src/reference/exposure.rs::backward
 
 layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;

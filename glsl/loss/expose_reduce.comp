@@ -9,7 +9,7 @@
 // Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of each number over all photos: the model can be
 //          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/exposure.rs::backward
+// Mirror:  src/reference/exposure.rs::backward
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 15) const uint ROWS = 1;

@@ -9,7 +9,7 @@
 // Writes:  v_image [P] (rgb, 0); loss_partials [strips, subgroups of columns] (sum |x - y|, sum ssim)
 // Math:    (1 - lambda) |x - y| + lambda (1 - ssim), times loss_scale = 1 / (3 valid pixels)
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/loss.rs::ssim_backward
+// Mirror:  src/reference/loss.rs::ssim_backward
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

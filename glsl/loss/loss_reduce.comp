@@ -8,7 +8,7 @@
 //          variant disagreement: step; disagreement [T]
 // Writes:  counters.loss_l1, loss_ssim, loss_label
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/loss.rs::photo_loss
+// Mirror:  src/reference/loss.rs::photo_loss
 
 #include "subgroup.glsl"
 layout(local_size_x_id = 0) in;

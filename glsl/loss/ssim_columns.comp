@@ -7,7 +7,7 @@
 // Reads:   step; image [P]; target [P] RGBA8 (pixels with alpha 0 are ignored; both images count as 0 there)
 // Writes:  moments [3, P] vec4 (mean x, mean y, mean x^2 + y^2, mean x y), filtered along columns
 // Math:    SSIM needs only the sum of the two second moments. 11 taps, sigma 1.5, zero padding.
-// Mirror:  src/verify/reference/loss.rs::ssim
+// Mirror:  src/reference/loss.rs::ssim
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

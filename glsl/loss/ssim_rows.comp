@@ -7,7 +7,7 @@
 // Reads:   step; moments [3, P]; target [P] (the value of pixels with alpha 0 is ignored)
 // Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, value; 0 for ignored pixels
 // Math:    ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2))
-// Mirror:  src/verify/reference/loss.rs::ssim
+// Mirror:  src/reference/loss.rs::ssim
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

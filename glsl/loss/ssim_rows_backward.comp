@@ -6,7 +6,7 @@
 // Work:    x: 64 rows per workgroup, y: strips of STRIP columns, z: channel.
 // Reads:   step; v_moments [3, P]
 // Writes:  v_rows [3, P] vec4 (three filtered maps, 0)
-// Mirror:  src/verify/reference/loss.rs::ssim_backward
+// Mirror:  src/reference/loss.rs::ssim_backward
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

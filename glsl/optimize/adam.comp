@@ -12,7 +12,7 @@
 // Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: also weights [S]
 // Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is
 //          kept as the moment of a gradient of 1, without a power or a count of updates.
-// Mirror:  src/verify/reference/adam.rs::adam, adam.rs::adam_value
+// Mirror:  src/reference/adam.rs::adam, adam.rs::adam_value
 
 layout(local_size_x = 64) in;
 #ifdef SHARED

@@ -10,7 +10,7 @@
 // Reads:   step, failure; means_in, scales, quats [N]
 // Writes:  means.xyz [N], the same buffer
 // Math:    3DGS-MCMC: x += noise sigmoid(-NOISE_STEEP (o - NOISE_OPACITY)) Sigma xi, xi standard normal.
-// Mirror:  src/verify/reference/relocate.rs::explored
+// Mirror:  src/reference/relocate.rs::explored
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -7,7 +7,7 @@
 // Work:    64 Gaussians per workgroup.
 // Reads:   step
 // Writes:  means.w, m_means.w, u_means.w [N]
-// Mirror:  src/verify/reference/densify.rs::opacity_reset
+// Mirror:  src/reference/densify.rs::opacity_reset
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

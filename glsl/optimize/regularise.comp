@@ -9,7 +9,7 @@
 // Reads:   step, failure, counters; gaussian_from_splat [V]; means, scales [N]
 // Writes:  v_means.w, v_scales.xyz [V], added
 // Math:    3DGS-MCMC: L += opacity_weight sum o + scale_weight sum (s_x + s_y + s_z), over the visible Gaussians.
-// Mirror:  src/verify/reference/relocate.rs::regularised
+// Mirror:  src/reference/relocate.rs::regularised
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

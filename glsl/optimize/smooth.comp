@@ -10,7 +10,7 @@
 // Writes:  scales [N], the same buffer: w is the limit, the least over the views so far that see the centre; 0: none yet
 // Math:    3-D filter of Mip-Splatting as a lower limit: s >= FINEST z / f, f of the photo at full size; the update of
 //          Adam is projected to it.
-// Mirror:  src/verify/reference/smooth.rs::smooth
+// Mirror:  src/reference/smooth.rs::smooth
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -7,7 +7,7 @@
 // Work:    64 Gaussians per workgroup.
 // Reads:   step, failure; depth_keys [N]; visible_offsets [N]
 // Writes:  keys_out [V] depth bits; values_out [V] Gaussian index
-// Mirror:  src/verify/reference/scan.rs::compact
+// Mirror:  src/reference/scan.rs::compact
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

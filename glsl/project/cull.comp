@@ -11,7 +11,7 @@
 //          atomics): nonfinite positions, scales and opacities
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative: never drops a splat
 //          with a tile in project_forward.
-// Mirror:  src/verify/reference/project.rs::cull
+// Mirror:  src/reference/project.rs::cull
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -7,7 +7,7 @@
 // Reads:   step_rows from [ROW] on, the rows of the photo; shared_parameters [S] (pose.glsl)
 // Writes:  step: rotation and centre of the camera, in place; the host writes them anew for each submit
 // Math:    R' = T(w) R, c' = c + d R^T m with the depth d in the fourth number of the second row
-// Mirror:  src/verify/reference/pose.rs::corrected
+// Mirror:  src/reference/pose.rs::corrected
 
 layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 1) in;

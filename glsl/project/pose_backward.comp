@@ -12,7 +12,7 @@
 //          but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the
 //          orientations, (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/pose.rs::backward
+// Mirror:  src/reference/pose.rs::backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;

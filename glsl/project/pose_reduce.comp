@@ -10,7 +10,7 @@
 //          That of the move is -d R force, with the rotation R before the turn. POSE_PRIOR pulls both to 0. The
 //          transposed preconditioner carries both to the trained numbers. A settled pose has none.
 // Order:   fixed, bitwise reproducible.
-// Mirror:  src/verify/reference/pose.rs::backward
+// Mirror:  src/reference/pose.rs::backward
 
 layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;

@@ -14,7 +14,7 @@
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
 //          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0;
 //          variant antialiased: the opacity reaches M through the coverage.
-// Mirror:  src/verify/reference/project.rs::project_backward
+// Mirror:  src/reference/project.rs::project_backward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;

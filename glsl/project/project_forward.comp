@@ -16,7 +16,7 @@
 //          (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
 //          variant antialiased: opacity times the root of the coverage (Mip-Splatting).
-// Mirror:  src/verify/reference/project.rs::project_forward
+// Mirror:  src/reference/project.rs::project_forward
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;

@@ -9,7 +9,7 @@
 // Reads:   step, counters, failure; values [n] (variant flag: counts values other than KEY_INVISIBLE)
 // Writes:  partials [LANES]
 // Order:   exact integers, equal in every run.
-// Mirror:  src/verify/reference/scan.rs::exclusive_scan
+// Mirror:  src/reference/scan.rs::exclusive_scan
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(local_size_x_id = 0) in;

@@ -8,7 +8,7 @@
 // Reads:   partials [LANES]
 // Writes:  partials [LANES] (exclusive); counters (the field of TOTAL)
 // Order:   exact integers, equal in every run.
-// Mirror:  src/verify/reference/scan.rs::exclusive_scan
+// Mirror:  src/reference/scan.rs::exclusive_scan
 
 #include "subgroup.glsl"
 layout(local_size_x_id = 0) in;

@@ -11,7 +11,7 @@
 // Writes:  offsets [n]; counters (the field of TOTAL); sweep
 //          variant compact: keys_out [V] depth bits; values_out [V] Gaussian index; sweep (histograms of the digits of the keys)
 // Order:   exact integers, equal in every run. Sums from 2^30 on become 2^32 - 1 in the counter.
-// Mirror:  src/verify/reference/scan.rs::exclusive_scan, scan.rs::compact
+// Mirror:  src/reference/scan.rs::exclusive_scan, scan.rs::compact
 
 #define EXCHANGE_LANES SWEEP_LANES
 #include "subgroup.glsl"

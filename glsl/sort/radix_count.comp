@@ -10,7 +10,7 @@
 // Writes:  histogram [2^DIGIT_BITS, LANES]: sums over the lanes before in the workgroup; totals [2^DIGIT_BITS,
 //          workgroups]
 // Order:   exact integers, equal in every run.
-// Mirror:  src/verify/reference/sort.rs::radix_sort
+// Mirror:  src/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 9) const uint DIGIT_BITS = 8;

@@ -6,7 +6,7 @@
 // Reads:   totals [CELLS]
 // Writes:  totals [CELLS]
 // Order:   exact integers, equal in every run.
-// Mirror:  src/verify/reference/sort.rs::radix_sort
+// Mirror:  src/reference/sort.rs::radix_sort
 
 #include "subgroup.glsl"
 layout(local_size_x_id = 0) in;

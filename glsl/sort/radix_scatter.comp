@@ -9,7 +9,7 @@
 //          totals (scanned)
 // Writes:  keys_out [n], values_out [n]
 // Order:   exact integers, equal in every run.
-// Mirror:  src/verify/reference/sort.rs::radix_sort
+// Mirror:  src/reference/sort.rs::radix_sort
 
 layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(constant_id = 9) const uint DIGIT_BITS = 8;

@@ -9,7 +9,7 @@
 // Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the digit)
 // Writes:  keys_out [n], values_out [n]; sweep (words of this pass, and zeros in those of the next one)
 // Order:   exact integers, equal in every run: that of the radix_scatter passes.
-// Mirror:  src/verify/reference/sort.rs::radix_sort
+// Mirror:  src/reference/sort.rs::radix_sort
 
 #define EXCHANGE_LANES SWEEP_LANES
 #include "subgroup.glsl"

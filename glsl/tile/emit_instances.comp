@@ -11,7 +11,7 @@
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  tile_keys [I]; splat_from_instance [I]; variant sweep: sweep (histograms of the digits of the keys)
-// Mirror:  src/verify/reference/tile.rs::emit_instances
+// Mirror:  src/reference/tile.rs::emit_instances
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -7,7 +7,7 @@
 // Work:    one tile of one layer per invocation.
 // Reads:   step, failure; layer_occupied, layer_offsets [layers * T]
 // Writes:  layer_tiles [occupied] (layer * T + tile)
-// Mirror:  src/verify/reference/scan.rs::compact
+// Mirror:  src/reference/scan.rs::compact
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

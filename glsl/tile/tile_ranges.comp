@@ -11,7 +11,7 @@
 // Reads:   step, counters, failure; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
 //          order); variant labels: layer_occupied [layers * T] 0 or 1
-// Mirror:  src/verify/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
+// Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);

@@ -112,8 +112,7 @@ fn every_mirror_is_there() {
         }
         for part in mirror.split(", ") {
             let (file, function) = part.split_once("::").unwrap_or_else(|| panic!("{stem}: {part} names no function"));
-            let file =
-                Path::new(ROOT).join("src/verify/reference").join(file.trim_start_matches("src/verify/reference/"));
+            let file = Path::new(ROOT).join("src/reference").join(file.trim_start_matches("src/reference/"));
             let reference =
                 fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
             assert!(

@@ -5,9 +5,9 @@ use crate::scenes::fixtures::*;
 use glam::{DMat3, DQuat, DVec3};
 use labelgs::edit::Transform;
 use labelgs::formats::{LabelType, SpzVersion, WriteOptions, export_model, read_model, write_model};
+use labelgs::reference::Rules;
+use labelgs::reference::sh::basis;
 use labelgs::scene::Gaussians;
-use labelgs::verify::reference::Rules;
-use labelgs::verify::reference::sh::basis;
 use std::fs;
 
 /// Axes by the value of the record, from 1 on, as its definition lists them.

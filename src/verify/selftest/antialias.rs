@@ -7,14 +7,14 @@ use super::fixture::{Fixture, GRADIENTS, PARAMETERS};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
 use crate::error::Result;
+use crate::reference::project::{project_backward, project_forward};
+use crate::reference::smooth::smooth;
+use crate::reference::splat::Splat;
+use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
 use crate::train::strategy::Strategy as _;
 use crate::train::strategy::budget::BudgetStrategy;
 use crate::train::strategy::passes::SMOOTH;
-use crate::verify::reference::project::{project_backward, project_forward};
-use crate::verify::reference::smooth::smooth;
-use crate::verify::reference::splat::Splat;
-use crate::verify::reference::{Row, Rules};
 
 /// Gaussians from a twentieth of a pixel to some pixels.
 pub fn fine(seed: u64) -> Scene {

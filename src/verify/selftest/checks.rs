@@ -9,20 +9,20 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::pass::KernelShape;
+use crate::reference::blend::{Upstream, blend_backward, blend_forward};
+use crate::reference::disagreement::disagreement;
+use crate::reference::lift::{self, vote, vote_alone};
+use crate::reference::loss::photo_loss;
+use crate::reference::splat::Splat;
+use crate::reference::step::step;
+use crate::reference::tile::{TileGrid, counted_tiles, tiles_within};
+use crate::reference::{Model, Rules};
 use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::LABEL_MASK;
 use crate::train::LabelRule;
 use crate::train::strategy::weights::weights;
-use crate::verify::reference::blend::{Upstream, blend_backward, blend_forward};
-use crate::verify::reference::disagreement::disagreement;
-use crate::verify::reference::lift::{self, vote, vote_alone};
-use crate::verify::reference::loss::photo_loss;
-use crate::verify::reference::splat::Splat;
-use crate::verify::reference::step::step;
-use crate::verify::reference::tile::{TileGrid, counted_tiles, tiles_within};
-use crate::verify::reference::{Model, Rules};
 use std::sync::Arc;
 
 /// Decisions (alpha 1/255, the stop) with a smaller distance to their threshold may go either way.

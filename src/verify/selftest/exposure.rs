@@ -7,13 +7,13 @@ use super::scenes::{Shape, scene};
 use super::{Judge, LEEWAY, Rig, judge};
 use crate::engine::SharedRow;
 use crate::error::Result;
+use crate::reference::Rules;
+use crate::reference::exposure::{ExposureRows, backward, exposed};
+use crate::reference::loss::photo_loss;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::{EXPOSURE_PRIOR, EXPOSURE_ROWS};
 use crate::train::shared::exposure::Exposure;
 use crate::train::shared::{Place, SharedLayout, SharedParameters};
-use crate::verify::reference::Rules;
-use crate::verify::reference::exposure::{ExposureRows, backward, exposed};
-use crate::verify::reference::loss::photo_loss;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -5,6 +5,10 @@ use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, Share
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Variant};
+use crate::reference::loss::ObjectPixel;
+use crate::reference::model::ROW_FLOATS;
+use crate::reference::splat::{Splat, SplatGradient};
+use crate::reference::{Model, Row};
 use crate::scene::{Camera, Occluders, Photo};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, PlanOptions};
@@ -13,10 +17,6 @@ use crate::train::input::step_input::{self, SceneScale, Shown, StepInput, StepVi
 use crate::train::setup::near_plane::NEAR;
 use crate::train::strategy::{self, At};
 use crate::train::{LabelRule, TrainConfig};
-use crate::verify::reference::loss::ObjectPixel;
-use crate::verify::reference::model::ROW_FLOATS;
-use crate::verify::reference::splat::{Splat, SplatGradient};
-use crate::verify::reference::{Model, Row};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;

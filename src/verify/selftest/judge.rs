@@ -3,14 +3,14 @@
 use super::compare::{
     Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients, pick, sure,
 };
+use crate::reference::adam::{Optimised, Rates};
+use crate::reference::blend::Blended;
+use crate::reference::lift::Labelled;
+use crate::reference::model::flatten;
+use crate::reference::project::project_forward;
+use crate::reference::splat::{Splat, SplatGradient};
+use crate::reference::{Group, Model, Row, Rules};
 use crate::scene::Camera;
-use crate::verify::reference::adam::{Optimised, Rates};
-use crate::verify::reference::blend::Blended;
-use crate::verify::reference::lift::Labelled;
-use crate::verify::reference::model::flatten;
-use crate::verify::reference::project::project_forward;
-use crate::verify::reference::splat::{Splat, SplatGradient};
-use crate::verify::reference::{Group, Model, Row, Rules};
 
 /// Combines several verdicts.
 pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {

@@ -15,7 +15,7 @@ mod training;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
-use crate::verify::reference::Rules;
+use crate::reference::Rules;
 use checks::FinishedStep;
 use compare::{Tolerance, Verdict};
 use fixture::{Fixture, readable};

@@ -6,12 +6,12 @@ use super::scenes::{Shape, scene};
 use super::{Judge, LEEWAY, Rig, judge};
 use crate::engine::SharedRow;
 use crate::error::Result;
+use crate::reference::pose::{PoseRows, backward, corrected};
+use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::POSE_PRIOR;
 use crate::train::shared::poses::{self, Poses};
 use crate::train::shared::{Place, SharedLayout, SharedParameters};
-use crate::verify::reference::pose::{PoseRows, backward, corrected};
-use crate::verify::reference::{Row, Rules};
 use glam::DVec3;
 use std::sync::Arc;
 

@@ -7,17 +7,17 @@ use super::scenes::{Shape, scene};
 use super::{Judge, LEEWAY, Rig, judge};
 use crate::engine::ListKey;
 use crate::error::Result;
+use crate::reference::densify::{Origin, Population};
+use crate::reference::model::floats;
+use crate::reference::random::{normal_draw, uniform_draw};
+use crate::reference::relocate::{explored, regularised, relocate, weights};
+use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::NO_SPLAT;
 use crate::shaders::structs::StepUniforms;
 use crate::train::StrategyKind;
 use crate::train::strategy::passes::EXPLORE;
 use crate::train::strategy::{At, of};
-use crate::verify::reference::densify::{Origin, Population};
-use crate::verify::reference::model::floats;
-use crate::verify::reference::random::{normal_draw, uniform_draw};
-use crate::verify::reference::relocate::{explored, regularised, relocate, weights};
-use crate::verify::reference::{Row, Rules};
 
 /// Relocates with this many draws; the fixture's model is the population. Opacities and scales of copies may differ.
 pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway: f64) -> Result<Judge> {

@@ -1,10 +1,10 @@
 //! Small seeded scenes. Every number is an f32, so that an engine in f32 and a mirror in f64 start with equal values.
 
+use crate::reference::densify::Population;
+use crate::reference::loss::{ObjectPixel, Photo};
+use crate::reference::step::Target;
+use crate::reference::{Model, Row};
 use crate::scene::{Camera, Gaussians};
-use crate::verify::reference::densify::Population;
-use crate::verify::reference::loss::{ObjectPixel, Photo};
-use crate::verify::reference::step::Target;
-use crate::verify::reference::{Model, Row};
 use glam::{DMat3, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

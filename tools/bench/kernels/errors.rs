@@ -2,8 +2,8 @@
 
 use super::mirror::Mirror;
 use crate::measure::quantile;
-use labelgs::verify::reference::Row;
-use labelgs::verify::reference::model::{Group, flatten};
+use labelgs::reference::Row;
+use labelgs::reference::model::{Group, flatten};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

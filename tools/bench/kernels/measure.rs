@@ -9,7 +9,7 @@ use crate::measure::median;
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
-use labelgs::verify::reference::Rules;
+use labelgs::reference::Rules;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,10 +1,10 @@
-//! The float64 step of the tests (`src/verify/reference`), by blocks of the picture on all cores, so that scenes of the
+//! The float64 step of the tests (`src/reference`), by blocks of the picture on all cores, so that scenes of the
 //! benchmark's size take seconds. Without labels.
 
-use labelgs::verify::reference::blend::{self, Margins, Upstream};
-use labelgs::verify::reference::loss::photo_loss;
-use labelgs::verify::reference::splat::{Splat, SplatGradient};
-use labelgs::verify::reference::{Model, Row, Rules, project, sort};
+use labelgs::reference::blend::{self, Margins, Upstream};
+use labelgs::reference::loss::photo_loss;
+use labelgs::reference::splat::{Splat, SplatGradient};
+use labelgs::reference::{Model, Row, Rules, project, sort};
 use labelgs::verify::selftest::scenes::Scene;
 use rayon::prelude::*;
 
@@ -54,7 +54,7 @@ impl<'a> View<'a> {
         let seen = |gaussian| {
             let projection = project::project_forward(rules, camera, &model, gaussian)?;
             let size = (camera.width as usize, camera.height as usize);
-            labelgs::verify::reference::tile::cull(rules, &projection.splat, size).touches.then_some(projection)
+            labelgs::reference::tile::cull(rules, &projection.splat, size).touches.then_some(projection)
         };
         let found: Vec<_> = (0..model.rows.len()).into_par_iter().filter_map(seen).collect();
         let order = sort::depth_sort(&found.iter().map(|projection| projection.splat.depth).collect::<Vec<_>>());

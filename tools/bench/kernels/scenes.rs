@@ -1,9 +1,9 @@
 //! The scenes: two sizes with the statistics of a trained scene, and five that are hard on the arithmetic.
 
 use glam::{DMat3, DVec3};
+use labelgs::reference::loss::Photo;
+use labelgs::reference::step::Target;
 use labelgs::scene::{Camera, Gaussians};
-use labelgs::verify::reference::loss::Photo;
-use labelgs::verify::reference::step::Target;
 use labelgs::verify::selftest::scenes::{Scene, generator, round, uniform};
 use rand::Rng;
 use rand_pcg::Pcg32;

@@ -1,8 +1,8 @@
 //! The least size of Gaussians that photos can show.
 
 use super::{Row, Rules};
-use crate::scene::Camera;
 use glam::DVec3;
+use labelgs_scene::Camera;
 
 /// Returns the row with its least size, given the limit of the views before, 0 if there is none; the limit after this
 /// view, whose photo has `focal` px at full size; and the distance of the nearest decision, relative to the view.

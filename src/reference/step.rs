@@ -5,7 +5,7 @@ use super::loss::{self, Loss, ObjectPixel, Photo};
 use super::project::{self, Projection};
 use super::splat::{Splat, SplatGradient};
 use super::{Model, Row, Rules};
-use crate::scene::Camera;
+use labelgs_scene::Camera;
 
 /// Training target of a view.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! Pose of a photo: the camera that two rows of the photo correct, and the gradient of the rows.
 
 use super::{Model, Row, Rules, sh};
-use crate::scene::Camera;
 use glam::DVec3;
+use labelgs_scene::Camera;
 
 /// The rows of a photo: six trained numbers in two rows, whose fourth numbers are 1 once the pose is settled, and the unit of
 /// the move; and the six rows of the preconditioner, in two rows each.

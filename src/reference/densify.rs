@@ -2,12 +2,11 @@
 
 use super::blend::{Upstream, blend_backward};
 use super::project::{normalised, rotation, sigmoid};
-use super::rules::wide;
+use super::rules::{GRADIENT_MAX, wide};
 use super::splat::Splat;
 use super::{Model, Row, Rules};
-use crate::scene::Camera;
-use crate::shaders::constants;
 use glam::DVec3;
+use labelgs_scene::Camera;
 
 /// Input of densification.
 #[derive(Clone, Debug, PartialEq)]
@@ -208,7 +207,7 @@ pub fn absolute_gradient2d(
 
 /// Adds a view to the statistic: gradient norm and one view per visible Gaussian. Skips dropped gradients.
 pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bool]) {
-    let counts = |index: &usize| visible[*index] && gradient2d[*index] < wide(constants::GRADIENT_MAX);
+    let counts = |index: &usize| visible[*index] && gradient2d[*index] < wide(GRADIENT_MAX);
     for index in (0..visible.len()).filter(counts) {
         population.gradient_sum[index] += gradient2d[index];
         population.gradient_count[index] += 1.0;

@@ -1,10 +1,13 @@
 //! All constants of the method: the engine's f32 values, widened to f64.
 //!
-//! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; the test below
-//! compares the two.
+//! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; a test of the engine
+//! compares the two (`tests/verify/constants.rs`).
 
-use crate::scene::Zone;
 use glam::DVec3;
+use labelgs_scene::Zone;
+
+/// Larger gradients are dropped: their square overflows in Adam.
+pub const GRADIENT_MAX: f32 = 1e18;
 
 /// The f32 constant as f64.
 pub fn wide(value: f32) -> f64 {
@@ -136,59 +139,5 @@ impl Rules {
     /// Returns true where Gaussians grow.
     pub fn grows_at(&self, mean: [f64; 3]) -> bool {
         self.grow_box.is_none_or(|zone| zone.contains(DVec3::from(mean)))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Rules;
-    use crate::scene::gaussians::ALPHA_MAX;
-    use crate::scene::harmonics::SH_C0;
-    use crate::shaders::constants as glsl;
-
-    #[test]
-    fn the_rules_are_the_constants_of_the_shaders() {
-        let r = Rules::default();
-        let [c20, c22, c24] = [glsl::SH_C2_0, glsl::SH_C2_2, glsl::SH_C2_4];
-        let [c30, c31, c32, c33, c35] = [glsl::SH_C3_0, glsl::SH_C3_1, glsl::SH_C3_2, glsl::SH_C3_3, glsl::SH_C3_5];
-        let single = [
-            (r.near, glsl::NEAR),
-            (r.dilation, glsl::COV2D_BLUR),
-            (r.finest, glsl::FINEST),
-            (r.alpha_slack, glsl::ALPHA_SLACK),
-            (r.smooth_margin, glsl::SMOOTH_MARGIN),
-            (r.jacobian_margin, glsl::JACOBIAN_MARGIN),
-            (r.alpha_min, glsl::ALPHA_MIN),
-            (r.alpha_max, glsl::ALPHA_MAX),
-            (r.transmittance_min, glsl::TRANSMITTANCE_MIN),
-            (r.exponent_min(), glsl::LOG2_ALPHA_MIN),
-            (r.colour_bias, glsl::COLOUR_BIAS),
-            (r.sh_c0, glsl::SH_C0),
-            (SH_C0, glsl::SH_C0),
-            (ALPHA_MAX, glsl::ALPHA_MAX),
-            (r.sh_c1, glsl::SH_C1),
-            (r.ssim_c1, glsl::SSIM_C1),
-            (r.ssim_c2, glsl::SSIM_C2),
-            (r.adam_beta1, glsl::ADAM_BETA1),
-            (r.adam_beta2, glsl::ADAM_BETA2),
-            (r.adam_eps, glsl::ADAM_EPSILON),
-            (r.split_shrink.ln(), glsl::SPLIT_SHRINK),
-            (r.split_offset, glsl::SPLIT_OFFSET),
-            (-r.split_long.ln(), glsl::SPLIT_LONG),
-            (-r.split_others.ln(), glsl::SPLIT_OTHERS),
-            (r.split_opacity, glsl::SPLIT_OPACITY),
-            (r.stat_near, glsl::STAT_NEAR),
-            (r.free_size, glsl::FREE_SIZE),
-            (r.relocate_one, glsl::RELOCATE_ONE),
-            (f64::from(r.relocate_most), glsl::RELOCATE_MOST as f32),
-            (r.noise_steep, glsl::NOISE_STEEP),
-            (r.noise_opacity, glsl::NOISE_OPACITY),
-            ((r.reset_opacity / (1.0 - r.reset_opacity)).ln(), glsl::OPACITY_RESET_LOGIT),
-        ];
-        let degree_2 = r.sh_c2.into_iter().zip([c20, -c20, c22, -c20, c24]);
-        let degree_3 = r.sh_c3.into_iter().zip([-c30, c31, -c32, c33, -c32, c35, -c30]);
-        for (rule, constant) in single.into_iter().chain(degree_2).chain(degree_3) {
-            assert!((rule / f64::from(constant) - 1.0).abs() < 2e-7, "{rule} for {constant}");
-        }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::splat::{Splat, SplatGradient};
 use super::{Model, Row, Rules, sh, sort, tile};
-use crate::scene::Camera;
 use glam::{DMat3, DVec2, DVec3};
+use labelgs_scene::Camera;
 
 /// A splat with the intermediate results of its projection.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Rows of parameters; gradients and moments use the same rows.
 
-use crate::scene::Gaussians;
+use labelgs_scene::Gaussians;
 use std::ops::Range;
 
 /// Floats per Gaussian.
