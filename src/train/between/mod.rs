@@ -13,6 +13,7 @@ pub(super) use pose_adjustment::PoseAdjustment;
 pub(super) use votes::Votes;
 
 use super::context::Context;
+use super::settings::TrainConfig;
 use crate::error::Result;
 
 /// Work between two steps, with what it works on.
@@ -42,6 +43,10 @@ pub(super) struct Jobs {
 }
 
 impl Jobs {
+    pub(super) fn new(config: &TrainConfig) -> Self {
+        Self { poses: PoseAdjustment, votes: Votes::default(), occluders: Occluders, growth: Growth::new(config) }
+    }
+
     /// Returns the jobs before or after a step, in their order.
     pub(super) fn list(&mut self, when: When) -> Vec<&mut dyn Between<Context>> {
         match when {

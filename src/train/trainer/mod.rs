@@ -15,7 +15,7 @@ use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::train::TrainConfig;
-use crate::train::between::{Growth, Jobs, Occluders, PoseAdjustment, Votes, When};
+use crate::train::between::{Jobs, When};
 use crate::train::context::Context;
 use crate::train::input::free_space;
 use crate::train::input::sampler::{self, ViewOrder};
@@ -86,12 +86,7 @@ impl Trainer {
         options: TrainerOptions,
     ) -> Result<Self> {
         let context = Context::new(gpu, config, dataset, size, options)?;
-        let jobs = Jobs {
-            poses: PoseAdjustment,
-            votes: Votes::default(),
-            occluders: Occluders,
-            growth: Growth::new(&context.config),
-        };
+        let jobs = Jobs::new(&context.config);
         Ok(Self {
             order: ViewOrder::new(context.config.seed, context.views.parts().len()),
             context,
