@@ -50,6 +50,8 @@ pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
     let emulated = KernelShape { emulated: true, ..KernelShape::new(32, is_cpu) };
     let mut kernels = Vec::new();
     for shape in shapes.chain([emulated]) {
+        let sweeping = shape.with_sweeps(gpu.capabilities()).filter(|_| !is_cpu);
+        let shape = sweeping.unwrap_or(shape);
         let of_shape = |shader: &&&'static ShaderDesc| shader.macros.contains(&"EMULATED") == shape.emulated;
         for shader in shaders::ALL.iter().filter(of_shape) {
             let spec = shader.spec.iter().map(|constant| shape.constant(constant.name).unwrap_or(constant.default));
