@@ -134,11 +134,14 @@ impl Pipeline {
         self.set_layout = vk_call("vkCreateDescriptorSetLayout", || unsafe {
             self.device.create_descriptor_set_layout(&info, None)
         })?;
-        let (layouts, pushed) = ([self.set_layout], [vk::PushConstantRange {
-            stage_flags: vk::ShaderStageFlags::COMPUTE,
-            offset: 0,
-            size: 4 * PUSHED_WORDS as u32,
-        }]);
+        let (layouts, pushed) = (
+            [self.set_layout],
+            [vk::PushConstantRange {
+                stage_flags: vk::ShaderStageFlags::COMPUTE,
+                offset: 0,
+                size: 4 * PUSHED_WORDS as u32,
+            }],
+        );
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(&pushed);
         // SAFETY: same as above.
         self.layout = vk_call("vkCreatePipelineLayout", || unsafe { self.device.create_pipeline_layout(&info, None) })?;

@@ -61,7 +61,15 @@ impl<'a> Builder<'a> {
     /// An empty list, without bands of colour.
     pub fn new(name: &str, shape: &'a KernelShape, capacity: &'a Capacity) -> Self {
         let list = PassList { stage: Stage::PROJECT, ..PassList::new(name) };
-        Self { shape, capacity, supervision: Supervision::Photo, sh_degree: 0, counts: false, sweeps: Sweeps::default(), list }
+        Self {
+            shape,
+            capacity,
+            supervision: Supervision::Photo,
+            sh_degree: 0,
+            counts: false,
+            sweeps: Sweeps::default(),
+            list,
+        }
     }
 
     /// Number of dispatches that walk the longest list of a tile, at least 1.

@@ -66,7 +66,14 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
 }
 
 /// The same in one pass for each digit. The pass that writes the keys counts their digits: `sweep_bin` of dispatch.glsl.
-fn sort_by_sweeps(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
+fn sort_by_sweeps(
+    b: &mut Builder,
+    buffers: SortBuffers,
+    bits: u32,
+    count: Count,
+    by: &str,
+    identity: bool,
+) -> (Buf, Buf) {
     let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::SORT));
     let (passes, digit_bits) = (passes(b.shape, bits), b.shape.digit_bits);
     for pass in 0..passes {

@@ -7,9 +7,9 @@
 #![expect(clippy::disallowed_methods, reason = "the place that records dispatches and barriers")]
 
 use crate::error::{Error, Result};
-use crate::shaders::PUSHED_WORDS;
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Pipeline, QueryPool, vk_call};
 use crate::scheduler::plan::{Use, Uses};
+use crate::shaders::PUSHED_WORDS;
 use ash::vk;
 
 /// Workgroups of a dispatch, with the resolved buffer.

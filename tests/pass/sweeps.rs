@@ -8,6 +8,7 @@ use crate::support::scenes::generator;
 use bytemuck::Zeroable;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::{Gpu, GpuOptions};
+use labelgs::pass::buffers::Capacity;
 use labelgs::pass::build::Count;
 use labelgs::pass::scan::Total;
 use labelgs::pass::sort::SortBuffers;
@@ -15,7 +16,8 @@ use labelgs::pass::{Builder, KernelShape, scan, sort};
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
-    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
+    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS,
+    SWEEP_LANES,
 };
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -73,14 +75,14 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
             sweep[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
         }
     }
-    let partitions = (count as u32).div_ceil(SWEEP_LANES * ITEMS);
+    let partitions = (count as u32).div_ceil(SWEEP_LANES * engine.shape().sweep_items);
     let mut args = [0_u32; 33];
-    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS] {
+    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES] {
         args[at as usize..][..3].copy_from_slice(&[partitions, 1, 1]);
     }
     let count = count as u32;
     let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
-    let counters = Counters { visible_count: count, ..Counters::zeroed() };
+    let counters = Counters { visible_count: count, instance_count: count, ..Counters::zeroed() };
     let sched = engine.raw_mut();
     sched.upload(Buf::SWEEP, 0, 0, &sweep).expect("upload");
     sched.upload(Buf::DISPATCH_ARGS, 0, 0, &args).expect("upload");
@@ -140,7 +142,8 @@ fn visible_keys_are_listed_and_sorted() {
         });
         let mut random = generator(72);
         for count in COUNTS {
-            let key = |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
+            let key =
+                |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
             let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
             announce(engine, count, &[]);
             engine.raw_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
@@ -196,6 +199,43 @@ fn sort_exactly(engine: &mut Engine, held: Option<u32>, cases: &[(usize, u32)]) 
         let order = radix_sort(&keys);
         let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
         check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
-        check("values", exact(&get(engine, values_out, count), &by_order(&values)));
+        let found = get(engine, values_out, count);
+        check("values", exact(&found, &by_order(&values)));
+        // A sort that turns equal keys around is seen.
+        if different < 100 && count > 1000 {
+            let mut turned: Vec<usize> = (0..count).rev().collect();
+            turned.sort_by_key(|&place| keys[place]);
+            let turned: Vec<u32> = turned.iter().map(|&place| values[place]).collect();
+            assert!(exact(&found, &turned).is_err());
+        }
     }
+}
+
+/// As many keys as a large scene has pairs, in partitions of the size that cards have.
+#[test]
+fn ten_million_keys_are_sorted() {
+    const KEYS: usize = 10_000_000;
+    let Ok(gpu) = Gpu::new(&options()) else { return };
+    let turn = Turn::with(gpu);
+    let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(16);
+    let size = EngineSize::new(1, (64, 64));
+    let mut engine =
+        Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");
+    let room = Capacity { instances: KEYS as u64, sweep_cells: shape.sweep_cells(KEYS as u64), ..*engine.capacity() };
+    engine.set_capacity(room).expect("room");
+    let buffers =
+        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+    let mut found = None;
+    let id = list(&mut engine, None, |b| found = Some(sort::sort(b, buffers, 13, Count::Instances, "by tile", true)));
+    let (keys_out, values_out) = found.expect("the sort was declared");
+    let mut random = generator(75);
+    let keys: Vec<u32> = (0..KEYS).map(|_| random.random_range(0..1 << 13)).collect();
+    announce(&mut engine, KEYS, &keys);
+    engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+    run(&mut engine, id);
+    let order = radix_sort(&keys);
+    let places: Vec<u32> = order.iter().map(|&place| place as u32).collect();
+    let sorted: Vec<u32> = order.iter().map(|&place| keys[place]).collect();
+    check("keys", exact(&get(&mut engine, keys_out, KEYS), &sorted));
+    check("places", exact(&get(&mut engine, values_out, KEYS), &places));
 }

@@ -44,13 +44,13 @@ toy_shader!(
 );
 
 toy_shader!(
-    undeclared_push,
+    undeclared_pushes,
     [],
     [("to", W, S, 4)],
     "layout(local_size_x = 1) in;
-    layout(push_constant, scalar) uniform Push { uint index; };
+    layout(push_constant, scalar) uniform Push { uint index[32]; };
     layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
-    void main() { to[0] = index; }"
+    void main() { to[0] = index[31]; }"
 );
 
 #[test]
@@ -130,7 +130,7 @@ fn messages_of_the_validation_layer_are_recorded() {
     }
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(256), SchedulerOptions::default()).unwrap();
     let mut list = PassList::new("wrong");
-    list.pass(PassDecl::new(undeclared_push(), vec![REPORT], Grid::Groups(1, 1, 1)));
+    list.pass(PassDecl::new(undeclared_pushes(), vec![REPORT], Grid::Groups(1, 1, 1)));
     let _ = scheduler.prepare(&list);
     let messages = gpu.messages();
     assert!(messages.iter().any(|message| message.is_error && message.id.starts_with("VUID")), "{messages:?}");

@@ -45,7 +45,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    for shape in own.into_iter().chain(emulated).chain(antialiased) {
+    let sweeping = own.into_iter().chain(emulated).map(|shape| shape.with_sweeps_of(8));
+    for shape in own.into_iter().chain(emulated).chain(antialiased).chain(sweeping) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;

@@ -48,13 +48,12 @@ pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static 
         },
         element_bytes: binding.element_bytes,
     });
-    let spec =
-        found.spec.into_iter().map(|spec| SpecDesc {
-            name: spec.name.leak(),
-            id: spec.id,
-            is_pushed: spec.is_pushed,
-            default: spec.default,
-        });
+    let spec = found.spec.into_iter().map(|spec| SpecDesc {
+        name: spec.name.leak(),
+        id: spec.id,
+        is_pushed: spec.is_pushed,
+        default: spec.default,
+    });
     Ok(Box::leak(Box::new(ShaderDesc {
         stem: name,
         name,

@@ -280,7 +280,9 @@ impl<'a> Reflector<'a> {
         for member in read {
             let name = self.member_names.get(&(block, member)).copied().unwrap_or("").to_owned();
             let ty = self.values.get(&block).map(|block| word(block, member as usize));
-            if self.spec_type(ty) != "u32" || self.member_decoration(block, member, Decoration::Offset) != Some(4 * member) {
+            if self.spec_type(ty) != "u32"
+                || self.member_decoration(block, member, Decoration::Offset) != Some(4 * member)
+            {
                 self.problem(&name, format!("`{name}` is pushed; it must be a uint"));
             }
             self.interface.spec.push(SpecConstant { name, id: member, is_pushed: true, rust: "u32", default: 0 });
