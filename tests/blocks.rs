@@ -109,7 +109,7 @@ fn json(path: &Path) -> Value {
 /// A scene with a coarse model and two blocks, trained but for those that a test trains itself.
 fn split() -> Place {
     let place = Place::new();
-    succeeded(&place.trained("coarse", &["--iterations", "120"]));
+    succeeded(&place.trained("coarse", &["--iterations", "60"]));
     let (scene, coarse, blocks) = (place.text("scene"), place.text("coarse"), place.text("blocks"));
     let typed = ["blocks", "split", &scene, "--model", &coarse, "--card", "8G", "--blocks", "2", "-o", &blocks];
     succeeded(&place.labelgs(&typed));
@@ -118,7 +118,7 @@ fn split() -> Place {
 
 fn train_block(place: &Place, id: &str, flags: &[&str]) -> std::process::Output {
     let block = place.text(&format!("blocks/{id}"));
-    place.trained(&format!("models/{id}"), &[&["--block", &block, "--resume", "--iterations", "120"], flags].concat())
+    place.trained(&format!("models/{id}"), &[&["--block", &block, "--resume", "--iterations", "60"], flags].concat())
 }
 
 fn merge(place: &Place, flags: &[&str]) -> std::process::Output {
@@ -248,9 +248,9 @@ fn a_merge_lists_all_that_is_wrong() {
     assert!(text.contains("label 2 is ball, elsewhere globe") && text.contains("problems"), "{text}");
     // Stopped before its end: the metrics of a run tell.
     let metrics = place.path("models/b000/metrics.json");
-    let changed = std::fs::read_to_string(&metrics).expect("text").replace("\"steps\": 120", "\"steps\": 7");
+    let changed = std::fs::read_to_string(&metrics).expect("text").replace("\"steps\": 60", "\"steps\": 7");
     std::fs::write(&metrics, changed).expect("written");
-    assert!(stderr(&merge(&place, &[])).contains("stopped after 7 of 120 steps"));
+    assert!(stderr(&merge(&place, &[])).contains("stopped after 7 of 60 steps"));
 }
 
 #[test]

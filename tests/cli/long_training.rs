@@ -37,7 +37,8 @@ fn a_long_training_is_the_same_to_the_last_bit() {
     succeeded(&place.trained("straight", &flags));
     let patience = start.elapsed() * 20 + Duration::from_secs(60);
     let expected = place.model("straight", STEPS);
-    let gaussians = labelgs::formats::read_model(place.path(format!("straight/point_cloud/iteration_{STEPS}/point_cloud.ply")));
+    let gaussians =
+        labelgs::formats::read_model(place.path(&format!("straight/point_cloud/iteration_{STEPS}/point_cloud.ply")));
     let gaussians = gaussians.expect("a model").gaussians;
     let labelled = gaussians.labels.as_ref().map_or(0, |labels| labels.iter().filter(|&&id| id > 0).count());
     assert!(gaussians.len() > 300 && labelled > 100, "{} Gaussians, {labelled} of them labelled", gaussians.len());

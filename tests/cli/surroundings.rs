@@ -145,7 +145,7 @@ fn host_memory_may_run_out() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let [model, part, right] = ["model.ply", "part.ply", "right.ply"].map(|name| place.text(name));
-    let rows = 150_000;
+    let rows = 300_000;
     let gaussians = Gaussians {
         means: (0..rows).map(|row| [row as f32, 0.0, 0.0]).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; rows],
@@ -159,7 +159,7 @@ fn host_memory_may_run_out() {
     succeeded(&place.labelgs(&extract(&right).each_ref().map(String::as_str)));
     let (mut done, mut refused) = (0, 0);
     // Less does not load a program without optimisation.
-    for megabytes in (60..240).step_by(12) {
+    for megabytes in (60..164).step_by(8) {
         let output = within(&place, megabytes, &extract(&part));
         let written = std::fs::read(&part).ok();
         match output.status.code() {

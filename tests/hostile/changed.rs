@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 /// Most places of a seed that are changed; longer seeds are changed at evenly spaced places. `LABELGS_TEST_PLACES` has another
 /// number.
 static PLACES: LazyLock<usize> =
-    LazyLock::new(|| std::env::var("LABELGS_TEST_PLACES").ok().and_then(|places| places.parse().ok()).unwrap_or(24));
+    LazyLock::new(|| std::env::var("LABELGS_TEST_PLACES").ok().and_then(|places| places.parse().ok()).unwrap_or(12));
 
 /// Numbers that a field may be given, as text.
 const WORDS: [&str; 11] = [

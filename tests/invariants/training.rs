@@ -14,6 +14,7 @@ use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::PlanOptions;
 use labelgs::synth::{Preset, SynthOptions, dataset};
 use labelgs::train::{StepReport, Trainer};
+use std::sync::LazyLock;
 
 /// 45 steps in which everything happens: higher degrees, labels by either rule, occluders, densification, an opacity
 /// reset.
@@ -53,8 +54,13 @@ pub fn budgeted() -> TrainConfig {
     }
 }
 
-/// Five views with masks.
+/// Five views with masks, made once.
 pub fn small() -> Dataset {
+    static MADE: LazyLock<Dataset> = LazyLock::new(make_small);
+    MADE.clone()
+}
+
+fn make_small() -> Dataset {
     let options = SynthOptions {
         preset: Preset::Simple,
         width: 72,

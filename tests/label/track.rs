@@ -94,8 +94,8 @@ fn score(truth: &[LabelMap], found: &[LabelMap]) -> f64 {
 fn frames_between_sparse_photos_keep_ids() {
     let options = SynthOptions {
         preset: Preset::Default,
-        width: 160,
-        height: 120,
+        width: 96,
+        height: 72,
         views: 8,
         points: 10,
         seed: 0,
@@ -109,7 +109,7 @@ fn frames_between_sparse_photos_keep_ids() {
         LabelMap { width: camera.width, height: camera.height, ids }
     };
     let mut table = Vec::new();
-    for between in [0, 4, 9, 19] {
+    for between in [0, 9] {
         let stops = video(&cameras, between, Between::Centres);
         let truth: Vec<LabelMap> = stops.iter().zip(0..).map(|(stop, at)| ids_at(&stop.camera, at)).collect();
         let segmented: Vec<LabelMap> = spoil(&truth, Fault::PerView, 1.0, 5).into_iter().flatten().collect();
@@ -121,7 +121,7 @@ fn frames_between_sparse_photos_keep_ids() {
         let (_, tracked, single) = table[table.len() - 1];
         println!("{between} frames between two photos: mIoU {tracked:.3} tracked, {single:.3} without a tracker");
     }
-    let [none, _, nine, _] = table[..] else { unreachable!("four rows") };
+    let [none, nine] = table[..] else { unreachable!("two rows") };
     assert!(none.2 < 0.2, "ids that differ in every view are no object: {}", none.2);
     assert!(nine.1 > none.1 + 0.3, "{table:?}");
 }

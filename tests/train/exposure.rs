@@ -100,7 +100,7 @@ fn gains_of_photos_are_found_and_go_on_from_a_checkpoint() {
     let mut straight = fresh(ExposureMode::On);
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("state");
-    go_on(&mut straight, 70).write(&file).expect("a file");
+    go_on(&mut straight, 90).write(&file).expect("a file");
     let expected = go_on(&mut straight, 120);
     let (bright, dark) = halves(&mut straight, |matrix| matrix[0].iter().sum());
     let (bright, dark) = (bright.into_iter().fold(f32::MAX, f32::min), dark.into_iter().fold(f32::MIN, f32::max));

@@ -89,7 +89,7 @@ fn a_wrong_pose_is_found_and_goes_on_from_a_checkpoint() {
         Trainer::new(turn.gpu(), settings, &scene, &start, SchedulerOptions::default()).expect("a trainer");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("state");
-    go_on(&mut straight, 120).write(&file).expect("a file");
+    go_on(&mut straight, 620).write(&file).expect("a file");
     let expected = go_on(&mut straight, 700);
     // A turn and a move can stand for each other, so pixels decide: the mean distance of the points from their places.
     let off = |camera: &Camera, truth: &Camera| {
