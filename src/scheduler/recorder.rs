@@ -103,12 +103,12 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Runs a shader with pushed words.
+    /// Runs a shader with the words that it reads.
     pub(super) fn dispatch(
         &self,
         pipeline: &Pipeline,
         set: vk::DescriptorSet,
-        pushed: &[u32; PUSHED_WORDS],
+        pushed: Option<[u32; PUSHED_WORDS]>,
         groups: &Groups<'_>,
     ) -> Result<()> {
         let (raw, command, limits) = (self.gpu.raw(), self.command, self.gpu.limits().plan);
@@ -127,8 +127,10 @@ impl<'a> Recorder<'a> {
         unsafe {
             raw.cmd_bind_pipeline(command, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
             raw.cmd_bind_descriptor_sets(command, vk::PipelineBindPoint::COMPUTE, pipeline.layout(), 0, &[set], &[]);
-            let words = bytemuck::cast_slice(pushed);
-            raw.cmd_push_constants(command, pipeline.layout(), vk::ShaderStageFlags::COMPUTE, 0, words);
+            if let Some(words) = &pushed {
+                let bytes = bytemuck::cast_slice(words);
+                raw.cmd_push_constants(command, pipeline.layout(), vk::ShaderStageFlags::COMPUTE, 0, bytes);
+            }
             match groups {
                 Groups::Count([x, y, z]) => raw.cmd_dispatch(command, *x, *y, *z),
                 Groups::Indirect(buffer, offset) => raw.cmd_dispatch_indirect(command, buffer.raw(), *offset),

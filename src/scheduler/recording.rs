@@ -125,11 +125,11 @@ impl Writer<'_> {
                 Groups::Indirect(buffer, offset + u64::from(inner))
             }
         };
-        let mut pushed = [0; PUSHED_WORDS];
+        let mut pushed = None;
         for (constant, &word) in pass.shader.spec.iter().zip(&pass.spec).filter(|(constant, _)| constant.is_pushed) {
-            pushed[constant.id as usize] = word;
+            pushed.get_or_insert([0; PUSHED_WORDS])[constant.id as usize] = word;
         }
-        self.recorder.dispatch(&pipeline, set, &pushed, &groups)
+        self.recorder.dispatch(&pipeline, set, pushed, &groups)
     }
 }
 
