@@ -118,6 +118,8 @@ pub struct Interface {
     pub bindings: Vec<Binding>,
     /// Specialisation constants in the order of ids, then pushed words that are used.
     pub spec: Vec<SpecConstant>,
+    /// Words of the block of pushed words.
+    pub pushed_words: u32,
     /// Struct types used in blocks, by name.
     pub structs: BTreeMap<String, Struct>,
     /// Invocations on each axis of a workgroup.

@@ -272,6 +272,7 @@ impl<'a> Reflector<'a> {
         let Some(variable) = module.types_global_values.iter().find(is_pushed) else { return };
         let pointer = variable.result_type.and_then(|pointer| self.values.get(&pointer));
         let (id, block) = (variable.result_id.unwrap_or(0), pointer.map_or(0, |pointer| word(pointer, 1)));
+        self.interface.pushed_words = self.values.get(&block).map_or(0, |block| block.operands.len() as u32);
         let chains = module.functions.iter().flat_map(|function| function.all_inst_iter());
         let read: BTreeSet<u32> = chains
             .filter(|instruction| instruction.class.opcode == Op::AccessChain && word(instruction, 0) == id)
