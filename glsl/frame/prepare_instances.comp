@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "partitions.glsl"
 // prepare_instances — detect an overflow of the buffers of (splat, tile) pairs; on overflow, no pairs are written.
 // Work:    one invocation.
 // Reads:   step; counters.instance_count (the need, even beyond capacity)
@@ -10,7 +11,6 @@
 // Mirror:  none (bookkeeping; tests/train/overflow.rs)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 18) const uint SWEEP_ITEMS = 16;
 INOUT1(0, Counters, counters);
 INOUT(1, uint, dispatch_args);
 INOUT1(2, uint, failure);
@@ -22,7 +22,7 @@ void main() {
         failure |= FAILED_INSTANCES;
         dispatch_args[ARGS_SPLATS] = 0u;
     }
-    uvec3 partitions = folded_groups(failure != 0u ? 0u : (needed + SWEEP_LANES * SWEEP_ITEMS - 1u) / (SWEEP_LANES * SWEEP_ITEMS));
-    dispatch_args[ARGS_SWEEP_INSTANCES] = partitions.x;
-    dispatch_args[ARGS_SWEEP_INSTANCES + 1u] = partitions.y;
+    uvec3 groups = folded_groups(failure != 0u ? 0u : partitions(needed));
+    dispatch_args[ARGS_SWEEP_INSTANCES] = groups.x;
+    dispatch_args[ARGS_SWEEP_INSTANCES + 1u] = groups.y;
 }

@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "partitions.glsl"
 // prepare_splats — size the dispatches over the visible splats.
 // Work:    one invocation.
 // Reads:   counters.visible_count
@@ -10,7 +11,6 @@
 // Mirror:  none (bookkeeping)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 18) const uint SWEEP_ITEMS = 16;
 READ1(0, Counters, counters);
 INOUT(1, uint, dispatch_args);
 
@@ -18,7 +18,7 @@ void main() {
     uvec3 groups = folded_groups((counters.visible_count + 63u) / 64u);
     dispatch_args[ARGS_SPLATS] = groups.x;
     dispatch_args[ARGS_SPLATS + 1u] = groups.y;
-    uvec3 partitions = folded_groups((counters.visible_count + SWEEP_LANES * SWEEP_ITEMS - 1u) / (SWEEP_LANES * SWEEP_ITEMS));
-    dispatch_args[ARGS_SWEEP_SPLATS] = partitions.x;
-    dispatch_args[ARGS_SWEEP_SPLATS + 1u] = partitions.y;
+    groups = folded_groups(partitions(counters.visible_count));
+    dispatch_args[ARGS_SWEEP_SPLATS] = groups.x;
+    dispatch_args[ARGS_SWEEP_SPLATS + 1u] = groups.y;
 }

@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "partitions.glsl"
 // step_begin — clear the counters and size the dispatches over all Gaussians or all layers.
 // Work:    one invocation.
 // Reads:   step
@@ -10,7 +11,6 @@
 // Mirror:  none (bookkeeping; every later pass fails without it)
 
 layout(local_size_x = 1) in;
-layout(constant_id = 18) const uint SWEEP_ITEMS = 16;
 READ1(0, StepUniforms, step);
 WRITE1(1, Counters, counters);
 WRITE(2, uint, dispatch_args);
@@ -19,10 +19,6 @@ void put(uint at, uvec3 groups) {
     dispatch_args[at] = groups.x;
     dispatch_args[at + 1u] = groups.y;
     dispatch_args[at + 2u] = groups.z;
-}
-
-uint partitions(uint items) {
-    return (items + SWEEP_LANES * SWEEP_ITEMS - 1u) / (SWEEP_LANES * SWEEP_ITEMS);
 }
 
 void main() {

@@ -86,3 +86,4 @@ const uint ARGS_SWEEP_GAUSSIANS = 21u;       // partitions of a sweep
 const uint ARGS_SWEEP_SPLATS = 24u;
 const uint ARGS_SWEEP_INSTANCES = 27u;
 const uint ARGS_SWEEP_TILES = 30u;
+const uint ARGS_WORDS = 33u;                 // of all entries

@@ -6,8 +6,7 @@
 // The buffer `sweep` is 0 before the step. Its words by partition are those of two passes of a sort, which take turns and clear
 // each other's, one for each digit, and one of each scan.
 
-layout(constant_id = 18) const uint SWEEP_ITEMS = 16;         // items of an invocation
-const uint SWEEP_PARTITION = SWEEP_LANES * SWEEP_ITEMS;
+#include "partitions.glsl"
 const uint SWEEP_SUBGROUPS = SWEEP_LANES / SUBGROUP_SIZE;
 
 // A word: two bits for its state, then a sum.

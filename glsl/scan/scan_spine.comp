@@ -14,6 +14,7 @@
 layout(local_size_x_id = 0) in;
 INOUT(0, uint, partials);
 INOUT1(1, Counters, counters);
+#include "total.glsl"
 
 void main() {
     uint lane = gl_LocalInvocationID.x;
@@ -28,16 +29,7 @@ void main() {
     uint high = subgroup_exclusive_add(sum >> 16u) + (low >> 16u);
     uint running = high > 0xffffu ? 0xffffffffu : (high << 16u) | (low & 0xffffu);
     if (lane == SUBGROUP_SIZE - 1u) {
-        uint total = saturating_add(running, sum);
-        if (TOTAL == 0u) {
-            counters.visible_count = total;
-        } else if (TOTAL == 1u) {
-            counters.instance_count = total;
-        } else if (TOTAL == 2u) {
-            counters.layer_tile_count = total;
-        } else {
-            counters.densified_count = total;
-        }
+        put_total(saturating_add(running, sum));
     }
     for (uint i = begin; i < end; i++) {
         uint v = partials[i];

@@ -3,7 +3,6 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "count.glsl"
-#include "dispatch.glsl"
 #include "saturate.glsl"
 // scan_sweep — exclusive prefix sum in one dispatch; or (variant compact) lists the visible Gaussians in the order of the model.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS items per workgroup.
@@ -24,13 +23,12 @@ INOUT(4, uint, sweep);
 #ifdef COMPACT
 WRITE(5, uint, keys_out);
 WRITE(6, uint, values_out);
-layout(constant_id = 9) const uint DIGIT_BITS = 8;
-const uint BINS = (32u / DIGIT_BITS) << DIGIT_BITS;
-shared uint bins[BINS];
+#include "digit_counts.glsl"
 #else
 WRITE(5, uint, offsets);
 #endif
 #include "sweep.glsl"
+#include "total.glsl"
 
 shared uint sums[SWEEP_SUBGROUPS];
 shared uint prefix;
@@ -97,22 +95,11 @@ void main() {
         prefix = found;
         if (part == (n - 1u) / SWEEP_PARTITION) {
             uint total = sweep_add(found, own);
-            total = total == SWEEP_SUM ? 0xffffffffu : total;
-            if (TOTAL == 0u) {
-                counters.visible_count = total;
-            } else if (TOTAL == 1u) {
-                counters.instance_count = total;
-            } else if (TOTAL == 2u) {
-                counters.layer_tile_count = total;
-            } else {
-                counters.densified_count = total;
-            }
+            put_total(total == SWEEP_SUM ? 0xffffffffu : total);
         }
     }
 #ifdef COMPACT
-    for (uint b = lane; b < BINS; b += SWEEP_LANES) {
-        bins[b] = 0u;
-    }
+    clear_bins(lane, SWEEP_LANES);
 #endif
     barrier();
     first = sweep_add(first, prefix);
@@ -125,9 +112,7 @@ void main() {
             if (key != KEY_INVISIBLE) {
                 keys_out[to] = key;
                 values_out[to] = i;
-                for (uint shift = 0u; shift < 32u; shift += DIGIT_BITS) {
-                    atomicAdd(bins[((shift / DIGIT_BITS) << DIGIT_BITS) + bitfieldExtract(key, int(shift), int(DIGIT_BITS))], 1u);
-                }
+                count_digits(key);
             }
 #else
             offsets[i] = to;
@@ -136,10 +121,6 @@ void main() {
     }
 #ifdef COMPACT
     barrier();
-    for (uint b = lane; b < BINS; b += SWEEP_LANES) {
-        if (bins[b] > 0u) {
-            atomicAdd(sweep[sweep_bin(SORT_SLOT, b, DIGIT_BITS)], bins[b]);
-        }
-    }
+    add_bins(lane, SWEEP_LANES);
 #endif
 }

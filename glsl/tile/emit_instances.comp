@@ -29,19 +29,14 @@ FETCHU(10, layer_from_label);
 #endif
 #ifdef SWEEP
 INOUT(11, uint, sweep);
-layout(constant_id = 9) const uint DIGIT_BITS = 8;
-layout(constant_id = 22) const uint KEY_BITS = 32;
-const uint BINS = (KEY_BITS + DIGIT_BITS - 1u) / DIGIT_BITS << DIGIT_BITS;
-shared uint bins[BINS];
+#include "digit_counts.glsl"
 #endif
 
 void put(uint at, uint key, uint splat) {
     tile_keys[at] = key;
     splat_from_instance[at] = splat;
 #ifdef SWEEP
-    for (uint shift = 0u; shift < KEY_BITS; shift += DIGIT_BITS) {
-        atomicAdd(bins[(shift / DIGIT_BITS << DIGIT_BITS) + bitfieldExtract(key, int(shift), int(DIGIT_BITS))], 1u);
-    }
+    count_digits(key);
 #endif
 }
 
@@ -81,9 +76,7 @@ void emit(uint s) {
 void main() {
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
 #ifdef SWEEP
-    for (uint b = gl_LocalInvocationID.x; b < BINS; b += 64u) {
-        bins[b] = 0u;
-    }
+    clear_bins(gl_LocalInvocationID.x, 64u);
     barrier();
 #endif
     if (s < counters.visible_count && failure == 0u) {
@@ -91,10 +84,6 @@ void main() {
     }
 #ifdef SWEEP
     barrier();
-    for (uint b = gl_LocalInvocationID.x; b < BINS; b += 64u) {
-        if (bins[b] > 0u) {
-            atomicAdd(sweep[sweep_bin(SORT_SLOT, b, DIGIT_BITS)], bins[b]);
-        }
-    }
+    add_bins(gl_LocalInvocationID.x, 64u);
 #endif
 }

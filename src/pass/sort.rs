@@ -29,11 +29,9 @@ fn passes(shape: &KernelShape, bits: u32) -> u32 {
 }
 
 /// Sorts by the low `bits` bits. With `identity`, the values are the positions of the keys before the sort. `by` is
-/// appended to the pass titles. Returns the buffers with the sorted keys and values.
+/// appended to the pass titles. Returns the buffers with the sorted keys and values. Where the shape's passes look back, the
+/// pass that writes the keys has counted their digits (glsl/include/digit_counts.glsl).
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
-    if b.shape.sweeps() {
-        return sort_by_sweeps(b, buffers, bits, count, by, identity);
-    }
     let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::SORT));
     let lanes = b.capacity.sort_lanes as u32;
     let workgroups = lanes / b.shape.subgroup;
@@ -43,11 +41,20 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
     for pass in 0..passes {
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;
-        // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.
-        let digit_bits = digit_bits.min(bits.max(1) - shift);
         // The first pass of an identity sort reads no values; the keys replace the unwritten values buffer.
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
+        if b.shape.sweeps() {
+            pass!(b, radix_sweep {
+                step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+                values_in: values_in, sweep: Buf::SWEEP, keys_out: buffers.keys[to], values_out: buffers.values[to],
+            } [count_source: count as u32, shift: shift, sweep_slot: b.sweeps.sorts,
+                identity: u32::from(identity_now)], count.partitions());
+            b.sweeps.sorts += 1;
+            continue;
+        }
+        // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.
+        let digit_bits = digit_bits.min(bits.max(1) - shift);
         pass!(b, radix_count {
             step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
@@ -60,44 +67,12 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
             identity: u32::from(identity_now)], groups);
     }
-    named(b, first, around, by);
-    let last = (passes % 2) as usize;
-    (buffers.keys[last], buffers.values[last])
-}
-
-/// The same in one pass for each digit. The pass that writes the keys counts their digits: `sweep_bin` of dispatch.glsl.
-fn sort_by_sweeps(
-    b: &mut Builder,
-    buffers: SortBuffers,
-    bits: u32,
-    count: Count,
-    by: &str,
-    identity: bool,
-) -> (Buf, Buf) {
-    let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::SORT));
-    let (passes, digit_bits) = (passes(b.shape, bits), b.shape.digit_bits);
-    for pass in 0..passes {
-        let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
-        let identity_now = identity && pass == 0;
-        let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
-        pass!(b, radix_sweep {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
-            values_in: values_in, sweep: Buf::SWEEP, keys_out: buffers.keys[to], values_out: buffers.values[to],
-        } [count_source: count as u32, shift: pass * digit_bits, sweep_slot: b.sweeps.sorts,
-            identity: u32::from(identity_now)], count.partitions());
-        b.sweeps.sorts += 1;
-    }
-    named(b, first, around, by);
-    let last = (passes % 2) as usize;
-    (buffers.keys[last], buffers.values[last])
-}
-
-/// Ends the stage of a sort, whose passes start with item `first`.
-fn named(b: &mut Builder, first: usize, around: Stage, by: &str) {
     b.list.stage = around;
     for work in &mut b.list.work[first..] {
         if let Work::Pass(pass) = work {
             pass.title = format!("{} {by}", pass.title);
         }
     }
+    let last = (passes % 2) as usize;
+    (buffers.keys[last], buffers.values[last])
 }

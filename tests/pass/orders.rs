@@ -44,11 +44,11 @@ fn announce(engine: &mut Engine, count: usize) {
     engine.raw_mut().upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
 }
 
-fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
+pub fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
     engine.raw_mut().download(buf, 0, 0, count).expect("download")
 }
 
-fn counters(engine: &mut Engine) -> Counters {
+pub fn counters(engine: &mut Engine) -> Counters {
     engine.raw_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
 }
 

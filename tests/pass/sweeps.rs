@@ -1,5 +1,6 @@
 //! Sorts and scans that look back, with subgroups of each size: exact answers, also where a workgroup tells nothing.
 
+use super::orders::{counters, get};
 use crate::reference::scan::exclusive_scan;
 use crate::reference::sort::radix_sort;
 use crate::support::compare::{check, exact};
@@ -16,8 +17,8 @@ use labelgs::pass::{Builder, KernelShape, scan, sort};
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
-    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS,
-    SWEEP_LANES,
+    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_WORDS, KEY_INVISIBLE, SWEEP_DIGITS,
+    SWEEP_HISTOGRAMS, SWEEP_LANES,
 };
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -76,7 +77,7 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
         }
     }
     let partitions = (count as u32).div_ceil(SWEEP_LANES * engine.shape().sweep_items);
-    let mut args = [0_u32; 33];
+    let mut args = [0_u32; ARGS_WORDS as usize];
     for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES] {
         args[at as usize..][..3].copy_from_slice(&[partitions, 1, 1]);
     }
@@ -93,14 +94,6 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
 fn run(engine: &mut Engine, id: ListId) {
     engine.raw_mut().run(id, 0).expect("run");
     engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
-}
-
-fn get(engine: &mut Engine, buf: Buf, count: usize) -> Vec<u32> {
-    engine.raw_mut().download(buf, 0, 0, count).expect("download")
-}
-
-fn counters(engine: &mut Engine) -> Counters {
-    engine.raw_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
 }
 
 #[test]

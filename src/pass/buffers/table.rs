@@ -2,6 +2,7 @@
 
 use super::domains::cures;
 use crate::scheduler::plan::{Buf, BufferDecl, Class, Domain, Table, TexelFormat};
+use crate::shaders::constants::ARGS_WORDS;
 use crate::shaders::structs::{Counters, StepUniforms};
 
 const VEC4: Option<TexelFormat> = Some(TexelFormat::Rgba32Sfloat);
@@ -61,7 +62,7 @@ crate::buffers! { cures::whole;
     V_INSTANCES_C "v_instances_c": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::ONE, Class::Persistent, None, "Counts of this step (glsl/include/step.glsl).";
-    DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(33), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
+    DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(ARGS_WORDS), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
     DEPTH_KEYS "depth_keys": 4, Domain::GAUSSIANS, Class::Step, WORD, "Bits of z, or KEY_INVISIBLE, `[N]`.";
     VISIBLE_OFFSETS "visible_offsets": 4, Domain::GAUSSIANS, Class::Step, WORD, "Index among the visible Gaussians, `[N]`.";
     SPLAT_FROM_GAUSSIAN "splat_from_gaussian": 4, Domain::GAUSSIANS, Class::Step, WORD, "Splat of each Gaussian, or NO_SPLAT, `[N]`.";
