@@ -42,7 +42,7 @@ layout(push_constant, scalar) uniform PassWords {
     uint SWEEP_SLOT;   // the pass among those of a step that look back (sweep.glsl)
     uint SWEEP_HELD;   // for tests: 1 + the partition that tells nothing
     uint SORT_SLOT;    // first pass of the sort of the keys that are written
-    uint PARTIALS;     // sums of the loss
+    uint PARTIALS;     // sums of the loss, or of the exposure
 };
 
 #ifdef TEXEL

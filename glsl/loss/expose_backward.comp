@@ -6,7 +6,7 @@
 // expose_backward — gradient of the picture before its exposure; sum the gradient of the exposure.
 // Work:    64 invocations per workgroup, EXPOSED pixels.
 // Reads:   step; step_rows [ROW], the first row of the photo; shared_parameters [S]; image [P], exposed; target [P]
-// Writes:  v_image [P] rgb, in place; exposure_partials [ceil(P / EXPOSED)], EXPOSURE_ROWS each: r, g, b, 0
+// Writes:  v_image [P] rgb, in place; exposure_partials [PARTIALS], EXPOSURE_ROWS each: r, g, b, 0
 // Math:    of exposure.glsl; without the channels that are above 1 where the photo is saturated
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/exposure.rs::backward
@@ -55,7 +55,7 @@ void main() {
         }
     }
     barrier();
-    if (lane < EXPOSURE_ROWS && group * EXPOSED < pixels) {
+    if (lane < EXPOSURE_ROWS && group < PARTIALS) {
         exposure_partials[EXPOSURE_ROWS * group + lane] = vec4(sums[lane][0], 0.0);
     }
 }

@@ -1,10 +1,10 @@
 #version 460
 #include "layout.glsl"
 #include "constants.glsl"
-#include "step.glsl"
 // expose_reduce — gradient of the exposure of the step's photo.
 // Work:    one workgroup.
-// Reads:   step; step_rows [ROW], the first row of the photo; exposure_partials; shared_parameters [ROWS], STRIDE a photo
+// Reads:   step_rows [ROW], the first row of the photo; exposure_partials [PARTIALS];
+//          shared_parameters [ROWS], STRIDE a photo
 // Writes:  v_shared [row] and those after it
 // Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of each number over all photos: the model can be
 //          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
@@ -15,11 +15,10 @@ layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 15) const uint ROWS = 1;
 layout(constant_id = 17) const uint ROW = 0;
 layout(local_size_x = 64) in;
-READ1(0, StepUniforms, step);
-READ(1, uint, step_rows);
-READ(2, vec4, shared_parameters);
-READ(3, vec4, exposure_partials);
-WRITE(4, vec4, v_shared);
+READ(0, uint, step_rows);
+READ(1, vec4, shared_parameters);
+READ(2, vec4, exposure_partials);
+WRITE(3, vec4, v_shared);
 
 #include "exposure.glsl"
 
@@ -27,9 +26,9 @@ shared vec3 sums[EXPOSURE_ROWS][64];
 shared vec3 means[EXPOSURE_ROWS][64];
 
 void main() {
-    uint lane = gl_LocalInvocationID.x, partials = (step.width * step.height + EXPOSED - 1u) / EXPOSED;
+    uint lane = gl_LocalInvocationID.x;
     vec3 sum[EXPOSURE_ROWS] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), mean[EXPOSURE_ROWS] = sum;
-    for (uint k = lane; k < partials; k += 64u) {
+    for (uint k = lane; k < PARTIALS; k += 64u) {
         for (uint i = 0u; i < EXPOSURE_ROWS; ++i) {
             sum[i] += exposure_partials[EXPOSURE_ROWS * k + i].rgb;
         }

@@ -18,7 +18,7 @@ FETCH4(2, image);
 FETCHC(3, target);
 WRITE(4, vec4, v_image);
 WRITE(5, vec2, loss_partials);
-#include "window.glsl"
+#include "ssim.glsl"
 
 void main() {
     uint width = step.width, height = step.height;

@@ -14,7 +14,7 @@ READ1(0, StepUniforms, step);
 FETCH4(1, image);
 FETCHC(2, target);
 WRITE(3, vec4, moments);
-#include "window.glsl"
+#include "ssim.glsl"
 
 void main() {
     uint width = step.width, height = step.height;

@@ -6,7 +6,7 @@
 // Work:    x: 64 rows per workgroup, y: strips of STRIP columns, z: channel.
 // Reads:   step; moments [3, P]; target [P] (the value of pixels with alpha 0 is ignored)
 // Writes:  v_moments [3, P] vec4: d ssim / d mean x, / d mean (x^2 + y^2), / d mean x y, value; 0 for ignored pixels
-// Math:    ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2))
+// Math:    ssim.glsl
 // Mirror:  src/reference/loss.rs::ssim
 
 layout(local_size_x = 64) in;
@@ -14,7 +14,7 @@ READ1(0, StepUniforms, step);
 FETCH4(1, moments);
 FETCHC(2, target);
 WRITE(3, vec4, v_moments);
-#include "window.glsl"
+#include "ssim.glsl"
 
 void main() {
     uint width = step.width, height = step.height;
@@ -41,15 +41,8 @@ void main() {
     [[unroll]] for (uint k = 0u; k < STRIP; k++) {
         uint x = x0 + k;
         if (x < width) {
-            float mx = sum[k].x, my = sum[k].y;
-            float squares = mx * mx + my * my, product = mx * my;
-            float a = 2.0 * product + SSIM_C1, b = 2.0 * (sum[k].w - product) + SSIM_C2;
-            float c = squares + SSIM_C1, d = sum[k].z - squares + SSIM_C2;
-            float inv = 1.0 / (c * d);
-            float value = a * b * inv;
-            float v_mean = 2.0 * my * (b - a) * inv + 2.0 * mx * value * (1.0 / d - 1.0 / c);
             bool counts = fetchc(target, y * width + x).w > 0.5;
-            v_moments[plane + x] = counts ? vec4(v_mean, -value / d, 2.0 * a * inv, value) : vec4(0.0);
+            v_moments[plane + x] = counts ? ssim(sum[k]) : vec4(0.0);
         }
     }
 }

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 FETCH4(1, v_moments);
 WRITE(2, vec4, v_rows);
-#include "window.glsl"
+#include "ssim.glsl"
 
 void main() {
     uint width = step.width, height = step.height;

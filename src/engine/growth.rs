@@ -56,7 +56,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         vote_cells: vote_columns(size) * gaussians,
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
-        loss_partials: u64::from(loss::partials(shape.subgroup, width, height)),
+        loss_partials: u64::from(loss::partials(shape, width, height)),
         segments: 1,
         shared_rows: u64::from(size.shared_rows),
         ..Capacity::default()

@@ -17,6 +17,10 @@ pub struct Builder<'a> {
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.
     pub counts: bool,
+    /// Row of the step with the exposure of its photo, if it has one.
+    pub exposure: Option<u32>,
+    /// Partial sums that the photo loss writes.
+    pub loss_partials: u32,
     /// Passes of sorts, and scans, so far in this list that look back.
     pub sweeps: Sweeps,
     /// The list so far.
@@ -67,6 +71,8 @@ impl<'a> Builder<'a> {
             supervision: Supervision::Photo,
             sh_degree: 0,
             counts: false,
+            exposure: None,
+            loss_partials: 0,
             sweeps: Sweeps::default(),
             list,
         }

@@ -1,17 +1,24 @@
-//! L1 and D-SSIM against the photo: value and gradient. The filter is separable and needs no barriers.
+//! L1 and D-SSIM against the photo: value and gradient, also through the exposure of the photo.
+//!
+//! Two forms, chosen by [`KernelShape::loss_tile`]: a dispatch for each direction of each separable filter, without barriers;
+//! or one for all, whose tiles go through shared memory.
 
-use super::Supervision;
 use super::build::{Builder, ONE};
+use super::{KernelShape, Supervision};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
-/// Rows or columns that one lane filters in registers (glsl/include/window.glsl).
+/// Rows or columns that one lane filters in registers (glsl/include/ssim.glsl).
 const STRIP: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
 pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     b.list.stage = Stage::LOSS;
+    b.loss_partials = partials(b.shape, width, height);
+    if b.shape.loss_tile > 0 {
+        return by_tiles(b, width, height);
+    }
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
     pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
@@ -24,39 +31,49 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
         loss_partials: Buf::LOSS_PARTIALS,
     } [], columns(1));
     if b.supervision != Supervision::Disagreement {
-        reduce(b, partials(b.shape.subgroup, width, height));
+        reduce(b);
     }
 }
 
-/// Sums the loss after the backward walk, which finds the disagreement of the labels.
-pub(super) fn reduce_last(b: &mut Builder, width: u32, height: u32) {
-    b.list.stage = Stage::LOSS;
-    reduce(b, partials(b.shape.subgroup, width, height));
+fn by_tiles(b: &mut Builder, width: u32, height: u32) {
+    let side = b.shape.loss_tile;
+    let macros = (b.supervision.has_layers(), b.exposure.is_some());
+    pass!(b, loss_tile(labels: macros.0, exposure: macros.1) {
+        step: Buf::STEP, counters: Buf::COUNTERS, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
+        loss_partials: Buf::LOSS_PARTIALS, layer_loss: Buf::LAYER_LOSS, step_rows: Buf::STEP_ROWS,
+        shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
+    } [row: b.exposure.unwrap_or(0)], Grid::Groups(width.div_ceil(side), height.div_ceil(side), 1));
 }
 
-/// Multiplies the picture by the exposure of its photo, row `row` of the step.
+/// Multiplies the picture by the exposure of its photo, row `row` of the step; or has the loss do so.
 pub(crate) fn expose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::LOSS;
+    b.exposure = Some(row);
+    if b.shape.loss_tile > 0 {
+        return;
+    }
     pass!(b, expose {
         step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
     } [row: row], over_pixels(b, 64));
 }
 
-/// Turns the gradient of the exposed picture into that of the blended one, and writes the gradient of the exposure, row
-/// `row` of the `stride` rows of a photo.
+/// Turns the gradient of the exposed picture into that of the blended one, unless the loss does so, and writes the gradient of
+/// the exposure, row `row` of the `stride` rows of a photo.
 pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
     b.list.stage = Stage::LOSS;
-    // The maps of SSIM are not needed any more.
-    let partials = Buf::SSIM_B;
-    pass!(b, expose_backward {
-        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
-        v_image: Buf::V_IMAGE, exposure_partials: partials, target: Buf::TARGET,
-    } [row: row], over_pixels(b, u64::from(constants::EXPOSED)));
+    let mut count = b.loss_partials;
+    if b.shape.loss_tile == 0 {
+        count = b.capacity.pixels.div_ceil(u64::from(constants::EXPOSED)) as u32;
+        pass!(b, expose_backward {
+            step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
+            v_image: Buf::V_IMAGE, exposure_partials: Buf::EXPOSURE_PARTIALS, target: Buf::TARGET,
+        } [row: row, partials: count], over_pixels(b, u64::from(constants::EXPOSED)));
+    }
     let rows = b.capacity.shared_rows as u32;
     pass!(b, expose_reduce {
-        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: partials,
+        step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
         v_shared: Buf::V_SHARED,
-    } [stride: stride, rows: rows, row: row], ONE);
+    } [stride: stride, rows: rows, row: row, partials: count], ONE);
 }
 
 /// Grid over the pixels of an image, `each` per workgroup.
@@ -65,14 +82,19 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
     Grid::Groups(groups.min(constants::FOLD), groups.div_ceil(constants::FOLD), 1)
 }
 
-fn reduce(b: &mut Builder, partials: u32) {
+/// Sums the loss; of a disagreement of labels after the backward walk, which finds it.
+pub(super) fn reduce(b: &mut Builder) {
+    b.list.stage = Stage::LOSS;
     pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
         disagreement: Buf::DISAGREEMENT,
-    } [partials: partials], ONE);
+    } [partials: b.loss_partials], ONE);
 }
 
-/// Number of partial loss sums of an image: one for each subgroup of each strip.
-pub(crate) fn partials(subgroup: u32, width: u32, height: u32) -> u32 {
-    width.div_ceil(64) * (64 / subgroup) * height.div_ceil(STRIP)
+/// Number of partial loss sums of an image: one for each tile, or for each subgroup of each strip.
+pub(crate) fn partials(shape: &KernelShape, width: u32, height: u32) -> u32 {
+    match shape.loss_tile {
+        0 => width.div_ceil(64) * (64 / shape.subgroup) * height.div_ceil(STRIP),
+        side => width.div_ceil(side) * height.div_ceil(side),
+    }
 }

@@ -152,7 +152,7 @@ pub fn extended_step(
     extension.extend(passes, Hook::Loss, &mut b);
     blend::blend_backward(&mut b, pairs);
     if variant.supervision == Supervision::Disagreement {
-        loss::reduce_last(&mut b, variant.size.0, variant.size.1);
+        loss::reduce(&mut b);
     }
     gather::gather(&mut b);
     project::project_backward(&mut b);

@@ -22,6 +22,8 @@ pub struct KernelShape {
     pub digit_bits: u32,
     /// Items of an invocation in sorts and scans of one dispatch a pass, which look back; 0 with several dispatches a pass.
     pub sweep_items: u32,
+    /// Side of the tiles of the photo loss in one dispatch, px; 0 with a dispatch for each filter.
+    pub loss_tile: u32,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -49,12 +51,24 @@ impl KernelShape {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
         let texel = shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN;
         let shape = Self { texel, emulated: device.subgroup.is_emulated, ..shape };
-        let wanted = match lab::var("LABELGS_SORT").as_deref() {
-            Some("sweep") => true,
-            Some("lanes") => false,
-            _ => !device.is_cpu() && !shape.emulated,
+        let is_card = !device.is_cpu();
+        let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);
+        let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
+        let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
+        if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
+    }
+
+    /// Returns this shape with the largest tiles of the loss whose pixels fit in shared memory; `None` if the device can run
+    /// none.
+    fn with_loss_tiles(self, device: &Capabilities) -> Option<Self> {
+        let limits = &device.limits;
+        let fits = |&tile: &u32| {
+            let (lanes, middle, outer) = (tile * tile, tile + 10, tile + 20);
+            lanes <= limits.max_invocations
+                && tile <= limits.max_group_size[1]
+                && 4 * (2 * outer * (outer + 1) + 4 * outer * (middle + 1) + 1) <= limits.max_shared
         };
-        if wanted { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
+        [16, 8].into_iter().find(fits).map(|loss_tile| Self { loss_tile, ..self })
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -113,6 +127,7 @@ impl KernelShape {
             texel: cpu,
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             sweep_items: 0,
+            loss_tile: 0,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
@@ -160,8 +175,15 @@ impl KernelShape {
             "TILE_HEIGHT" => Some(self.tile_height),
             "DIGIT_BITS" => Some(self.digit_bits),
             "SWEEP_ITEMS" => Some(self.sweep_items.max(1)),
+            "LOSS_TILE" => (self.loss_tile > 0).then_some(self.loss_tile),
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }
     }
+}
+
+/// Returns whether a variable of developers names the second of two forms; `None` if it names neither.
+fn chosen(variable: &str, [first, second]: [&str; 2]) -> Option<bool> {
+    let name = lab::var(variable)?;
+    (name == first || name == second).then_some(name == second)
 }

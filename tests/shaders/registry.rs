@@ -45,7 +45,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping = own.into_iter().chain(emulated).map(|shape| shape.with_sweeps_of(8));
+    let sweeping =
+        own.into_iter().chain(emulated).map(|shape| KernelShape { loss_tile: 16, ..shape }.with_sweeps_of(8));
     for shape in own.into_iter().chain(emulated).chain(antialiased).chain(sweeping) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
@@ -74,7 +75,9 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
             let place = Place::default();
             for shared in [Exposure::default().extension(place), Poses::default().extension(place)] {
-                add(pass::extended_step(&shape, &capacity, variant, (&*shared, 1)));
+                for supervision in [Supervision::Photo, Supervision::Layers { lift: false }] {
+                    add(pass::extended_step(&shape, &capacity, Variant { supervision, ..variant }, (&*shared, 1)));
+                }
             }
             add(pass::weigh_view(&shape, &capacity));
             add(pass::densify_count(&shape, &capacity));
