@@ -13,7 +13,8 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     const RANGE: u64 = u32::MAX as u64 & !0xffff;
     let limits =
         PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
-    (KernelShape::new(32, false), limits)
+    let shape = KernelShape { loss_tile: 16, ..KernelShape::new(32, false) };
+    (shape.with_sweeps_of(16), limits.of_card())
 }
 
 /// Predicts the memory of an engine of this size on a device with these kernels and limits.

@@ -2,6 +2,7 @@
 
 use super::Engine;
 use crate::error::{Error, Result};
+use crate::scheduler::DataKey;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::NO_ROW;
 use crate::shaders::structs::StepUniforms;
@@ -23,6 +24,8 @@ pub(crate) enum Input<'a> {
 pub(crate) struct TrainInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
+    /// Names photo and labels of the view, if they come again.
+    pub key: Option<DataKey>,
     /// The photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.
     pub photo: Cow<'a, [[u8; 4]]>,
     /// Labels, in a step with object layers.
@@ -120,11 +123,13 @@ impl Engine {
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
-                sched.upload(Buf::TARGET, frame, 0, &train.photo)?;
+                // A photo that was made for this step does not come again.
+                let key = train.key.filter(|_| matches!(train.photo, Cow::Borrowed(_)));
+                sched.load(Buf::TARGET, frame, key, &train.photo)?;
                 train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
-                train.disagreement.map_or(Ok(()), |labels| sched.upload(Buf::VIEW_LABELS, frame, 0, labels))?;
+                train.disagreement.map_or(Ok(()), |labels| sched.load(Buf::VIEW_LABELS, frame, train.key, labels))?;
                 let Some(layers) = &train.layers else { return Ok(()) };
-                sched.upload(Buf::VIEW_LABELS, frame, 0, layers.view_labels)?;
+                sched.load(Buf::VIEW_LABELS, frame, train.key, layers.view_labels)?;
                 sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;
                 sched.upload(Buf::LABEL_FROM_LAYER, frame, 0, &layers.label_from_layer)?;
                 sched.upload(Buf::LAYER_WEIGHTS, frame, 0, &layers.weights)?;

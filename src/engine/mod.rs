@@ -29,7 +29,6 @@ use crate::gpu::Gpu;
 use crate::pass::buffers::{Capacity, TABLE};
 use crate::pass::{Extension, KernelShape};
 use crate::scene::{Camera, Gaussians, Zone};
-use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
 use glam::DVec3;
@@ -59,7 +58,7 @@ pub struct Engine {
     stamp: u32,
     last_frame: usize,
     /// Frames with an unread report.
-    in_flight: [bool; FRAMES_IN_FLIGHT],
+    in_flight: Vec<bool>,
     /// Every run is checked for writes outside of its buffers.
     has_guards: bool,
 }
@@ -88,8 +87,10 @@ impl Engine {
         let size = size.in_bands(&shape);
         size.check(&shape)?;
         let capacity = capacity(&shape, &size);
+        let sched = Scheduler::new(gpu, TABLE, capacity.counts(), options)?;
         Ok(Self {
-            sched: Scheduler::new(gpu, TABLE, capacity.counts(), options)?,
+            in_flight: vec![false; sched.frames()],
+            sched,
             capacity,
             shape,
             size,
@@ -103,7 +104,6 @@ impl Engine {
             label_rounds: 1,
             stamp: 0,
             last_frame: 0,
-            in_flight: [false; FRAMES_IN_FLIGHT],
             has_guards: options.plan.guards,
         })
     }

@@ -3,7 +3,7 @@
 use super::{Engine, Input};
 use crate::error::{Error, Result};
 use crate::pass::{self, Stage, Variant};
-use crate::scheduler::plan::{Buf, FRAMES_IN_FLIGHT};
+use crate::scheduler::plan::Buf;
 use crate::scheduler::{ListId, Ticket};
 use crate::shaders::constants::LABEL_ROUNDS;
 use crate::shaders::structs::{Counters, StepUniforms};
@@ -123,11 +123,17 @@ impl Engine {
         }
     }
 
+    /// Most lists in flight.
+    pub(crate) fn frames(&self) -> usize {
+        self.sched.frames()
+    }
+
     /// Submits a list without waiting. At most one list per frame may be in flight.
     pub(crate) fn submit<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<InFlight> {
-        let frame = (self.last_frame + 1) % FRAMES_IN_FLIGHT;
+        let frames = self.sched.frames();
+        let frame = (self.last_frame + 1) % frames;
         if self.in_flight[frame] {
-            return Err(Error::Bug(format!("{FRAMES_IN_FLIGHT} lists are in flight; retire the oldest first")));
+            return Err(Error::Bug(format!("{frames} lists are in flight; retire the oldest first")));
         }
         let list = self.list(key)?;
         self.write(frame, input.into())?;
@@ -147,7 +153,7 @@ impl Engine {
     /// Waits for all lists in flight and discards their reports.
     pub(crate) fn abandon(&mut self) -> Result<()> {
         self.sched.wait_all()?;
-        self.in_flight = [false; FRAMES_IN_FLIGHT];
+        self.in_flight.fill(false);
         Ok(())
     }
 

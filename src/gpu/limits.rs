@@ -24,6 +24,10 @@ pub struct PlanLimits {
     pub max_texel_buffers: u32,
     /// Memory that the engine may use in total, in bytes: a share of the driver's free memory, or of the heap.
     pub max_memory: u64,
+    /// Most steps in flight, and copies of the buffers that the host shares with them.
+    pub frames: usize,
+    /// The data of a step go through staging to the device's own memory.
+    pub stages: bool,
 }
 
 impl Default for PlanLimits {
@@ -39,11 +43,24 @@ impl Default for PlanLimits {
             max_storage_buffers: 32,
             max_texel_buffers: 32,
             max_memory: u64::MAX,
+            frames: 2,
+            stages: false,
         }
     }
 }
 
 impl PlanLimits {
+    /// Steps in flight on a card, and their data in its own memory: the host runs ahead, and each pass reads a photo from there.
+    pub(crate) fn of_card(self) -> Self {
+        Self { frames: 4, stages: true, ..self }
+    }
+
+    /// Most bytes of photos and masks that stay in device memory beside an engine of so many bytes: half of what is left, so
+    /// that the model can grow.
+    pub(crate) fn kept_max(&self, engine: u64) -> u64 {
+        if self.stages { self.max_memory.saturating_sub(engine) / 2 } else { 0 }
+    }
+
     /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines.
     pub fn alignment(&self) -> u64 {
         self.storage_alignment.max(self.texel_alignment).max(64)
@@ -71,8 +88,9 @@ pub struct Limits {
 
 impl Limits {
     /// Lowers limits to the values of `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` (numbers with K, M
-    /// or G), so that tests can try out a small device on a large one.
-    pub(super) fn lower_by_env(&mut self) -> Result<()> {
+    /// or G), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, and
+    /// the way of their data from `LABELGS_PHOTOS`: `upload` or `resident`.
+    pub(super) fn change_by_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),
             ("LABELGS_LIMIT_TEXELS", &mut self.plan.max_texel_elements),
@@ -83,6 +101,14 @@ impl Limits {
                 let problem = || Error::usage(name, format!("{text} is not a size; expected a number with K, M or G"));
                 *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
             }
+        }
+        if let Some(text) = lab::var("LABELGS_FRAMES") {
+            let frames = text.parse().ok().filter(|frames| (1..=16).contains(frames));
+            self.plan.frames =
+                frames.ok_or_else(|| Error::usage("LABELGS_FRAMES", "expected a number from 1 to 16"))?;
+        }
+        if let Some(text) = lab::var("LABELGS_PHOTOS") {
+            self.plan.stages = text == "resident";
         }
         Ok(())
     }

@@ -190,9 +190,10 @@ impl Gpu {
         vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })
     }
 
-    /// Submits a command buffer; the timeline reaches `value` when the commands are done.
-    pub(crate) fn submit(&self, command: &CommandBuffer, timeline: &Timeline, value: u64) -> Result<()> {
-        let (commands, semaphores, values) = ([command.raw()], [timeline.raw()], [value]);
+    /// Submits command buffers; the timeline reaches `value` when the commands are done.
+    pub(crate) fn submit(&self, commands: &[&CommandBuffer], timeline: &Timeline, value: u64) -> Result<()> {
+        let (semaphores, values) = ([timeline.raw()], [value]);
+        let commands: Vec<vk::CommandBuffer> = commands.iter().map(|command| command.raw()).collect();
         let mut signal = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
         let info =
             vk::SubmitInfo::default().command_buffers(&commands).signal_semaphores(&semaphores).push_next(&mut signal);

@@ -50,7 +50,10 @@ impl Capabilities {
         let memory = memory(instance, physical, has(ash::ext::memory_budget::NAME));
         let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
         let mut limits = limits(&core.limits, &eleven, max_buffer, memory, timestamp_bits);
-        limits.lower_by_env()?;
+        if kind(core.device_type) != DeviceKind::Cpu {
+            limits.plan = limits.plan.of_card();
+        }
+        limits.change_by_env()?;
         hidden.limits(&mut limits);
         let mut subgroup = subgroup(&eleven, &control, &features);
         hidden.subgroup(&mut subgroup);
@@ -160,6 +163,7 @@ fn limits(
             .min(core.max_descriptor_set_sampled_images)
             .min(core.max_per_stage_resources),
         max_memory,
+        ..PlanLimits::default()
     };
     Limits {
         plan,

@@ -4,7 +4,7 @@ use super::Scheduler;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
 use crate::gpu::Buffer;
-use crate::scheduler::plan::{Buf, Class, FRAMES_IN_FLIGHT, GUARD_BYTES};
+use crate::scheduler::plan::{Buf, Class, GUARD_BYTES};
 
 const PATTERN: u32 = 0x5AFE_C0DE;
 
@@ -31,7 +31,7 @@ impl Scheduler {
             if decl.class == Class::Step && !(submitted && self.is_placed(buf)) {
                 continue;
             }
-            let copies = if decl.class.copies() > 1 { FRAMES_IN_FLIGHT } else { 1 };
+            let copies = if decl.class.is_shared() { self.limits.frames } else { 1 };
             for frame in 0..copies {
                 let end = self.bytes(buf)?;
                 let words = self.read_words(buf, frame, end, GUARD_BYTES)?;

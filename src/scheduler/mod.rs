@@ -1,9 +1,10 @@
 //! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays recordings.
 //!
-//! Two steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full barrier,
+//! Two or four steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full barrier,
 //! so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
 
 mod guard;
+mod loads;
 pub mod plan;
 pub(crate) mod profiler;
 mod recorder;
@@ -11,14 +12,14 @@ mod recording;
 mod storage;
 mod transfer;
 
+pub use loads::{DataKey, Traffic};
 pub use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
-use crate::scheduler::plan::{
-    Buf, BufferDecl, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory,
-};
+use crate::scheduler::plan::{Buf, BufferDecl, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory};
 use crate::stage::Stage;
+use loads::Loads;
 use recorder::Recorder;
 use recording::Recording;
 use std::sync::Arc;
@@ -38,13 +39,16 @@ pub struct SchedulerOptions {
     pub crash_markers: bool,
     /// Upper limit on the device memory in use, bytes.
     pub memory_limit: Option<u64>,
+    /// Steps in flight and their data as on a card, on any device.
+    pub as_card: bool,
 }
 
 impl SchedulerOptions {
     /// Returns the limits of a device for plans.
     pub fn limits(&self, gpu: &Gpu) -> Limits {
         let limits = gpu.limits().plan;
-        Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits }
+        let limits = Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits };
+        if self.as_card { limits.of_card() } else { limits }
     }
 }
 
@@ -77,7 +81,10 @@ pub struct Scheduler {
     /// Timeline value of the last submit.
     submitted: u64,
     /// Timeline value of the last submit of each frame.
-    frame_busy: [u64; FRAMES_IN_FLIGHT],
+    frame_busy: Vec<u64>,
+    /// On a device whose data go through staging.
+    loads: Option<Loads>,
+    traffic: Traffic,
     /// The list that was prepared or submitted last; `upload` and `download` access its scratch buffers.
     current: Option<usize>,
     generation: u64,
@@ -102,7 +109,9 @@ impl Scheduler {
             immediate: CommandBuffer::new(&gpu)?,
             timeline: Timeline::new(&gpu)?,
             submitted: 0,
-            frame_busy: [0; FRAMES_IN_FLIGHT],
+            frame_busy: vec![0; limits.frames],
+            loads: limits.stages.then(|| Loads::new(&gpu, limits.frames)).transpose()?,
+            traffic: Traffic::default(),
             current: None,
             generation: 0,
             counts,
@@ -134,8 +143,9 @@ impl Scheduler {
             plans.push(Plan::new(self.table, &self.counts, list, &self.limits, self.options.plan)?);
         }
         let all = self.lists.iter().map(|list| &list.plan).chain(&plans).collect::<Vec<_>>();
-        MemoryReport::of_plans(self.table, &self.counts, &all, &self.limits, self.options.plan)?;
+        let total = MemoryReport::of_plans(self.table, &self.counts, &all, &self.limits, self.options.plan)?.total;
         let pages = memory::merge_pages(all.iter().map(|plan| plan.step_pages.as_slice()));
+        self.make_room(total)?;
         self.grow_arena(&pages)?;
         if self.options.poison_step {
             self.poison()?;
@@ -154,17 +164,25 @@ impl Scheduler {
 
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
-    /// Allocates nothing. Blocks only if the same list still runs in the same frame.
+    /// Allocates nothing. Blocks only if the same list still runs in the same frame; where data go through staging, if any does.
     pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
         let index = self.index(id)?;
         self.check_frame(frame)?;
         self.wait(Ticket(self.lists[index].recordings[frame].busy))?;
+        if self.loads.is_some() {
+            self.wait_frame(frame)?;
+        }
         let recording = &self.lists[index].recordings[frame];
         if let Some(markers) = &recording.markers {
             markers.reset()?;
         }
         let value = self.submitted + 1;
-        let submitted = self.gpu.submit(&recording.command, &self.timeline, value);
+        let loads = match &mut self.loads {
+            Some(loads) => loads.record(&self.gpu, &self.storage, frame)?,
+            None => None,
+        };
+        let commands: Vec<&CommandBuffer> = loads.into_iter().chain([&recording.command]).collect();
+        let submitted = self.gpu.submit(&commands, &self.timeline, value);
         submitted.map_err(|error| self.name_pass(error))?;
         self.submitted = value;
         self.frame_busy[frame] = value;
@@ -206,12 +224,17 @@ impl Scheduler {
     /// over, and all lists are discarded. If memory does not suffice, the old counts stay in force.
     pub fn set_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         self.wait_all()?;
-        MemoryReport::predict(self.table, &counts, &[], &self.limits, self.options.plan)?;
+        let total = MemoryReport::predict(self.table, &counts, &[], &self.limits, self.options.plan)?.total;
+        self.make_room(total)?;
         self.lists.clear();
         self.current = None;
         self.generation += 1;
         self.storage.drop_arena();
-        self.resize_own(counts)
+        match self.resize_own(counts.clone()) {
+            // Drivers may offer less memory than they report.
+            Err(error) if error.is_out_of_memory() && self.free_kept()? => self.resize_own(counts),
+            other => other,
+        }
     }
 
     /// Makes all lists from now on write the times of their items, with a barrier before each. Discards the lists that
@@ -226,6 +249,16 @@ impl Scheduler {
         &self.counts
     }
 
+    /// Most steps in flight.
+    pub fn frames(&self) -> usize {
+        self.limits.frames
+    }
+
+    /// Bytes between host and device so far.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
     /// The device.
     pub fn gpu(&self) -> &Arc<Gpu> {
         &self.gpu
@@ -235,6 +268,7 @@ impl Scheduler {
     pub fn memory(&self) -> Vec<(String, u64)> {
         let mut rows = self.storage.memory(self.table);
         rows.push(("staging".to_owned(), self.staging.bytes()));
+        rows.extend(self.loads.as_ref().map(|loads| ("kept data".to_owned(), loads.kept_bytes())));
         rows
     }
 
@@ -270,7 +304,8 @@ impl Scheduler {
     }
 
     fn check_frame(&self, frame: usize) -> Result<()> {
-        if frame < FRAMES_IN_FLIGHT { Ok(()) } else { Err(Error::Bug(format!("frame {frame} of {FRAMES_IN_FLIGHT}"))) }
+        let frames = self.limits.frames;
+        if frame < frames { Ok(()) } else { Err(Error::Bug(format!("frame {frame} of {frames}"))) }
     }
 
     fn decl(&self, buf: Buf) -> Result<&'static BufferDecl> {
@@ -279,7 +314,9 @@ impl Scheduler {
 
     /// Records a list for each frame.
     fn record(&self, plan: &Plan) -> Result<Vec<Recording>> {
-        (0..FRAMES_IN_FLIGHT).map(|frame| Recording::new(&self.gpu, plan, &self.storage, frame, self.options)).collect()
+        (0..self.limits.frames)
+            .map(|frame| Recording::new(&self.gpu, plan, &self.storage, frame, self.options))
+            .collect()
     }
 
     /// Records, submits and waits for a few commands outside of any list.
@@ -291,7 +328,7 @@ impl Scheduler {
         commands(&mut recorder, &self.storage, &self.staging)?;
         recorder.end()?;
         let value = self.submitted + 1;
-        self.gpu.submit(&self.immediate, &self.timeline, value).map_err(|error| self.name_pass(error))?;
+        self.gpu.submit(&[&self.immediate], &self.timeline, value).map_err(|error| self.name_pass(error))?;
         self.submitted = value;
         self.wait(Ticket(value))
     }

@@ -3,7 +3,7 @@
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu, MemoryKind};
-use crate::scheduler::plan::{Buf, BufferDecl, Class, Page, Plan, Table, memory};
+use crate::scheduler::plan::{Buf, BufferDecl, Class, Limits, Page, Plan, Table, memory};
 use std::sync::Arc;
 
 /// All buffers of a scheduler.
@@ -54,14 +54,15 @@ impl Storage {
 }
 
 /// Allocates all copies of a buffer; returns none for a buffer of 0 bytes.
-fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64) -> Result<Vec<Buffer>> {
-    let kind = match decl.class {
+fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64, limits: &Limits) -> Result<Vec<Buffer>> {
+    let kind = |copy: usize| match decl.class {
         Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
+        Class::PerFrame if limits.stages && copy < limits.frames => MemoryKind::Device,
         Class::PerFrame => MemoryKind::Upload,
         Class::Report => MemoryKind::Download,
     };
-    let copies = if bytes == 0 { 0 } else { decl.class.copies() };
-    (0..copies).map(|_| Buffer::new(gpu, decl.name, bytes, kind)).collect()
+    let copies = if bytes == 0 { 0 } else { decl.class.copies(limits) };
+    (0..copies).map(|copy| Buffer::new(gpu, decl.name, bytes, kind(copy))).collect()
 }
 
 impl Scheduler {
@@ -75,7 +76,7 @@ impl Scheduler {
         for index in 0..self.table.len() {
             let decl = &self.table[index];
             if decl.class != Class::Step {
-                self.storage.own[index] = allocate(&self.gpu, decl, self.own_bytes(decl, &self.counts)?)?;
+                self.storage.own[index] = allocate(&self.gpu, decl, self.own_bytes(decl, &self.counts)?, &self.limits)?;
                 self.clear(Buf(index as u16))?;
             }
         }
@@ -87,6 +88,7 @@ impl Scheduler {
     /// Growing buffers go first. If one does not fit, those that grew before are only larger than the old counts
     /// need, and nothing is lost.
     pub(super) fn resize_own(&mut self, counts: Vec<u64>) -> Result<()> {
+        self.cancel_loads();
         let resized = self.resize_those(&counts, true).and_then(|()| self.resize_those(&counts, false));
         if resized.is_ok() {
             self.counts = counts;
@@ -146,19 +148,19 @@ impl Scheduler {
             let old = std::mem::take(&mut self.storage.own[index]);
             let old_bytes = old.first().map_or(0, Buffer::bytes);
             drop(old);
-            return match allocate(&self.gpu, decl, bytes) {
+            return match allocate(&self.gpu, decl, bytes, &self.limits) {
                 Ok(copies) => {
                     self.storage.own[index] = copies;
                     Ok(())
                 }
                 Err(error) => {
                     // The old size fitted a moment ago. If it fails now, report the first error; the next list retries.
-                    self.storage.own[index] = allocate(&self.gpu, decl, old_bytes).unwrap_or_default();
+                    self.storage.own[index] = allocate(&self.gpu, decl, old_bytes, &self.limits).unwrap_or_default();
                     Err(error)
                 }
             };
         }
-        let fresh = allocate(&self.gpu, decl, bytes)?;
+        let fresh = allocate(&self.gpu, decl, bytes, &self.limits)?;
         let old = std::mem::replace(&mut self.storage.own[index], fresh);
         if bytes == 0 {
             return Ok(());
@@ -200,7 +202,13 @@ impl Scheduler {
         self.generation += 1;
         for (page, bytes) in merged.iter().enumerate() {
             let name = format!("scratch page {page}");
-            self.storage.step.push(Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device)?);
+            let page = match Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device) {
+                Err(error) if error.is_out_of_memory() && self.free_kept()? => {
+                    Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device)?
+                }
+                other => other?,
+            };
+            self.storage.step.push(page);
         }
         for plan in plans {
             let recordings = self.record(&plan)?;
@@ -233,7 +241,7 @@ impl Scheduler {
     }
 }
 
-/// Index of a buffer's copy for a frame: classes have one copy per frame, or one in total.
+/// Index of a buffer's copy for a frame.
 pub(super) fn copy_of(class: Class, frame: usize) -> usize {
-    if class.copies() > 1 { frame } else { 0 }
+    if class.is_shared() { frame } else { 0 }
 }

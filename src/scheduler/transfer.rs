@@ -40,9 +40,13 @@ impl Scheduler {
             return Ok(());
         }
         let class = self.decl(buf)?.class;
-        if class.copies() > 1 {
+        self.traffic.up += data.len() as u64;
+        if class.is_shared() {
             self.wait_frame(frame)?;
-            return self.storage.own(buf, frame)?.write(start, data);
+            return match self.loads.as_ref().filter(|_| class == Class::PerFrame) {
+                Some(_) => self.stage(buf, frame, start, data),
+                None => self.storage.own(buf, frame)?.write(start, data),
+            };
         }
         if class == Class::Step && self.options.plan.aliases() {
             let name = self.decl(buf)?.name;
@@ -83,7 +87,8 @@ impl Scheduler {
             return Ok(());
         }
         let bytes = self.bytes(buf)?;
-        for copy in 0..self.decl(buf)?.class.copies() as usize {
+        let copies = if self.decl(buf)?.class.is_shared() { self.limits.frames } else { 1 };
+        for copy in 0..copies {
             let place = self.locate(buf, copy)?;
             self.immediately(|recorder: &mut Recorder<'_>, storage, _| {
                 let (buffer, offset) = place.find(storage)?;
@@ -123,7 +128,9 @@ impl Scheduler {
         if bytes.is_empty() {
             return Ok(());
         }
-        if self.decl(buf)?.class.copies() > 1 {
+        let class = self.decl(buf)?.class;
+        self.traffic.down += bytes.len() as u64;
+        if class == Class::Report || (class == Class::PerFrame && self.loads.is_none()) {
             self.wait_frame(frame)?;
             return self.storage.own(buf, frame)?.read(start, bytes);
         }
@@ -141,7 +148,7 @@ impl Scheduler {
     }
 
     /// Returns the byte offset of an element; fails if the range leaves the buffer.
-    fn range(&self, buf: Buf, frame: usize, first: u64, bytes: u64) -> Result<u64> {
+    pub(super) fn range(&self, buf: Buf, frame: usize, first: u64, bytes: u64) -> Result<u64> {
         self.check_frame(frame)?;
         let (decl, all) = (self.decl(buf)?, self.bytes(buf)?);
         let start = first

@@ -54,7 +54,7 @@ impl Context {
         let strategy = strategy.unwrap_or_else(|| objective.strategy(config.strategy));
         let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
         let views = setup::train_views(dataset, depths, config.mask_border, size.band(&shape))?;
-        let views = Views::new(views, &config);
+        let views = Views::new(views, &config, scheduler.limits(&gpu).frames);
         let size = size.with_shared_rows(shared.rows(views.len()));
         let mut engine = Engine::with_shape(gpu, shape, size, scheduler)?;
         engine.set_sh_degree(config.sh_degree);

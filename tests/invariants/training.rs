@@ -164,7 +164,7 @@ fn a_training_by_the_papers_rule_is_the_same_to_the_last_bit() {
     stays_the_same(LabelRule::Main);
 }
 
-/// The reference run twice; overflows on the way; one barrier before each pass; no shared scratch, and poison in it.
+/// The reference run twice; overflows on the way, also with more steps in flight; one barrier before each pass; no shared scratch, and poison in it.
 fn stays_the_same(rule: LabelRule) {
     let Some(turn) = device() else { return };
     let plan = PlanOptions::default();
@@ -179,6 +179,8 @@ fn stays_the_same(rule: LabelRule) {
     same("tiny buffers that grow", &grown, &first);
     same("large buffers", &train(&turn, rule, with(plan), large), &first);
     same("barriers", &train(&turn, rule, with(PlanOptions { barrier_everywhere: true, ..plan }), |_| ()), &first);
+    let card = train(&turn, rule, SchedulerOptions { as_card: true, ..with(plan) }, tiny);
+    same("four steps in flight, photos on the device", &card, &first);
     let alone = PlanOptions { alias: false, guards: true, ..plan };
     let poisoned = SchedulerOptions { poison_step: true, ..with(alone) };
     same("poison", &train(&turn, rule, poisoned, large), &first);

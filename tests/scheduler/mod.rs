@@ -2,6 +2,7 @@
 
 mod controls;
 mod faults;
+mod loads;
 mod memory;
 mod plan;
 mod random;

@@ -37,19 +37,26 @@ toy_shader!(
 );
 
 #[test]
-fn a_hundred_steps_with_two_in_flight_are_exact() {
+fn a_hundred_steps_in_flight_are_exact() {
     let Some(gpu) = device() else { return };
-    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(16), SchedulerOptions::default()).unwrap();
+    for as_card in [false, true] {
+        let options = SchedulerOptions { as_card, ..SchedulerOptions::default() };
+        steps_in_flight(Scheduler::new(gpu.gpu(), TABLE, pixels(16), options).unwrap());
+    }
+}
+
+fn steps_in_flight(mut scheduler: Scheduler) {
+    let frames = scheduler.frames();
     let mut list = PassList::new("step");
     list.pass(PassDecl::new(accumulate(), vec![UNIFORMS, TOTALS, REPORT], Grid::Groups(1, 1, 1)));
     let id = scheduler.prepare(&list).unwrap();
     let (mut expected, mut history) = ([0_u32; 16], Vec::new());
     for step in 0..100_u32 {
-        let frame = step as usize % 2;
-        if step >= 2 {
-            // Waits for step - 2 alone: the step between is still in flight.
+        let frame = step as usize % frames;
+        if let Some(oldest) = (step as usize).checked_sub(frames) {
+            // Waits for the oldest alone: the steps between are still in flight.
             let report = scheduler.download_all::<u32>(REPORT, frame).unwrap();
-            assert_eq!(report, history[step as usize - 2], "report of step {}", step - 2);
+            assert_eq!(report, history[oldest], "report of step {oldest}");
         }
         let uniforms = [step, step * 7, 1, step ^ 5];
         scheduler.upload(UNIFORMS, frame, 0, &uniforms).unwrap();

@@ -145,6 +145,11 @@ fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
         0 => "fits:    no Gaussian on such pictures\n".to_owned(),
         most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
     };
+    let kept = subject.limits.kept_max(memory.total);
+    if kept > 0 {
+        let views = kept / (8 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
+        text += &format!("photos:  {views} with masks stay there besides, in {:.0} MiB\n", kept as f64 / MIB);
+    }
     let half = |value: u32| (value / 2).max(1);
     let image = (half(room.image.0), half(room.image.1));
     let labels = room.labels.map(|labels| LabelSize { layers: half(labels.layers), ..labels });
@@ -216,6 +221,7 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
             "scratch_without_sharing": memory.step_unaliased,
             "staging": memory.staging,
             "total": memory.total,
+            "kept_max": subject.limits.kept_max(memory.total),
         },
         "barriers": plan.barrier_count(),
         "passes": passes.collect::<Vec<_>>(),

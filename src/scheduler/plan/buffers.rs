@@ -3,6 +3,7 @@
 //! A buffer is an array of equal elements. The shaders declare its bindings (read, written, texel); the planner chooses
 //! its place in memory by its class.
 
+use super::Limits;
 use crate::error::{Error, Result};
 use std::ops::Deref;
 
@@ -26,17 +27,23 @@ pub enum Class {
     Persistent,
     /// Scratch of one pass list; buffers with disjoint lifetimes share bytes.
     Step,
-    /// Written by the host for each step; one copy per frame, in host-visible memory.
+    /// Written by the host for each step; one copy per frame, in memory that the host sees or copied from such memory.
     PerFrame,
     /// Written by the device, read by the host; one copy per frame, in host-cached memory.
     Report,
 }
 
 impl Class {
-    /// Number of copies: two for buffers that the host shares with the steps in flight.
-    pub fn copies(self) -> u64 {
+    /// Returns true if the host shares the buffer with the steps in flight: each has a copy.
+    pub fn is_shared(self) -> bool {
+        matches!(self, Self::PerFrame | Self::Report)
+    }
+
+    /// Number of copies on a device: those of the frames, and their staging after them if there is one.
+    pub fn copies(self, limits: &Limits) -> usize {
         match self {
-            Self::PerFrame | Self::Report => super::FRAMES_IN_FLIGHT as u64,
+            Self::PerFrame if limits.stages => 2 * limits.frames,
+            Self::PerFrame | Self::Report => limits.frames,
             Self::Model | Self::Persistent | Self::Step => 1,
         }
     }

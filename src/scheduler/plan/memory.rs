@@ -104,7 +104,7 @@ impl MemoryReport {
             } else {
                 own_bytes(decl, counts, options, limits.alignment())?
             };
-            let bytes = one * decl.class.copies();
+            let bytes = one * decl.class.copies(limits) as u64;
             let count = decl.count(counts)?;
             let shown = count > 0 || !decl.domain.is_optional;
             let used = decl.class != Class::Step || plans.iter().any(|plan| plan.placements[index].is_some());

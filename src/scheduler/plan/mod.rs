@@ -24,9 +24,6 @@ pub use pass::{Grid, PassDecl, PassList, Stage, Work};
 use crate::error::{Error, Result};
 use crate::shaders::BindingKind;
 
-/// Number of steps in flight, and of copies of the buffers that the host shares with them.
-pub(crate) const FRAMES_IN_FLIGHT: usize = 2;
-
 /// Bytes of the guard after each buffer in test mode.
 pub(crate) const GUARD_BYTES: u64 = 256;
 

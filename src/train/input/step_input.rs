@@ -5,6 +5,7 @@ use super::known_depths::{self, KnownDepths};
 use crate::engine::{Engine, LayerInput, TrainInput};
 use crate::pass::Supervision;
 use crate::scene::{Camera, LabelMap, Occluders, Photo, Pixels};
+use crate::scheduler::DataKey;
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, ALPHA_SLACK, FINEST, LABEL_BORDER};
 use crate::shaders::structs::StepUniforms;
 use crate::train::{LabelRule, TrainConfig};
@@ -41,6 +42,8 @@ pub struct TrainView {
 /// A view as a step uses it: at the size of the step.
 #[derive(Clone, Copy, Debug)]
 pub struct StepView<'a> {
+    /// Names photo and mask of this size; `None` if they do not come again.
+    pub key: Option<DataKey>,
     /// Camera.
     pub camera: &'a Camera,
     /// Camera of the whole photo, if this is a part of it.
@@ -239,5 +242,5 @@ pub(crate) fn train_input<'a>(
     });
     let photo = backdrop::photo(view.photo, config, input.step);
     let depths = (config.depth_weight_at(input.step) > 0.0).then_some(view.depths);
-    TrainInput { uniforms, photo, layers, disagreement, depths, shared: Vec::new() }
+    TrainInput { uniforms, key: view.key, photo, layers, disagreement, depths, shared: Vec::new() }
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::label::vote::ballot::Voter;
 use crate::scene::Camera;
 use crate::scene::camera::side_at;
-use crate::scheduler::plan::FRAMES_IN_FLIGHT;
+use crate::scheduler::DataKey;
 use crate::train::TrainConfig;
 use crate::train::shared::poses;
 use std::collections::BTreeMap;
@@ -39,10 +39,16 @@ pub(in crate::train) struct Views {
     full_from: u32,
     /// First step without known depths.
     depths_until: u32,
+    /// Most steps in flight.
+    frames: u32,
 }
 
 impl Views {
-    pub(in crate::train) fn new((whole, parts): (Vec<TrainView>, Vec<Part>), config: &TrainConfig) -> Self {
+    pub(in crate::train) fn new(
+        (whole, parts): (Vec<TrainView>, Vec<Part>),
+        config: &TrainConfig,
+        frames: usize,
+    ) -> Self {
         let (start, full_from) = (f64::from(config.start_size.unwrap_or(1.0)), config.full_size_from());
         let prefetch = Prefetch::new(&whole, config.iterations);
         Self {
@@ -57,6 +63,7 @@ impl Views {
             start,
             full_from,
             depths_until: config.depths_until(),
+            frames: frames as u32,
         }
     }
 
@@ -138,7 +145,7 @@ impl Views {
     /// meanwhile.
     pub(in crate::train) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
         // Steps in flight still use their pixels and sizes.
-        let oldest = step.saturating_sub(FRAMES_IN_FLIGHT as u32);
+        let oldest = step.saturating_sub(self.frames);
         let oldest_size = self.size_at(oldest);
         self.ready.retain(|&kept, _| kept >= oldest && kept < step);
         self.shrunk.retain(|&(kept, _), _| kept >= oldest_size);
@@ -191,6 +198,7 @@ impl Views {
         let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
         let view = &self.whole[part.view];
         Ok(StepView {
+            key: Some(DataKey { round: self.size_at(input.step), item: input.part as u32 }),
             camera: &ready.camera,
             whole: part.whole.as_ref(),
             near: view.near,

@@ -13,7 +13,6 @@ use crate::gpu::Gpu;
 use crate::lab::fault;
 use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
-use crate::scheduler::plan::FRAMES_IN_FLIGHT;
 use crate::train::TrainConfig;
 use crate::train::between::{Jobs, When};
 use crate::train::context::Context;
@@ -153,7 +152,7 @@ impl Trainer {
     }
 
     /// Submits a step, with the work that is due before and after it. Returns the reports of finished steps; they lag behind,
-    /// because two steps are in flight.
+    /// because some steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
         let mut done = self.work(When::Before, step)?;
@@ -209,7 +208,7 @@ impl Trainer {
 
     /// Submits a step, and first waits for the oldest one if its frame is still in use.
     fn submit_next(&mut self, input: StepInput) -> Result<Option<StepReport>> {
-        let done = if self.in_flight.len() == FRAMES_IN_FLIGHT { self.retire()? } else { None };
+        let done = if self.in_flight.len() == self.context.engine.frames() { self.retire()? } else { None };
         self.submit(input)?;
         Ok(done)
     }

@@ -111,7 +111,19 @@ impl OwnView {
         let Self { near, photo, occluders, depths, shown } = self;
         let (camera, near, valid_pixels) = (&scene.camera, *near, step_input::valid_pixels(&photo.rgba));
         let (finest, view_labels) = (step_input::finest(camera), &scene.target.label_map[..]);
-        StepView { camera, whole: None, near, finest, photo, valid_pixels, view_labels, depths, shown, occluders }
+        StepView {
+            key: None,
+            camera,
+            whole: None,
+            near,
+            finest,
+            photo,
+            valid_pixels,
+            view_labels,
+            depths,
+            shown,
+            occluders,
+        }
     }
 }
 
