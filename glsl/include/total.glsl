@@ -1,11 +1,39 @@
-// Writes the total of a scan to its counter.
+// Takes the total of a scan: to its counter, and to the dispatches over what it counts, unless it does not fit. Step, counters,
+// failure and dispatch_args are declared before.
+
+#include "dispatch.glsl"
+#include "partitions.glsl"
+
+void put_groups(uint at, uint count) {
+    uvec3 groups = folded_groups(count);
+    dispatch_args[at] = groups.x;
+    dispatch_args[at + 1u] = groups.y;
+}
+
+// All tiles of the scene, then the occupied tiles of object layers.
+void put_blend(uint layers) {
+    uint failed = (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
+        | (counters.longest_list > step.longest_list ? FAILED_SEGMENTS : 0u);
+    failure |= failed;
+    put_groups(ARGS_BLEND, failed != 0u ? 0u : step.tile_count + layers);
+}
+
 void put_total(uint total) {
     if (TOTAL == 0u) {
         counters.visible_count = total;
+        put_groups(ARGS_SPLATS, (total + 63u) / 64u);
+        put_groups(ARGS_SWEEP_SPLATS, partitions(total));
     } else if (TOTAL == 1u) {
+        // The need, even beyond capacity; then no pairs are written.
         counters.instance_count = total;
+        if (total > step.instance_capacity) {
+            failure |= FAILED_INSTANCES;
+            dispatch_args[ARGS_SPLATS] = 0u;
+        }
+        put_groups(ARGS_SWEEP_INSTANCES, failure != 0u ? 0u : partitions(total));
     } else if (TOTAL == 2u) {
         counters.layer_tile_count = total;
+        put_blend(total);
     } else {
         counters.densified_count = total;
     }

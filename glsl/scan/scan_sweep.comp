@@ -4,11 +4,13 @@
 #include "step.glsl"
 #include "count.glsl"
 #include "saturate.glsl"
-// scan_sweep — exclusive prefix sum in one dispatch; or (variant compact) lists the visible Gaussians in the order of the model.
+// scan_sweep — exclusive prefix sum in one dispatch; or (variant compact) lists the visible Gaussians in the order of the model;
+//              or (variant list) the occupied tiles of object layers.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS items per workgroup.
-// Reads:   step, counters, failure; values [n] (variant compact: depth keys)
-// Writes:  offsets [n]; counters (the field of TOTAL); sweep
+// Reads:   step, counters, failure; values [n] (variant compact: depth keys; variant list: 1 for an occupied tile)
+// Writes:  offsets [n]; sweep; what follows from the total (total.glsl): counters, dispatch_args, failure
 //          variant compact: keys_out [V] depth bits; values_out [V] Gaussian index; sweep (histograms of the digits of the keys)
+//          variant list: layer_tiles [occupied] (layer * T + tile)
 // Order:   exact integers, equal in every run. Sums from 2^30 on become 2^32 - 1 in the counter.
 // Mirror:  src/reference/scan.rs::exclusive_scan, scan.rs::compact
 
@@ -17,13 +19,16 @@
 layout(local_size_x = SWEEP_LANES) in;
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
-READ1(2, uint, failure);
+INOUT1(2, uint, failure);
 READ(3, uint, values);
 INOUT(4, uint, sweep);
+INOUT(7, uint, dispatch_args);
 #ifdef COMPACT
 WRITE(5, uint, keys_out);
 WRITE(6, uint, values_out);
 #include "digit_counts.glsl"
+#elif defined(LIST)
+WRITE(5, uint, layer_tiles);
 #else
 WRITE(5, uint, offsets);
 #endif
@@ -113,6 +118,10 @@ void main() {
                 keys_out[to] = key;
                 values_out[to] = i;
                 count_digits(key);
+            }
+#elif defined(LIST)
+            if (values[i] != 0u && to < step.layer_tile_capacity) {
+                layer_tiles[to] = i;
             }
 #else
             offsets[i] = to;

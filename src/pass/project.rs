@@ -26,10 +26,8 @@ pub(super) fn visible_splats(b: &mut Builder) {
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
     if b.shape.sweeps() {
         scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
-        pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
     } else {
         scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
-        pass!(b, prepare_splats { counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [], ONE);
         pass!(b, compact {
             step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
             keys_out: buffers.keys[0], values_out: buffers.values[0], failure: Buf::FAILURE,

@@ -17,27 +17,33 @@ pub enum Total {
     Densified = 3,
 }
 
-/// Writes `offsets[i]` = sum of `values[..i]`, and the sum of all values to the counter `total`.
+/// Writes `offsets[i]` = sum of `values[..i]`, the sum of all values to the counter `total`, and the sizes of the dispatches that
+/// follow from it.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
-    if !b.shape.sweeps() {
-        return reduce_then_scan(b, (values, offsets), count, total, false);
+    if b.shape.sweeps() {
+        sweep(b, (values, [offsets; 2]), count, total, (false, false));
+    } else {
+        reduce_then_scan(b, (values, offsets), count, total, false);
     }
-    let slot = b.next_scan();
-    pass!(b, scan_sweep {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, sweep: Buf::SWEEP,
-        offsets: offsets, keys_out: offsets, values_out: offsets,
-    } [count_source: count as u32, total: total as u32, sweep_slot: slot], count.partitions());
 }
 
 /// Writes the visible keys and their Gaussians, in the order of the model, and the number of them to `visible_count`, in one
 /// pass; and the histograms for a sort of these keys by the next passes.
 pub fn compact_by_sweep(b: &mut Builder, keys: Buf, (keys_out, values_out): (Buf, Buf)) {
+    sweep(b, (keys, [keys_out, values_out]), Count::Gaussians, Total::Visible, (true, false));
+}
+
+/// Writes the tiles whose value is not 0, and the number of them to `layer_tile_count`, in one pass.
+pub fn list_by_sweep(b: &mut Builder, occupied: Buf, tiles: Buf) {
+    sweep(b, (occupied, [tiles; 2]), Count::VirtualTiles, Total::LayerTiles, (false, true));
+}
+
+fn sweep(b: &mut Builder, (values, out): (Buf, [Buf; 2]), count: Count, total: Total, (compact, list): (bool, bool)) {
     let (slot, sort_slot) = (b.next_scan(), b.sweeps.sorts);
-    pass!(b, scan_sweep(compact: true) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: keys, sweep: Buf::SWEEP,
-        keys_out: keys_out, values_out: values_out, offsets: keys_out,
-    } [count_source: Count::Gaussians as u32, total: Total::Visible as u32, sweep_slot: slot, sort_slot: sort_slot],
-        Count::Gaussians.partitions());
+    pass!(b, scan_sweep(compact: compact, list: list) {
+        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, sweep: Buf::SWEEP,
+        offsets: out[0], layer_tiles: out[0], keys_out: out[0], values_out: out[1], dispatch_args: Buf::DISPATCH_ARGS,
+    } [count_source: count as u32, total: total as u32, sweep_slot: slot, sort_slot: sort_slot], count.partitions());
 }
 
 /// Same as [`scan`]; each key other than `KEY_INVISIBLE` counts as 1.
@@ -51,8 +57,10 @@ fn reduce_then_scan(b: &mut Builder, (values, offsets): (Buf, Buf), count: Count
     pass!(b, scan_reduce(flag: flag) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, partials: Buf::SCAN_PARTIALS,
     } [count_source: count as u32, lanes: lanes], groups);
-    pass!(b, scan_spine { partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS }
-        [lanes: lanes, total: total as u32], ONE);
+    pass!(b, scan_spine {
+        partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS, step: Buf::STEP, failure: Buf::FAILURE,
+        dispatch_args: Buf::DISPATCH_ARGS,
+    } [lanes: lanes, total: total as u32], ONE);
     pass!(b, scan_apply(flag: flag) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, partials: Buf::SCAN_PARTIALS,
         offsets: offsets,

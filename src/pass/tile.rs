@@ -12,9 +12,6 @@ use crate::shaders::constants;
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
-    pass!(b, prepare_instances {
-        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-    } [], ONE);
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
     pass!(b, emit_instances(labels: b.supervision.has_layers(), sweep: sweep) {
@@ -27,9 +24,6 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys);
-    pass!(b, prepare_blend {
-        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-    } [], ONE);
     pairs
 }
 
@@ -40,7 +34,13 @@ fn tile_ranges(b: &mut Builder, keys: Buf) {
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
     } [], groups);
     if !b.supervision.has_layers() {
+        pass!(b, prepare_blend {
+            step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
+        } [], ONE);
         return;
+    }
+    if b.shape.sweeps() {
+        return scan::list_by_sweep(b, Buf::LAYER_OCCUPIED, Buf::LAYER_TILES);
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
     pass!(b, layer_list {

@@ -59,7 +59,7 @@ fn scan_is_exact_and_saturates() {
     let Some(turn) = device() else { return };
     let mut engine = engine(turn.gpu());
     let id = list(&mut engine, |b| {
-        scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances)
+        scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Densified)
     });
     let mut random = generator(71);
     for count in COUNTS {
@@ -72,7 +72,7 @@ fn scan_is_exact_and_saturates() {
         engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
         let (offsets, total) = exclusive_scan(&values);
         check("offsets", exact(&get(&mut engine, Buf::INSTANCE_OFFSETS, count), &offsets));
-        assert_eq!(counters(&mut engine).instance_count, total);
+        assert_eq!(counters(&mut engine).densified_count, total);
         assert_eq!(total == u32::MAX, count == ITEMS);
     }
 }

@@ -17,8 +17,8 @@ use labelgs::pass::{Builder, KernelShape, scan, sort};
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
-    ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_WORDS, KEY_INVISIBLE, SWEEP_DIGITS,
-    SWEEP_HISTOGRAMS, SWEEP_LANES,
+    ARGS_BLEND, ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_SWEEP_TILES, ARGS_WORDS,
+    KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
 };
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -78,11 +78,18 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
     }
     let partitions = (count as u32).div_ceil(SWEEP_LANES * engine.shape().sweep_items);
     let mut args = [0_u32; ARGS_WORDS as usize];
-    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES] {
+    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_TILES] {
         args[at as usize..][..3].copy_from_slice(&[partitions, 1, 1]);
     }
     let count = count as u32;
-    let uniforms = StepUniforms { gaussian_count: count, ..StepUniforms::zeroed() };
+    let (tile_count, most) = (count, u32::MAX);
+    let uniforms = StepUniforms {
+        gaussian_count: count,
+        tile_count,
+        layer_tile_capacity: most,
+        longest_list: most,
+        ..StepUniforms::zeroed()
+    };
     let counters = Counters { visible_count: count, instance_count: count, ..Counters::zeroed() };
     let sched = engine.raw_mut();
     sched.upload(Buf::SWEEP, 0, 0, &sweep).expect("upload");
@@ -101,7 +108,7 @@ fn a_scan_is_exact_and_saturates() {
     each_size(MOST, |engine| {
         for held in [None, Some(0), Some(3)] {
             let id = list(engine, held, |b| {
-                scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
+                scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Densified);
             });
             let mut random = generator(71);
             for most in [900, u32::MAX / 1000] {
@@ -116,9 +123,29 @@ fn a_scan_is_exact_and_saturates() {
                     offsets.iter_mut().for_each(|offset| *offset = (*offset).min(SUM_MAX));
                     total = if total >= SUM_MAX { u32::MAX } else { total };
                     check("offsets", exact(&get(engine, Buf::INSTANCE_OFFSETS, count), &offsets));
-                    assert_eq!(counters(engine).instance_count, total, "{count} items");
+                    assert_eq!(counters(engine).densified_count, total, "{count} items");
                 }
             }
+        }
+    });
+}
+
+#[test]
+fn occupied_tiles_are_listed_and_counted() {
+    each_size(MOST, |engine| {
+        // There are fewer tiles than Gaussians, and the buffers of any words do.
+        let id = list(engine, Some(1), |b| scan::list_by_sweep(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS));
+        let mut random = generator(73);
+        for count in COUNTS {
+            let occupied: Vec<u32> = (0..count).map(|_| u32::from(random.random_bool(0.3))).collect();
+            announce(engine, count, &[]);
+            engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &occupied).expect("upload");
+            run(engine, id);
+            let expected: Vec<u32> = (0..count as u32).filter(|&i| occupied[i as usize] != 0).collect();
+            check("tiles", exact(&get(engine, Buf::INSTANCE_OFFSETS, expected.len()), &expected));
+            assert_eq!(counters(engine).layer_tile_count as usize, expected.len(), "{count} tiles");
+            let groups = if count == 0 { 0 } else { count + expected.len() };
+            assert_eq!(get(engine, Buf::DISPATCH_ARGS, ARGS_BLEND as usize + 1)[ARGS_BLEND as usize], groups as u32);
         }
     });
 }
