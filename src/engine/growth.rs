@@ -131,7 +131,7 @@ impl Engine {
             return Ok(());
         }
         self.check_idle()?;
-        let roomy = Capacity::grown(self.size.gaussians, count);
+        let roomy = self.grown(self.size.gaussians, count);
         let gaussians = if self.fits(&self.with_gaussians(roomy))? { roomy } else { count };
         let gaussians = match self.set_capacity(self.with_gaussians(gaussians)) {
             // Drivers may offer less memory than they report.
@@ -186,6 +186,10 @@ impl Engine {
         Ok(fits)
     }
 
+    fn grown(&self, current: u64, needed: u64) -> u64 {
+        Capacity::grown(current, needed, !self.gpu().is_cpu())
+    }
+
     fn with_gaussians(&self, gaussians: u64) -> Capacity {
         self.capacity_for(&EngineSize { gaussians, ..self.size })
     }
@@ -224,7 +228,7 @@ impl Engine {
         }
         self.abandon()?;
         let needed = &report.counters;
-        let grown = self.capacity_of(needed, Capacity::grown);
+        let grown = self.capacity_of(needed, |current, needed| self.grown(current, needed));
         // If reserves do not fit, allocate exactly what is needed.
         let least = self.capacity_of(needed, |_, needed| needed);
         let new = if self.fits(&grown)? { grown } else { least };

@@ -4,6 +4,7 @@
 //! above use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
 //! `Engine::retire` keep steps in flight, and transfers are typed.
 
+mod ahead;
 mod bands;
 mod card;
 mod data;
@@ -31,6 +32,7 @@ use crate::pass::{Extension, KernelShape};
 use crate::scene::{Camera, Gaussians, Zone};
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
+use ahead::Ahead;
 use glam::DVec3;
 use label_ids::LabelIds;
 use std::collections::HashMap;
@@ -59,6 +61,8 @@ pub struct Engine {
     last_frame: usize,
     /// Frames with an unread report.
     in_flight: Vec<bool>,
+    /// Compiles kernels of later lists.
+    ahead: Option<Ahead>,
     /// Every run is checked for writes outside of its buffers.
     has_guards: bool,
 }
@@ -104,6 +108,7 @@ impl Engine {
             label_rounds: 1,
             stamp: 0,
             last_frame: 0,
+            ahead: None,
             has_guards: options.plan.guards,
         })
     }

@@ -1,9 +1,10 @@
 //! Lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
 
+use super::ahead::Ahead;
 use super::{Engine, Input};
 use crate::error::{Error, Result};
 use crate::pass::{self, Stage, Variant};
-use crate::scheduler::plan::Buf;
+use crate::scheduler::plan::{Buf, PassList};
 use crate::scheduler::{ListId, Ticket};
 use crate::shaders::constants::LABEL_ROUNDS;
 use crate::shaders::structs::{Counters, StepUniforms};
@@ -72,8 +73,21 @@ impl Engine {
         if let Some(&id) = self.lists.get(&key) {
             return Ok(id);
         }
+        let list = self.declare(key);
+        let id = self.sched.prepare(&list)?;
+        self.lists.insert(key, id);
+        Ok(id)
+    }
+
+    /// Compiles the kernels of lists that come later, in this order, while the device works.
+    pub(crate) fn compile_ahead(&mut self, keys: impl IntoIterator<Item = ListKey>) {
+        let lists = keys.into_iter().map(|key| self.declare(key)).collect();
+        self.ahead = Some(Ahead::new(self.gpu(), lists));
+    }
+
+    fn declare(&self, key: ListKey) -> PassList {
         let (shape, capacity) = (&self.shape, &self.capacity);
-        let list = match key {
+        match key {
             ListKey::Train(variant) => pass::training_step(shape, capacity, variant),
             ListKey::Extended(variant, passes) => {
                 pass::extended_step(shape, capacity, variant, (&*self.extension, passes))
@@ -87,10 +101,7 @@ impl Engine {
             ListKey::RelocateCount => pass::relocate_count(shape, capacity),
             ListKey::RelocateApply => pass::relocate_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::OpacityReset => pass::opacity_reset(shape, capacity),
-        };
-        let id = self.sched.prepare(&list)?;
-        self.lists.insert(key, id);
-        Ok(id)
+        }
     }
 
     /// Runs a list and waits for it; grows buffers that were too small and repeats. No list may be in flight.
@@ -126,6 +137,11 @@ impl Engine {
     /// Most lists in flight.
     pub(crate) fn frames(&self) -> usize {
         self.sched.frames()
+    }
+
+    /// True if the host runs ahead of the device, as on a card.
+    pub(crate) fn runs_ahead(&self) -> bool {
+        self.frames() > 2
     }
 
     /// Submits a list without waiting. At most one list per frame may be in flight.

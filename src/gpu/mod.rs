@@ -38,7 +38,8 @@ pub(crate) use call::vk_call;
 pub(crate) use command::CommandBuffer;
 pub(crate) use crash::Markers;
 pub(crate) use descriptor::{Binding, BufferView, DescriptorPool};
-pub(crate) use pipeline::{Pipeline, PipelineKey};
+pub(crate) use pipeline::Pipeline;
+use pipeline::{PipelineKey, PipelineSlot};
 pub(crate) use query::QueryPool;
 pub(crate) use timeline::Timeline;
 
@@ -93,7 +94,7 @@ impl GpuOptions {
 
 /// An opened device.
 pub struct Gpu {
-    pipelines: Mutex<HashMap<PipelineKey, Arc<Pipeline>>>,
+    pipelines: Mutex<HashMap<PipelineKey, PipelineSlot>>,
     allocator: Mutex<Option<Allocator>>,
     used: memory::Used,
     queue: Mutex<vk::Queue>,

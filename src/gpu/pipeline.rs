@@ -5,11 +5,12 @@ use super::{Gpu, lock};
 use crate::error::{Error, Result};
 use crate::shaders::{BindingDesc, BindingKind, PUSHED_WORDS, ShaderDesc};
 use ash::vk;
-use std::sync::Arc;
+use rayon::prelude::*;
+use std::sync::{Arc, Mutex};
 
 /// Properties that distinguish pipelines.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct PipelineKey {
+pub(super) struct PipelineKey {
     name: &'static str,
     /// Address of the SPIR-V: tests may have two shaders with the same name.
     spirv: usize,
@@ -17,6 +18,9 @@ pub(crate) struct PipelineKey {
     spec: Vec<u32>,
     subgroup_size: Option<u32>,
 }
+
+/// A pipeline, or none before its first use.
+pub(super) type PipelineSlot = Arc<Mutex<Option<Arc<Pipeline>>>>;
 
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
@@ -36,12 +40,20 @@ impl Gpu {
         let subgroup_size = self.pinned(shader, self.subgroup_size());
         let spirv = shader.spirv.as_ptr() as usize;
         let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size };
-        if let Some(pipeline) = lock(&self.pipelines).get(&key) {
-            return Ok(Arc::clone(pipeline));
-        }
-        // Created outside of the lock: this may take long, and two equal pipelines do no harm.
-        let pipeline = Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?);
-        Ok(Arc::clone(lock(&self.pipelines).entry(key).or_insert(pipeline)))
+        let slot = Arc::clone(lock(&self.pipelines).entry(key.clone()).or_default());
+        // Others wait for this pipeline only: it may take long.
+        let mut slot = lock(&slot);
+        let pipeline = match slot.take() {
+            Some(pipeline) => pipeline,
+            None => Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?),
+        };
+        *slot = Some(Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+
+    /// Creates pipelines by several threads, so that [`Self::pipeline`] finds them.
+    pub(crate) fn compile(&self, passes: &[(&'static ShaderDesc, &[u32])]) -> Result<()> {
+        passes.par_iter().try_for_each(|(shader, spec)| self.pipeline(shader, spec).map(drop))
     }
 
     /// The subgroup size to pin for a shader, if it uses subgroups.

@@ -152,6 +152,8 @@ impl Scheduler {
         }
         // On first use, which may take long on a new driver.
         let _stage = Stage::new("compiling kernels", 0);
+        let passes: Vec<_> = plans.iter().flat_map(|plan| plan.list.kernels()).collect();
+        self.gpu.compile(&passes)?;
         let mut ids = Vec::new();
         for plan in plans {
             let recordings = self.record(&plan)?;

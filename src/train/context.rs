@@ -10,7 +10,7 @@ use crate::train::TrainConfig;
 use crate::train::extension::Joined;
 use crate::train::input::step_input::{self, SceneScale, StepInput};
 use crate::train::input::views::Views;
-use crate::train::objective::Objective;
+use crate::train::objective::{Loss, Objective};
 use crate::train::setup::{self, TrainerOptions};
 use crate::train::shared::Shared;
 use crate::train::shared::poses;
@@ -130,6 +130,30 @@ impl Context {
             0 => ListKey::Train(variant),
             passes => ListKey::Extended(variant, passes),
         }
+    }
+
+    /// Returns the lists that the steps of this training may need, in the order of their first steps.
+    pub(super) fn lists_ahead(&self) -> Vec<ListKey> {
+        let mut keys = Vec::new();
+        for step in 1..=self.config.iterations {
+            let update = self.strategy.updates(self.at(step));
+            let plain = StepInput { step, part: 0, layers: Vec::new(), labels: false, update, updates: step };
+            let disagrees =
+                self.has_labels() && self.objective.has(Loss::Disagreement) && self.config.has_disagreement_at(step);
+            let layered = self.has_labels() && self.objective.has(Loss::Layers) && self.config.has_layers_at(step);
+            let labelled = disagrees.then(|| StepInput { labels: true, ..plain.clone() });
+            let layered = layered.then(|| StepInput { labels: true, layers: vec![1], ..plain.clone() });
+            for input in [plain].into_iter().chain(labelled).chain(layered) {
+                let key = self.key(&input);
+                if !keys.contains(&key) {
+                    keys.push(key);
+                }
+            }
+        }
+        let growth = [ListKey::DensifyCount, ListKey::DensifyApply, ListKey::OpacityReset];
+        let first = 1.min(keys.len());
+        keys.splice(first..first, growth);
+        keys
     }
 
     /// Returns the rows of each photo that belong to an owner of shared parameters; none without the owner. Nothing may be

@@ -112,6 +112,14 @@ impl PassList {
         Self { name: name.into(), ..Self::default() }
     }
 
+    /// The shader of each dispatch, and its words.
+    pub(crate) fn kernels(&self) -> impl Iterator<Item = (&'static ShaderDesc, &[u32])> {
+        self.work.iter().filter_map(|work| match work {
+            Work::Pass(pass) => Some((pass.shader, pass.spec.as_slice())),
+            Work::Fill { .. } | Work::Copy { .. } => None,
+        })
+    }
+
     /// Appends a dispatch.
     pub fn pass(&mut self, pass: PassDecl) -> &mut Self {
         self.work.push(Work::Pass(PassDecl { stage: self.stage, ..pass }));

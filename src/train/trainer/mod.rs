@@ -84,7 +84,12 @@ impl Trainer {
         size: EngineSize,
         options: TrainerOptions,
     ) -> Result<Self> {
-        let context = Context::new(gpu, config, dataset, size, options)?;
+        let mut context = Context::new(gpu, config, dataset, size, options)?;
+        // On a processor, compiling would take time from the steps.
+        if context.engine.runs_ahead() {
+            let lists = context.lists_ahead();
+            context.engine.compile_ahead(lists);
+        }
         let jobs = Jobs::new(&context.config);
         Ok(Self {
             order: ViewOrder::new(context.config.seed, context.views.parts().len()),

@@ -109,8 +109,11 @@ fn a_scene_without_gaussians_can_be_planned() {
 }
 
 #[test]
-fn capacities_grow_by_half_and_past_the_need() {
-    assert_eq!(Capacity::grown(1000, 1001), 1500);
-    assert_eq!(Capacity::grown(1000, 5000), 5500);
-    assert_eq!(Capacity::grown(u64::MAX, 1), u64::MAX);
+fn capacities_grow_by_half_or_twofold_and_past_the_need() {
+    assert_eq!(Capacity::grown(1000, 1001, false), 1500);
+    assert_eq!(Capacity::grown(1000, 1001, true), 2000);
+    for on_card in [false, true] {
+        assert_eq!(Capacity::grown(1000, 5000, on_card), 5500);
+        assert_eq!(Capacity::grown(u64::MAX, 1, on_card), u64::MAX);
+    }
 }
