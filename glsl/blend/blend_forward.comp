@@ -107,7 +107,7 @@ void main() {
 #ifdef LABELS
         if (t.layer != 0u && inside) {
             uint p = (t.y0 + k) * u.width + t.x;
-            inside = fetchc(target, p).w > 0.5 && !left_out(t.layer, fetchu(view_labels, p), u);
+            inside = fetchc(target, p).w > 0.5 && !left_out(t.layer, view_label(p), u);
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats

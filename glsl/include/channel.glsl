@@ -1,9 +1,11 @@
 // One more channel of the backward walk, of opacities only: what each splat carries differs from what the pixel has.
 
 #ifdef DISAGREEMENT
+#include "view_label.glsl"
+
 // Labels: the mask's against the splat's; no label behind all splats.
 uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {
-    uint here = fetchu(view_labels, p), own = here & LABEL_MASK;
+    uint here = view_label(p), own = here & LABEL_MASK;
     bool counts = inside && fetchc(target, p).w > 0.5 && (here & LABEL_BORDER) == 0u;
     weight = counts ? u.label_weight * u.loss_scale : 0.0;
     behind = own != 0u ? weight : 0.0;

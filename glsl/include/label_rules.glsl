@@ -1,5 +1,7 @@
 // Label rules: the pixels at which an object is hidden, and the lift.
 
+#include "view_label.glsl"
+
 // 1: the paper's lift is on; each pixel then remembers its main splat.
 layout(constant_id = 16) const uint LIFT = 0;
 const bool REMEMBERS_MAIN = LIFT != 0u;
@@ -17,7 +19,7 @@ bool left_out(uint layer, uint here, StepUniforms u) {
 // Main-Gaussian labelling with the projection filter: pixel p of a sampled object votes for the Gaussian that
 // dominates it. Keys order by weight, then label, so the maximum does not depend on the order of the votes.
 void lift(uint p, uint splat, float weight, StepUniforms u) {
-    uint label = fetchu(view_labels, p);
+    uint label = view_label(p);
     // A pixel near a contour also has LABEL_BORDER set.
     if (label == 0u || label > LABEL_MASK || fetchu(layer_from_label, label) == 0u) {
         return;
@@ -27,7 +29,7 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
     if (!inside) {
         return;
     }
-    if (u.gpf != 0u && (fetchu(view_labels, uint(centre.y) * u.width + uint(centre.x)) & LABEL_MASK) != label) {
+    if (u.gpf != 0u && (view_label(uint(centre.y) * u.width + uint(centre.x)) & LABEL_MASK) != label) {
         return;
     }
     uint key = (uint(weight * 65535.0) << 16) | label;
@@ -42,7 +44,7 @@ void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], floa
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         bool inside = t.x < u.width && t.y0 + k < u.height;
         uint p = inside ? (t.y0 + k) * u.width + t.x : 0u;
-        uint here = fetchu(view_labels, p);
+        uint here = view_label(p);
         vec4 photo = fetchc(target, p);
         vec4 wanted = here == label ? vec4(photo.xyz, 1.0) : vec4(0.0);
         bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);

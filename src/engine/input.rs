@@ -118,18 +118,20 @@ impl Engine {
             stamp: self.stamp,
             ..*uniforms
         };
-        let sched = &mut self.sched;
+        let (sched, shape) = (&mut self.sched, &self.shape);
         sched.upload(Buf::STEP, frame, 0, &[counts])?;
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
                 // A photo that was made for this step does not come again.
                 let key = train.key.filter(|_| matches!(train.photo, Cow::Borrowed(_)));
-                sched.load(Buf::TARGET, frame, key, &train.photo)?;
+                sched.load(Buf::TARGET, frame, key, || Cow::Borrowed(&train.photo))?;
                 train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
-                train.disagreement.map_or(Ok(()), |labels| sched.load(Buf::VIEW_LABELS, frame, train.key, labels))?;
+                if let Some(labels) = train.disagreement {
+                    sched.load(Buf::VIEW_LABELS, frame, train.key, || shape.view_labels(labels))?;
+                }
                 let Some(layers) = &train.layers else { return Ok(()) };
-                sched.load(Buf::VIEW_LABELS, frame, train.key, layers.view_labels)?;
+                sched.load(Buf::VIEW_LABELS, frame, train.key, || shape.view_labels(layers.view_labels))?;
                 sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;
                 sched.upload(Buf::LABEL_FROM_LAYER, frame, 0, &layers.label_from_layer)?;
                 sched.upload(Buf::LAYER_WEIGHTS, frame, 0, &layers.weights)?;

@@ -90,6 +90,7 @@ impl Engine {
         shape.check()?;
         let size = size.in_bands(&shape);
         size.check(&shape)?;
+        let shape = shape.for_labels(size.labels.map_or(0, |labels| labels.max_label));
         let capacity = capacity(&shape, &size);
         let sched = Scheduler::new(gpu, TABLE, capacity.counts(), options)?;
         Ok(Self {

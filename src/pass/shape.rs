@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
-use crate::shaders::constants::{SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
+use crate::shaders::constants::{LABEL_BORDER, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
+use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub struct KernelShape {
     pub sweep_items: u32,
     /// Side of the tiles of the photo loss in one dispatch, px; 0 with a dispatch for each filter.
     pub loss_tile: u32,
+    /// Pixels of a mask on the device have 16 bits.
+    pub narrow_labels: bool,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -34,6 +37,9 @@ pub struct KernelShape {
     /// ([`Gaussians::antialiased`](crate::scene::Gaussians::antialiased)).
     pub antialiased: bool,
 }
+
+/// Largest id of a pixel of 16 bits, the highest of which is a flag.
+const NARROW_MAX: u32 = 0x7fff;
 
 /// Lavapipe ends all loops of an invocation after 65,535 rounds.
 const LOOP_ROUNDS: u32 = 65_000;
@@ -54,6 +60,8 @@ impl KernelShape {
         let is_card = !device.is_cpu();
         let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
+        let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
+        let shape = Self { narrow_labels, ..shape };
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -128,11 +136,28 @@ impl KernelShape {
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             sweep_items: 0,
             loss_tile: 0,
+            narrow_labels: false,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
             antialiased: false,
         }
+    }
+
+    /// Returns the shape for masks with ids up to `max_label`.
+    pub(crate) fn for_labels(self, max_label: u32) -> Self {
+        Self { narrow_labels: self.narrow_labels && max_label <= NARROW_MAX, ..self }
+    }
+
+    /// Returns the pixels of a mask in the layout of the kernels (glsl/include/view_label.glsl).
+    pub(crate) fn view_labels<'a>(&self, labels: &'a [u32]) -> Cow<'a, [u32]> {
+        if !self.narrow_labels {
+            return Cow::Borrowed(labels);
+        }
+        let narrow = |word: u32| word & NARROW_MAX | (word & LABEL_BORDER) >> 1;
+        Cow::Owned(
+            labels.chunks(2).map(|two| narrow(two[0]) | two.get(1).map_or(0, |&word| narrow(word) << 16)).collect(),
+        )
     }
 
     /// Checks that the blend kernels can use this shape: each lane owns whole pixels in one column of a tile.
@@ -175,6 +200,7 @@ impl KernelShape {
             "TILE_HEIGHT" => Some(self.tile_height),
             "DIGIT_BITS" => Some(self.digit_bits),
             "SWEEP_ITEMS" => Some(self.sweep_items.max(1)),
+            "LABELS_PER_WORD" => Some(if self.narrow_labels { 2 } else { 1 }),
             "LOSS_TILE" => (self.loss_tile > 0).then_some(self.loss_tile),
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, CommandBuffer, Gpu, MemoryKind};
 use crate::scheduler::plan::Buf;
 use bytemuck::Pod;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -125,23 +126,29 @@ impl Loads {
 }
 
 impl Scheduler {
-    /// Writes the first elements of a PerFrame buffer, which have a key if they come again.
+    /// Writes the first elements of a PerFrame buffer, which have a key if they come again; then `data` makes them once.
     ///
     /// Waits for the last list of the frame. On a device with memory of its own, data with a key come from the host once, as
     /// long as half of the memory that is left has room for them.
-    pub fn load<T: Pod>(&mut self, buf: Buf, frame: usize, key: Option<DataKey>, data: &[T]) -> Result<()> {
-        let bytes = std::mem::size_of_val(data) as u64;
-        self.range(buf, frame, 0, bytes)?;
-        let (Some(loads), Some(key)) = (&mut self.loads, key.filter(|_| bytes > 0)) else {
-            return self.upload(buf, frame, 0, data);
-        };
-        if let Some(kept) = loads.kept.get(&(buf, key)).filter(|kept| kept.bytes() == bytes) {
-            let source = Source::Again(Arc::clone(kept));
-            loads.push(frame, Load { buf, start: 0, bytes, source });
+    pub fn load<'a, T: Pod>(
+        &mut self,
+        buf: Buf,
+        frame: usize,
+        key: Option<DataKey>,
+        data: impl FnOnce() -> Cow<'a, [T]>,
+    ) -> Result<()> {
+        self.check_frame(frame)?;
+        if let (Some(loads), Some(key)) = (&mut self.loads, key)
+            && let Some(kept) = loads.kept.get(&(buf, key))
+        {
+            let load = Load { buf, start: 0, bytes: kept.bytes(), source: Source::Again(Arc::clone(kept)) };
+            loads.push(frame, load);
             return Ok(());
         }
-        self.upload(buf, frame, 0, data)?;
-        let kept = self.place_for(buf, key, bytes);
+        let data = data();
+        self.upload(buf, frame, 0, &data)?;
+        let Some(key) = key.filter(|_| !data.is_empty()) else { return Ok(()) };
+        let kept = self.place_for(buf, key, std::mem::size_of_val(&*data) as u64);
         if let (Some(kept), Some(loads)) = (kept, &mut self.loads)
             && let Some(load) = loads.frames[frame].next.last_mut()
         {

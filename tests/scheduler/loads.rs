@@ -34,7 +34,7 @@ fn sent(scheduler: &mut Scheduler, loads: &[(Option<DataKey>, u32)]) -> u64 {
             assert_eq!(back, data(loads[step - 4].1), "load {}", step - 4);
         }
         if let Some(&(key, seed)) = loads.get(step) {
-            scheduler.load(FLOATS, frame, key, &data(seed)).unwrap();
+            scheduler.load(FLOATS, frame, key, || data(seed).into()).unwrap();
             scheduler.submit(id, frame).unwrap();
         }
     }
@@ -79,8 +79,8 @@ fn without_room_data_come_from_the_host_and_another_round_makes_room() {
 fn data_of_a_list_that_does_not_run_are_not_kept() {
     let Some(gpu) = device() else { return };
     let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap();
-    scheduler.load(FLOATS, 0, key(0, 1), &[7_u32; 500]).unwrap();
-    scheduler.load(FLOATS, 0, key(0, 2), &[8_u32; 500]).unwrap();
+    scheduler.load(FLOATS, 0, key(0, 1), || vec![7_u32; 500].into()).unwrap();
+    scheduler.load(FLOATS, 0, key(0, 2), || vec![8_u32; 500].into()).unwrap();
     assert_eq!(scheduler.kept_bytes(), 2000);
     scheduler.set_counts(counts(200, 500)).unwrap();
     assert_eq!(scheduler.kept_bytes(), 0);

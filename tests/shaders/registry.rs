@@ -45,8 +45,10 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping =
-        own.into_iter().chain(emulated).map(|shape| KernelShape { loss_tile: 16, ..shape }.with_sweeps_of(8));
+    let sweeping = own
+        .into_iter()
+        .chain(emulated)
+        .map(|shape| KernelShape { loss_tile: 16, narrow_labels: true, ..shape }.with_sweeps_of(8));
     for shape in own.into_iter().chain(emulated).chain(antialiased).chain(sweeping) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);

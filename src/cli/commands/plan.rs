@@ -147,7 +147,7 @@ fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
     };
     let kept = subject.limits.kept_max(memory.total);
     if kept > 0 {
-        let views = kept / (8 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
+        let views = kept / (6 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
         text += &format!("photos:  {views} with masks stay there besides, in {:.0} MiB\n", kept as f64 / MIB);
     }
     let half = |value: u32| (value / 2).max(1);
