@@ -25,6 +25,15 @@ impl Timeline {
         self.handle
     }
 
+    /// Returns true if the value is reached.
+    pub(crate) fn is_reached(&self, value: u64) -> Result<bool> {
+        // SAFETY: the handle is alive.
+        let found = vk_call("vkGetSemaphoreCounterValue", || unsafe {
+            self.gpu.raw().get_semaphore_counter_value(self.handle)
+        })?;
+        Ok(found >= value)
+    }
+
     /// Blocks until the value is reached.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
         let (handles, values) = ([self.handle], [value]);

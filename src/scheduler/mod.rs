@@ -191,6 +191,11 @@ impl Scheduler {
         })
     }
 
+    /// Returns true if a submit is done, and does not block.
+    pub fn is_done(&self, ticket: Ticket) -> Result<bool> {
+        self.timeline.is_reached(ticket.0).map_err(|error| self.name_pass(error))
+    }
+
     /// Blocks until all submits are done.
     pub fn wait_all(&self) -> Result<()> {
         self.wait(Ticket(self.submitted))
@@ -214,10 +219,10 @@ impl Scheduler {
         self.resize_own(counts)
     }
 
-    /// Makes all lists from now on write the times of their items, with a barrier before each. Discards the lists that
-    /// there are.
-    pub fn time_items(&mut self) -> Result<()> {
-        (self.options.timestamps, self.options.plan.barrier_everywhere) = (true, true);
+    /// Sets whether lists from now on write the times of their items, and whether each item has a barrier before it.
+    /// Discards the lists that there are.
+    pub fn time_items(&mut self, timestamps: bool, barriers: bool) -> Result<()> {
+        (self.options.timestamps, self.options.plan.barrier_everywhere) = (timestamps, barriers);
         self.set_counts(self.counts.clone())
     }
 
