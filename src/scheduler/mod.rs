@@ -15,6 +15,7 @@ pub use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
+use crate::phases::{self, Phase};
 use crate::scheduler::plan::{
     Buf, BufferDecl, FRAMES_IN_FLIGHT, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory,
 };
@@ -128,6 +129,10 @@ impl Scheduler {
 
     /// Plans and records several lists; this is cheaper than one by one if scratch memory must grow.
     pub fn prepare_all(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
+        phases::timed(Phase::Compile, || self.plan_and_record(lists))
+    }
+
+    fn plan_and_record(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
         self.replace_lost()?;
         let mut plans = Vec::new();
         for list in lists {
@@ -211,6 +216,10 @@ impl Scheduler {
     /// over, and all lists are discarded. If memory does not suffice, the old counts stay in force.
     pub fn set_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         self.wait_all()?;
+        phases::timed(Phase::Grow, || self.replace_counts(counts))
+    }
+
+    fn replace_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         MemoryReport::predict(self.table, &counts, &[], &self.limits, self.options.plan)?;
         self.lists.clear();
         self.current = None;
