@@ -104,7 +104,7 @@ def tables(folder, part):
     if part == "1":
         kernels(folder / "kernels.json")
         for row in of("other"):
-            print(f"SM clock {mhz(row)} MHz\n{(folder / (row['name'] + '.txt')).read_text().strip()}\n")
+            print(f"{row['name']} ({' '.join(row['forms'])}), SM clock {mhz(row)} MHz\n{(folder / (row['name'] + '.txt')).read_text().strip()}\n")
     if of("training"):
         phases = list(of("training")[0]["phases"])
         table(["training", "steps", "Gaussians", "s", *phases, "PSNR", "peak MiB", "sha256", "SM MHz"], [
