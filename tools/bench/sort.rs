@@ -31,9 +31,12 @@ const BITS: [u32; 2] = [32, 13];
 
 /// Runs it.
 pub fn run(common: &Common) -> Result<()> {
-    let (counts, rounds): (&[usize], _) =
-        if common.small { (&[2_000, 20_000], 2) } else { (&[20_000, 450_000, 2_000_000, 10_000_000], 10) };
     let gpu = device::open()?;
+    let (counts, rounds): (&[usize], _) = match (common.small, gpu.is_cpu()) {
+        (true, _) => (&[2_000, 20_000], 2),
+        (false, true) => (&[20_000, 450_000], 10),
+        (false, false) => (&[20_000, 450_000, 2_000_000, 10_000_000], 10),
+    };
     let own = KernelShape::of(gpu.capabilities());
     let lanes =
         KernelShape { sweep_items: 0, digit_bits: KernelShape::new(own.subgroup, gpu.is_cpu()).digit_bits, ..own };

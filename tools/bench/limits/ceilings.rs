@@ -68,7 +68,7 @@ pub struct Ceilings {
 
 impl Ceilings {
     /// A row for each.
-    pub fn to_text(&self) -> String {
+    pub fn to_text(self) -> String {
         let g = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2}", value / 1e9));
         let us = |value: f64| format!("{:.2}", value * 1e6);
         let rows = [
