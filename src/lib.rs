@@ -94,7 +94,7 @@ pub use labelgs_scenes as scenes;
 pub use labelgs_synth as synth;
 
 use labelgs_report as report;
-use labelgs_scene::{error, lab, options, stage, words};
+use labelgs_scene::{error, lab, options, phases, stage, words};
 #[cfg(feature = "viewer")]
 use labelgs_web as web;
 

@@ -190,13 +190,13 @@ impl Engine {
         Ok(Report { counters, failure })
     }
 
-    /// Makes all lists from now on write the times of their items ([`Scheduler::time_items`]).
+    /// Sets whether lists write the times of their items from now on ([`Scheduler::time_items`]).
     ///
     /// [`Scheduler::time_items`]: crate::scheduler::Scheduler::time_items
-    pub(crate) fn time_items(&mut self) -> Result<()> {
+    pub(crate) fn time_items(&mut self, timestamps: bool, barriers: bool) -> Result<()> {
         self.check_idle()?;
         self.lists.clear();
-        self.sched.time_items()
+        self.sched.time_items(timestamps, barriers)
     }
 
     /// Stage, name and nanoseconds of each item of a retired list; its frame must not be in use again. Empty without

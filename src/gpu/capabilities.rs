@@ -85,7 +85,7 @@ impl Subgroup {
     }
 
     /// True if the device has ballots, which some kernels use.
-    pub(crate) fn has_ballots(&self) -> bool {
+    pub fn has_ballots(&self) -> bool {
         self.operations.contains(vk::SubgroupFeatureFlags::BALLOT)
     }
 

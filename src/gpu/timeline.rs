@@ -29,10 +29,13 @@ impl Timeline {
         self.handle
     }
 
-    /// The value that is reached.
-    fn reached(&self) -> Result<u64> {
+    /// Returns true if the value is reached.
+    pub(crate) fn is_reached(&self, value: u64) -> Result<bool> {
         // SAFETY: the handle is alive.
-        vk_call("vkGetSemaphoreCounterValue", || unsafe { self.gpu.raw().get_semaphore_counter_value(self.handle) })
+        let found = vk_call("vkGetSemaphoreCounterValue", || unsafe {
+            self.gpu.raw().get_semaphore_counter_value(self.handle)
+        })?;
+        Ok(found >= value)
     }
 
     /// Waits until the value is reached. Asks again and again for a while, unless the device is the processor: a thread that
@@ -40,7 +43,7 @@ impl Timeline {
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
         let start = Instant::now();
         while !self.gpu.is_cpu() && start.elapsed() < POLLED {
-            if self.reached()? >= value {
+            if self.is_reached(value)? {
                 return Ok(());
             }
             std::hint::spin_loop();

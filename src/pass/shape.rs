@@ -80,7 +80,7 @@ impl KernelShape {
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
-    pub(super) fn with_sweeps(self, device: &Capabilities) -> Option<Self> {
+    pub fn with_sweeps(self, device: &Capabilities) -> Option<Self> {
         let (limits, subgroup) = (&device.limits, &device.subgroup);
         let fits = limits.max_invocations.min(limits.max_group_size[0]) >= SWEEP_LANES
             && SWEEP_LANES / self.subgroup <= subgroup.max_per_group

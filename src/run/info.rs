@@ -7,10 +7,12 @@ use crate::engine::Engine;
 use crate::error::Result;
 use crate::files::atomic;
 use crate::gpu::Gpu;
+use crate::phases;
 use crate::scene::Dataset;
 use crate::scheduler::SchedulerOptions;
 use crate::train::Trainer;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -34,6 +36,8 @@ pub(crate) struct Info {
     /// Whenever the run was started or went on, in turn.
     pub parts: Vec<Part>,
     pub memory: Memory,
+    /// Seconds of the last part by phase, until its last step.
+    pub phases: BTreeMap<String, f64>,
     /// The end; none while the run goes on, and after a kill.
     pub ended: Option<Ended>,
     /// Views with pictures, the worst first.
@@ -131,6 +135,11 @@ impl Info {
         let engine = trainer.engine_mut();
         let plan = Engine::predict(engine.gpu(), engine.size(), SchedulerOptions::default());
         self.memory.planned_start = self.memory.planned_start.or(plan.ok().map(|plan| plan.total));
+    }
+
+    /// Notes where the time went.
+    pub(super) fn note_phases(&mut self) {
+        self.phases = phases::take().into_iter().map(|(name, seconds)| (name.to_owned(), seconds)).collect();
     }
 
     /// Reads the file; none if there is none.

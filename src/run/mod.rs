@@ -37,6 +37,7 @@ pub use crate::train::{ExposureMode, Preset, StrategyKind};
 
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::phases::{self, Phase};
 use crate::scene::{Dataset, View};
 use crate::train::Trainer;
 use checkpoints::Checkpoints;
@@ -145,12 +146,15 @@ pub fn train(request: &Request, open: &Open, observer: &mut dyn Observer) -> Res
 /// Trains until the end or until the device is lost.
 fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn Observer) -> Result<Summary> {
     let prepared = prepare::prepare(request, is_again)?;
+    phases::take();
     let mut run = prepare::begin(prepared, request, open()?, observer)?;
     run.write_records()?;
     run.write_info()?;
     run.tell(Event::Started { after: run.trainer.steps_done(), steps: run.settings.train.iterations })?;
     run.history.start();
-    recovery::over_numeric_failures(&mut run).map_err(|error| run.keep_model(error))?;
+    let done = phases::timed(Phase::Steps, || recovery::over_numeric_failures(&mut run));
+    run.info.note_phases();
+    done.map_err(|error| run.keep_model(error))?;
     run.hold_records()?;
     // Save the model in either case.
     let kept = run.keep_if_stopped();

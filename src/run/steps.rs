@@ -5,6 +5,7 @@ use super::models::ModelJob;
 use super::preview::PreviewJob;
 use super::{Event, Run};
 use crate::error::{Error, Result};
+use crate::phases::{self, Phase};
 use crate::train::between::Between;
 use std::time::Instant;
 
@@ -33,12 +34,13 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
 
 /// Writes the files that are due after a step.
 fn work_after(run: &mut Run, step: u32) -> Result<()> {
-    let jobs: [&mut dyn Between<Run>; 3] = [&mut ModelJob, &mut PreviewJob, &mut CheckpointJob];
-    for job in jobs {
+    let jobs: [(&mut dyn Between<Run>, Phase); 3] =
+        [(&mut ModelJob, Phase::Output), (&mut PreviewJob, Phase::Output), (&mut CheckpointJob, Phase::Checkpoint)];
+    for (job, phase) in jobs {
         if job.is_due(step, run) {
             run.hold_folder()?;
             run.history.drain(&mut run.trainer)?;
-            job.run(step, run)?;
+            phases::timed(phase, || job.run(step, run))?;
         }
     }
     Ok(())

@@ -20,6 +20,7 @@ pub mod options;
 pub mod origin;
 pub mod overview;
 pub mod path;
+pub mod phases;
 pub mod pixels;
 pub mod sampling;
 pub mod spread;

@@ -17,6 +17,7 @@ pub use profiler::{PassTime, Profiler};
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{CommandBuffer, Gpu, Timeline};
+use crate::phases::{self, Phase};
 use crate::scheduler::plan::{Buf, BufferDecl, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory};
 use crate::stage::Stage;
 use loads::Loads;
@@ -137,6 +138,10 @@ impl Scheduler {
 
     /// Plans and records several lists; this is cheaper than one by one if scratch memory must grow.
     pub fn prepare_all(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
+        phases::timed(Phase::Compile, || self.plan_and_record(lists))
+    }
+
+    fn plan_and_record(&mut self, lists: &[&PassList]) -> Result<Vec<ListId>> {
         self.replace_lost()?;
         let mut plans = Vec::new();
         for list in lists {
@@ -211,6 +216,11 @@ impl Scheduler {
         })
     }
 
+    /// Returns true if a submit is done, and does not block.
+    pub fn is_done(&self, ticket: Ticket) -> Result<bool> {
+        self.timeline.is_reached(ticket.0).map_err(|error| self.name_pass(error))
+    }
+
     /// Blocks until all submits are done.
     pub fn wait_all(&self) -> Result<()> {
         self.wait(Ticket(self.submitted))
@@ -226,6 +236,10 @@ impl Scheduler {
     /// over, and all lists are discarded. If memory does not suffice, the old counts stay in force.
     pub fn set_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         self.wait_all()?;
+        phases::timed(Phase::Grow, || self.replace_counts(counts))
+    }
+
+    fn replace_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         let total = MemoryReport::predict(self.table, &counts, &[], &self.limits, self.options.plan)?.total;
         self.make_room(total)?;
         self.lists.clear();
@@ -239,10 +253,10 @@ impl Scheduler {
         }
     }
 
-    /// Makes all lists from now on write the times of their items, with a barrier before each. Discards the lists that
-    /// there are.
-    pub fn time_items(&mut self) -> Result<()> {
-        (self.options.timestamps, self.options.plan.barrier_everywhere) = (true, true);
+    /// Sets whether lists from now on write the times of their items, and whether each item has a barrier before it.
+    /// Discards the lists that there are.
+    pub fn time_items(&mut self, timestamps: bool, barriers: bool) -> Result<()> {
+        (self.options.timestamps, self.options.plan.barrier_everywhere) = (timestamps, barriers);
         self.set_counts(self.counts.clone())
     }
 

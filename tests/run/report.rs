@@ -119,6 +119,10 @@ fn warnings_are_in_the_report() {
     let place = Place::new();
     let flags = ["--iterations", "6", "--checkpoint-every", "2"];
     succeeded(&place.trained("out", &flags));
+    let info: serde_json::Value = serde_json::from_str(&read(&place.path("out/run.json"))).expect("JSON");
+    for phase in ["steps", "compile", "checkpoint"] {
+        assert!(info["phases"][phase].as_f64() > Some(0.0), "{phase}: {}", info["phases"]);
+    }
     let said = succeeded(&place.trained("out", &["--resume", "--iterations", "12"]));
     assert!(said.contains("--iterations: 6 in the checkpoint, now 12"), "{said}");
     let page = read(&place.path("out/report.html"));

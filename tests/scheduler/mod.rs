@@ -108,6 +108,7 @@ fn fill_dispatch_and_copy_run_in_order() {
     let id = scheduler.prepare(&list).unwrap();
     let ticket = scheduler.submit(id, 1).unwrap();
     scheduler.wait(ticket).unwrap();
+    assert!(scheduler.is_done(ticket).unwrap());
     assert_eq!(scheduler.download_all::<u32>(REPORT, 1).unwrap(), vec![32; 1000]);
     assert_eq!(scheduler.download_all::<u32>(REPORT, 0).unwrap(), vec![0; 1000], "the other frame is untouched");
 }

@@ -26,9 +26,8 @@ pub fn spirv(name: &str, source: &str, defines: &[Define]) -> Result<&'static [u
 }
 
 /// A kernel of a benchmark with the interface that it declares.
-pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static ShaderDesc> {
-    let defines = texel_define(texel);
-    let declared = compiler()?.compile(name, source, &defines, Purpose::Reflect).map_err(Error::Check)?;
+pub fn shader(name: &'static str, source: &str, defines: &[Define]) -> Result<&'static ShaderDesc> {
+    let declared = compiler()?.compile(name, source, defines, Purpose::Reflect).map_err(Error::Check)?;
     let declared = rspirv::dr::load_words(&declared).map_err(|error| Error::Bug(format!("{name}: {error}")))?;
     let found = reflect::interface(&declared);
     if let Some(problem) = found.problems.first() {
@@ -58,7 +57,7 @@ pub fn shader(name: &'static str, source: &str, texel: bool) -> Result<&'static 
         stem: name,
         name,
         macros: &[],
-        spirv: spirv(name, source, &defines)?,
+        spirv: spirv(name, source, defines)?,
         bindings: bindings.collect::<Vec<_>>().leak(),
         spec: spec.collect::<Vec<_>>().leak(),
         local_size: found.local_size.map(|size| match size {

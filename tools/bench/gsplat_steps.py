@@ -3,6 +3,8 @@
 
     gsplat_steps.py RUN SCENE [--steps N]
 
+Each step is waited for once, and once many are submitted without a wait, as in a training.
+
 RUN is the folder of `labelgs train`, SCENE the scene that it was trained on. Needs torch with CUDA, gsplat, numpy and
 pillow; fused_ssim for the D-SSIM part of the loss, without which the loss is L1 alone and the output says so.
 """
@@ -92,14 +94,11 @@ def main():
         picture = np.asarray(Image.open(photo).convert("RGB").resize(size), dtype=np.float32) / 255
         views.append((tensor(np.linalg.inv(world)), tensor(np.array(intrinsics, dtype=np.float32)), tensor(picture), size))
 
-    times = []
-    for step in range(20 + arguments.steps):
-        pose, intrinsics, photo, (width, height) = views[step % len(views)]
-        torch.cuda.synchronize()
-        start = time.perf_counter()
+    def step(number, packed):
+        pose, intrinsics, photo, (width, height) = views[number % len(views)]
         picture, _, _ = rasterization(
             parameters["means"], parameters["quats"], parameters["scales"].exp(), parameters["opacities"].sigmoid(),
-            parameters["colours"], pose[None], intrinsics[None], width, height, sh_degree=3, near_plane=0.2, packed=False)
+            parameters["colours"], pose[None], intrinsics[None], width, height, sh_degree=3, near_plane=0.2, packed=packed)
         loss = 0.8 * (picture[0] - photo).abs().mean()
         if fused_ssim is not None:
             one = fused_ssim(picture.permute(0, 3, 1, 2), photo[None].permute(0, 3, 1, 2))
@@ -107,13 +106,31 @@ def main():
         adam.zero_grad(set_to_none=True)
         loss.backward()
         adam.step()
+
+    def timed(work):
         torch.cuda.synchronize()
-        times.append((time.perf_counter() - start) * 1e3)
+        start = time.perf_counter()
+        work()
+        torch.cuda.synchronize()
+        return (time.perf_counter() - start) * 1e3
+
+    ways = []
+    for name, packed in [("unpacked", False), ("packed", True)]:
+        for number in range(20):
+            step(number, packed)
+        times = sorted(timed(lambda: step(number, packed)) for number in range(arguments.steps))
+        together = timed(lambda: [step(number, packed) for number in range(arguments.steps)])
+        ways.append({
+            "name": name, "median_ms": statistics.median(times), "p90_ms": times[len(times) * 9 // 10],
+            "in_flight_ms": together / arguments.steps,
+        })
     print(json.dumps({
         "device": torch.cuda.get_device_name(),
         "gaussians": len(ply),
+        "size": max(view[3] for view in views),
+        "sh_degree": 3,
         "ssim": fused_ssim is not None,
-        "median_ms": statistics.median(times[20:]),
+        "ways": ways,
     }))
 
 

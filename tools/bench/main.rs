@@ -19,7 +19,10 @@ mod pace;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
 #[path = "../shadergen/mod.rs"]
 mod shadergen;
+mod sort;
+mod split;
 mod steps;
+mod tile;
 mod trained;
 mod training;
 
@@ -57,8 +60,14 @@ enum Command {
     Steps(Common),
     /// Quality against processor time of this program, and of another one.
     Training(training::Options),
-    /// How near each stage of a step comes to the limit of the device, measured in the same run.
+    /// Rates and costs of the device, and how near each stage of a step comes to the limit that follows.
     Limits(Common),
+    /// The blends of made splats: the chain of a lone tile, and a picture of even tiles.
+    Tile(Common),
+    /// The sort in each form that the device has.
+    Sort(Common),
+    /// A large model from a trained one, to be timed.
+    Split(split::Options),
     /// Predicted against measured memory of training.
     Memory(Common),
     /// A city that is larger than the memory of the device: its pictures, its list, one object of it.
@@ -83,6 +92,9 @@ fn run() -> Result<()> {
         Command::Steps(common) => steps::run(&common),
         Command::Training(options) => training::run(&options),
         Command::Limits(common) => limits::run(&common),
+        Command::Tile(common) => tile::run(&common),
+        Command::Sort(common) => sort::run(&common),
+        Command::Split(options) => split::run(&options),
         Command::Memory(common) => memory::run(&common),
         Command::Large(options) => large::run(&options),
         Command::MemoryOf { gaussians, width, height } => memory::measure(gaussians, width, height),

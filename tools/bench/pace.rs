@@ -1,36 +1,38 @@
 //! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
 
-use super::measure::timed;
-use super::trained::{timed_step, timing_config};
+use super::measure::{median, timed};
+use super::trained::timing_config;
+use labelgs::cli::commands::profile::timed::Timed;
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
-use labelgs::run::TrainConfig;
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
-use labelgs::train::Trainer;
+use labelgs::train::{StepReport, Trainer};
 use labelgs::{Error, Result};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A training whose steps are timed one by one.
+/// Steps that follow each other without a wait between them: a card that waits for the host lowers its clock. One of them
+/// has object layers.
+const TURN: u32 = 8;
+
+/// A training whose steps are timed: of photos of full size, all bands of colour and, with masks, labels.
 pub struct Pace {
     /// Name in tables.
     pub name: String,
     trainer: Trainer,
+    tile_pixels: f64,
     /// Sum of the passes, ms, by step.
     pub passes: Vec<f64>,
     /// The same by stage.
     pub stages: BTreeMap<Stage, Vec<f64>>,
-    /// Host's clock from submit to end, ms, by step.
+    /// Host's clock, ms a step, by turn.
     pub wall: Vec<f64>,
-    /// Processor time of all threads, ms, by step.
+    /// Processor time of all threads, ms a step, by turn.
     pub processor: Vec<f64>,
-    /// (pixel, splat) pairs walked, by step.
-    pub pairs: Vec<f64>,
-    /// Visible splats, by step.
-    pub splats: Vec<f64>,
-    /// (splat, tile) pairs, by step.
-    pub instances: Vec<f64>,
+    /// Reports, by step.
+    pub reports: Vec<StepReport>,
     /// Items of the step's list.
     pub items: usize,
 }
@@ -38,21 +40,19 @@ pub struct Pace {
 impl Pace {
     /// Starts a training from `model`, without densification, and with labels from the first step if there are masks.
     pub fn new(name: &str, gpu: &Arc<Gpu>, dataset: Dataset, model: &Gaussians) -> Result<Self> {
-        // Bands of colour come in as in any training.
-        let config = TrainConfig { sh_degree_interval: Some(1000), ..timing_config() };
         let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
-        let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, model, options)?;
+        let mut trainer = Trainer::new(Arc::clone(gpu), timing_config(), &dataset, model, options)?;
         trainer.keep_times();
+        let tile_pixels = f64::from(trainer.engine_mut().shape().tile_pixels());
         Ok(Self {
+            tile_pixels,
             name: name.to_owned(),
             trainer,
             passes: Vec::new(),
             stages: BTreeMap::new(),
             wall: Vec::new(),
             processor: Vec::new(),
-            pairs: Vec::new(),
-            splats: Vec::new(),
-            instances: Vec::new(),
+            reports: Vec::new(),
             items: 0,
         })
     }
@@ -76,38 +76,76 @@ impl Pace {
         Ok(start.cpu + end.cpu)
     }
 
-    /// Runs one step and waits for it. Steps in which the driver compiles are not counted.
-    pub fn step(&mut self) -> Result<()> {
-        let (reports, cost) = timed_step(&mut self.trainer)?;
-        let (times, last) = (self.trainer.take_times(), reports.last());
-        let (Some(times), Some(last)) = (times.last(), last) else {
-            return Err(Error::Bug("a step that was waited for has no report".to_owned()));
-        };
-        if times.is_first {
-            return Ok(());
+    /// Runs steps and waits for the last. Steps in which the driver compiles are not counted.
+    fn turn(&mut self) -> Result<()> {
+        let (reports, cost) = timed(|| {
+            let mut reports = Vec::new();
+            for _ in 0..TURN {
+                reports.extend(self.trainer.step()?);
+            }
+            reports.extend(self.trainer.drain()?);
+            Ok(reports)
+        })?;
+        let times = self.trainer.take_times();
+        if times.iter().all(|times| !times.is_first) {
+            self.wall.push(cost.wall / f64::from(TURN));
+            self.processor.push(cost.cpu / f64::from(TURN));
         }
-        self.items = times.items.len();
-        self.passes.push(times.items.iter().map(|(_, _, ns)| *ns as f64 / 1e6).sum());
-        let mut stages: BTreeMap<Stage, f64> = BTreeMap::new();
-        for (stage, _, ns) in &times.items {
-            *stages.entry(*stage).or_default() += *ns as f64 / 1e6;
+        for times in times.iter().filter(|times| !times.is_first) {
+            let report = reports.iter().find(|report| report.step == times.step);
+            let report = report.ok_or_else(|| Error::Bug("a step that was waited for has no report".to_owned()))?;
+            self.reports.push(*report);
+            self.items = times.items.len();
+            let mut stages: BTreeMap<Stage, f64> = BTreeMap::new();
+            for (stage, _, ns) in &times.items {
+                *stages.entry(*stage).or_default() += *ns as f64 / 1e6;
+            }
+            self.passes.push(stages.values().sum());
+            stages.into_iter().for_each(|(stage, ms)| self.stages.entry(stage).or_default().push(ms));
         }
-        stages.into_iter().for_each(|(stage, ms)| self.stages.entry(stage).or_default().push(ms));
-        self.wall.push(cost.wall);
-        self.processor.push(cost.cpu);
-        let pixels = f64::from(self.trainer.engine_mut().shape().tile_pixels());
-        self.splats.push(f64::from(last.report.counters.visible_count));
-        self.instances.push(f64::from(last.report.counters.instance_count));
-        self.pairs.push(last.report.counters.walked_splats() as f64 * pixels);
         Ok(())
+    }
+
+    /// Median over the steps of a number of their reports.
+    pub fn median(&self, value: impl Fn(&StepReport) -> f64) -> f64 {
+        median(self.reports.iter().map(value))
+    }
+
+    /// (pixel, splat) pairs that the steps walked, by step.
+    pub fn pairs(&self) -> Vec<f64> {
+        self.reports.iter().map(|report| report.report.counters.walked_splats() as f64 * self.tile_pixels).collect()
+    }
+
+    /// What the steps worked on, for tables and for JSON.
+    pub fn about(&self) -> (String, Value) {
+        let (gaussians, pairs) = (self.trainer.gaussian_count(), median(self.pairs()));
+        let timed = Timed::new(&self.reports);
+        let (width, height) = timed.size();
+        let counted = |value: fn(&StepReport) -> u32| self.median(|report| f64::from(value(report)));
+        let visible = counted(|report| report.report.counters.visible_count);
+        let instances = counted(|report| report.report.counters.instance_count);
+        let longest = counted(|report| report.report.counters.longest_list);
+        let text = format!(
+            "{}; {gaussians} Gaussians, {visible} visible, {instances} (splat, tile) pairs, {:.1} M (pixel, splat) pairs, \
+             {:.0} a pixel, {longest} splats in the fullest tile",
+            timed.to_text(),
+            pairs / 1e6,
+            pairs / timed.pixels
+        );
+        let found = json!({
+            "size": [width, height], "sh_degree": timed.degrees.last(), "labels": timed.layers + timed.disagreement > 0,
+            "steps": self.reports.len(), "gaussians": gaussians, "visible": visible, "instances": instances,
+            "pairs": pairs, "longest_list": longest,
+        });
+        (text, found)
     }
 }
 
 /// Runs the trainings in turn until each has the wanted number of timed steps.
 pub fn race(paces: &mut [Pace], steps: usize) -> Result<()> {
-    while paces.iter().any(|pace| pace.wall.len() < steps) {
+    while paces.iter().any(|pace| pace.passes.len() < steps || pace.wall.is_empty()) {
         for pace in paces.iter_mut() {
-            pace.step()?;
+            pace.turn()?;
         }
     }
     Ok(())

@@ -63,7 +63,7 @@ fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usi
         Pace::new(&format!("masks cover {:.0} %", share * 100.0), gpu, made, model)?,
         Pace::new("masks cover everything", gpu, whole, model)?,
     ];
-    table(paces, timed, (options.width, options.height), model)
+    table(paces, timed, (options.width, options.height))
 }
 
 /// Divides the same space among few and among many objects.
@@ -74,7 +74,7 @@ fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &S
         let divided = divided(gpu, &made, model, objects)?;
         paces.push(Pace::new(&format!("{objects} objects"), gpu, divided, model)?);
     }
-    table(paces, size.timed, (options.width, options.height), model)
+    table(paces, size.timed, (options.width, options.height))
 }
 
 /// Share of the pixels that belong to an object.
@@ -124,12 +124,13 @@ fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, 
     divide(high, means, parts - left, next, labels);
 }
 
-fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model: &Gaussians) -> Result<Vec<Value>> {
+fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32)) -> Result<Vec<Value>> {
     race(&mut paces, timed)?;
     // A mean, because a few steps have object layers.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let plain = (mean(&paces[0].passes), mean(&paces[0].processor), mean(&paces[0].pairs));
-    println!("{} Gaussians, {width} x {height} px, {timed} steps of each in turn", model.len());
+    let plain = (mean(&paces[0].passes), mean(&paces[0].processor), mean(&paces[0].pairs()));
+    println!("{timed} steps of each in turn");
+    paces.iter().for_each(|pace| println!("{}: {}", pace.name, pace.about().0));
     println!(
         "{:<24} {:>9} {:>7} {:>9} {:>9} {:>10} {:>9} {:>9} {:>12}",
         "", "passes ms", "ratio", "cpu ms", "ratio", "sweeps ms", "ratio", "pairs/px", "object/scene"
@@ -137,7 +138,8 @@ fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model:
     let mut rows = Vec::new();
     for pace in &mut paces {
         let sweeps = pace.sweeps()?;
-        let (passes, processor, pairs) = (mean(&pace.passes), mean(&pace.processor), mean(&pace.pairs));
+        let (passes, processor, pairs) = (mean(&pace.passes), mean(&pace.processor), mean(&pace.pairs()));
+        let (_, step) = pace.about();
         let (ratio, cpu_ratio, objects) = (passes / plain.0, processor / plain.1, pairs / plain.2 - 1.0);
         let phase_ratio = (LABEL_STEPS * processor + sweeps) / (LABEL_STEPS * plain.1);
         let per_pixel = pairs / (f64::from(width) * f64::from(height));
@@ -147,9 +149,9 @@ fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32), model:
             pace.name
         );
         rows.push(json!({
-            "name": pace.name, "size": [width, height], "gaussians": model.len(), "passes_ms": passes, "ratio": ratio,
+            "name": pace.name, "step": step, "passes_ms": passes, "ratio": ratio,
             "processor_ms": processor, "processor_ratio": cpu_ratio, "sweeps_ms": sweeps, "phase_ratio": phase_ratio,
-            "wall_ms": mean(&pace.wall), "pairs": pairs, "object_pairs_by_scene_pairs": objects,
+            "pipeline_ms": mean(&pace.wall), "pairs": pairs, "object_pairs_by_scene_pairs": objects,
         }));
     }
     println!(

@@ -13,7 +13,8 @@ use std::sync::Arc;
 /// One view in this many of a made scene is held out.
 pub const TEST_EVERY: u32 = 8;
 
-/// Runs one step and waits for it; returns its report and its time.
+/// Runs one step and waits for it; returns its report and its time. Not for times of a card, which lowers its clock while
+/// it waits.
 pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
     timed(|| {
         let mut reports = trainer.step()?;

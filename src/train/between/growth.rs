@@ -2,6 +2,7 @@
 
 use super::Between;
 use crate::error::{Error, Result};
+use crate::phases::{self, Phase};
 use crate::train::TrainConfig;
 use crate::train::context::Context;
 use crate::train::strategy::{At, Bound, Densified, Population};
@@ -38,7 +39,7 @@ impl Between<Context> for Growth {
         let first_count = *self.first_count.get_or_insert(engine.gaussian_count());
         let bound = &mut self.bound;
         let mut population = Population { engine, bound, views, uniforms, step, first_count, densified: None };
-        strategy.act(At { step, config, extent }, &mut population)?;
+        phases::timed(Phase::Densify, || strategy.act(At { step, config, extent }, &mut population))?;
         self.densified = population.densified.or(self.densified);
         Ok(())
     }

@@ -259,6 +259,12 @@ impl Trainer {
         self.timing.get_or_insert_default();
     }
 
+    /// Ends the collection of times: the next steps run as in a training, without timestamps. Nothing may be in flight.
+    pub(crate) fn stop_times(&mut self) -> Result<()> {
+        self.timing = None;
+        self.context.engine.time_items(false, false)
+    }
+
     /// Sets whether the next steps count the (pixel, splat) pairs with a weight. Counting slows them down.
     pub fn count_pairs(&mut self, on: bool) {
         self.context.counts_pairs = on;
@@ -274,7 +280,7 @@ impl Trainer {
     pub(crate) fn times_of_last(&mut self, count: u32, model: &Gaussians) -> Result<Vec<StepTimes>> {
         self.drain()?;
         self.context.engine.upload_model(model)?;
-        self.context.engine.time_items()?;
+        self.context.engine.time_items(true, true)?;
         self.keep_times();
         for step in self.step - count.min(self.step)..self.step {
             let input = self.input(step + 1)?;

@@ -13,6 +13,9 @@ mod modes;
 mod report;
 mod scenes;
 
+pub use bed::Bed;
+pub use modes::{MODES, Mode, Replacements};
+
 use super::Common;
 use super::measure::write_json;
 use labelgs::engine::EngineSize;
@@ -21,7 +24,6 @@ use labelgs::gpu::Gpu;
 use labelgs::pass::{self, KernelShape, Variant};
 use labelgs::{Error, Result};
 use measure::SceneResult;
-use modes::{MODES, Mode, Replacements};
 use serde_json::json;
 
 /// Options of this benchmark.

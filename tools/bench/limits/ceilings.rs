@@ -1,85 +1,204 @@
-//! Peak rates of the device, measured with kernels that do one thing.
+//! Peak rates and costs of the device, measured with kernels that do one thing.
 
-use crate::compiler::shader;
+use crate::compiler::{shader, texel_define};
+use crate::measure::{median, table};
 use labelgs::Result;
 use labelgs::gpu::Gpu;
 use labelgs::scheduler::plan::{Buf, BufferDecl, Class, Domain, Grid, PassDecl, PassList, Table, TexelFormat};
 use labelgs::scheduler::{Scheduler, SchedulerOptions};
+use labelgs::shaders::ShaderDesc;
 use serde::Serialize;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// vec4 of the buffer that is copied, nearly 64 MiB: as many workgroups as a dispatch has at most.
 const VECS: u32 = 65_535 * 64;
-/// Workgroups of 64 and rounds of eight operations each.
-const GROUPS: u32 = 1024;
+/// vec4 that the host writes, 16 MiB.
+const HOST_VECS: u32 = 1 << 20;
+/// Rounds of eight operations of each invocation.
 const ROUNDS: u32 = 2048;
-/// Dispatches of the list that measures the cost of a dispatch.
-const EMPTY: u32 = 64;
+/// Dispatches of the lists that measure the cost of a dispatch.
+const DISPATCHES: u32 = 512;
 const REPETITIONS: usize = 8;
+/// Submits that are waited for.
+const SUBMITS: usize = 200;
 
-/// Rates of a device.
+/// Buffers of the benchmark.
+const FROM: Buf = Buf(0);
+const TO: Buf = Buf(1);
+const GRID: Buf = Buf(2);
+const HOST: Buf = Buf(3);
+
+/// Rates of a device, a second, and costs, s.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Ceilings {
-    /// Multiplications and additions a second, as the driver compiles `v * a + b`.
+    /// Multiplications and additions, as the driver compiles `v * a + b`.
     pub operations: f64,
-    /// `exp2` a second.
+    /// `exp2`.
     pub exp2: f64,
-    /// Divisions a second.
+    /// Divisions.
     pub divisions: f64,
-    /// Bytes read and written a second.
+    /// Bytes read and written by a copy.
     pub bytes: f64,
-    /// Seconds that a dispatch takes by itself, with the barrier before it.
+    /// Shuffles of an invocation; none where subgroups are emulated.
+    pub shuffles: Option<f64>,
+    /// Ballots of an invocation.
+    pub ballots: Option<f64>,
+    /// Bytes loaded from shared memory, 16 at a time.
+    pub shared_bytes: f64,
+    /// Atomic additions, each invocation to a word of its own.
+    pub atomics: f64,
+    /// Atomic additions of 64 invocations to one word.
+    pub atomics_to_one: f64,
+    /// A dispatch that waits for nothing.
+    pub dispatch_alone: f64,
+    /// A dispatch with a barrier before it.
     pub dispatch: f64,
+    /// A dispatch whose size is in a buffer, and waits for nothing.
+    pub indirect: f64,
+    /// A dispatch whose size the dispatch before it has written.
+    pub indirect_after: f64,
+    /// From a submit to the end of a wait that blocks, median.
+    pub submit_wait: f64,
+    /// From a submit to a poll that sees the end, median.
+    pub submit_poll: f64,
+    /// Bytes that one thread of the host writes into mapped memory of the device.
+    pub host_bytes: f64,
 }
 
-/// The operation that the arithmetic kernel repeats.
-#[derive(Clone, Copy)]
-enum Operation {
-    MultiplyAdd = 0,
-    Exp2 = 1,
-    Divide = 2,
+impl Ceilings {
+    /// A row for each.
+    pub fn to_text(self) -> String {
+        let g = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{:.2}", value / 1e9));
+        let us = |value: f64| format!("{:.2}", value * 1e6);
+        let rows = [
+            ("multiplications and additions, G/s", g(Some(self.operations))),
+            ("exp2, G/s", g(Some(self.exp2))),
+            ("divisions, G/s", g(Some(self.divisions))),
+            ("copy, read and written, GB/s", g(Some(self.bytes))),
+            ("shuffles of an invocation, G/s", g(self.shuffles)),
+            ("ballots of an invocation, G/s", g(self.ballots)),
+            ("shared memory, loads of 16 B, GB/s", g(Some(self.shared_bytes))),
+            ("atomics, a word each, G/s", g(Some(self.atomics))),
+            ("atomics, 64 to a word, G/s", g(Some(self.atomics_to_one))),
+            ("dispatch, us", us(self.dispatch_alone)),
+            ("dispatch after a barrier, us", us(self.dispatch)),
+            ("indirect dispatch, us", us(self.indirect)),
+            ("indirect dispatch after its size, us", us(self.indirect_after)),
+            ("submit to wait, blocking, us", us(self.submit_wait)),
+            ("submit to wait, polling, us", us(self.submit_poll)),
+            ("host into mapped memory, GB/s", g(Some(self.host_bytes))),
+        ];
+        table(&rows.map(|(name, value)| vec![name.to_owned(), value]))
+    }
+}
+
+/// The buffers, of so many vec4.
+fn buffers(vecs: u32, host_vecs: u32) -> &'static Table {
+    let row = |name, element_bytes, elements, class| BufferDecl {
+        name,
+        element_bytes,
+        domain: Domain::fixed(elements),
+        class,
+        texel: (element_bytes == 16).then_some(TexelFormat::Rgba32Sfloat),
+        doc: "A benchmark's.",
+    };
+    let rows = [
+        row("from", 16, vecs, Class::Persistent),
+        row("to", 16, vecs, Class::Persistent),
+        row("grid", 4, 64, Class::Persistent),
+        row("host", 16, host_vecs, Class::PerFrame),
+    ];
+    Box::leak(Box::new(Table { rows: Box::leak(Box::new(rows)), cure: || "use another device".to_owned() }))
 }
 
 /// Measures the rates; `texel` selects the engine's way of reading on this device.
 pub fn measure(gpu: &Arc<Gpu>, texel: bool, small: bool) -> Result<Ceilings> {
-    let (groups, vecs) = if small { (2, 1 << 12) } else { (GROUPS, VECS) };
-    let row = |name, elements| BufferDecl {
-        name,
-        element_bytes: 16,
-        domain: Domain::fixed(elements),
-        class: Class::Persistent,
-        texel: Some(TexelFormat::Rgba32Sfloat),
-        doc: "A benchmark's.",
+    // Workgroups of 64: enough for every invocation that a card holds, and few where each takes its turn.
+    let groups = if small {
+        2
+    } else if gpu.is_cpu() {
+        64
+    } else {
+        8192
     };
-    let rows = Box::leak(Box::new([row("from", vecs), row("to", vecs)]));
-    let table = Box::leak(Box::new(Table { rows, cure: || "use another device".to_owned() }));
-    let (from, to) = (Buf(0), Buf(1));
+    let (vecs, host_vecs) = if small { (1 << 12, 1 << 12) } else { (VECS, HOST_VECS) };
+    let table = buffers(vecs, host_vecs);
     let options = SchedulerOptions { timestamps: true, ..SchedulerOptions::default() };
     let mut sched = Scheduler::new(Arc::clone(gpu), table, Vec::new(), options)?;
-    let arithmetic = shader("arithmetic", include_str!("arithmetic.comp"), texel)?;
-    let mut seconds = |operation: Operation, rounds: u32| {
-        let mut list = PassList::new("arithmetic");
-        list.pass(PassDecl::new(arithmetic, vec![to], Grid::Groups(groups, 1, 1)).spec(vec![operation as u32, rounds]));
-        least(&mut sched, &list)
-    };
     let count = f64::from(groups) * 64.0 * 8.0;
     // The difference of two runs removes the constant cost.
-    let mut rate = |operation, rounds: u32| -> Result<f64> {
-        let net = seconds(operation, rounds)? - seconds(operation, 1)?;
+    let mut rate = |shader: &'static ShaderDesc, operation: u32, rounds: u32| -> Result<f64> {
+        let mut seconds = |rounds: u32| {
+            let mut list = PassList::new("rate");
+            list.pass(PassDecl::new(shader, vec![TO], Grid::Groups(groups, 1, 1)).spec(vec![operation, rounds]));
+            least(&mut sched, &list)
+        };
+        let net = seconds(rounds)? - seconds(1)?;
         Ok(count * f64::from(rounds - 1) / net.max(1e-9))
     };
-    let operations = 2.0 * rate(Operation::MultiplyAdd, ROUNDS)?;
-    let (exp2, divisions) = (rate(Operation::Exp2, ROUNDS / 4)?, rate(Operation::Divide, ROUNDS / 4)?);
-    let copy = shader("copy", include_str!("copy.comp"), texel)?;
+    let rates = shader("rates", include_str!("rates.comp"), &[])?;
+    let subgroup = &gpu.capabilities().subgroup;
+    let [shuffles, ballots] = if subgroup.is_emulated || !subgroup.has_ballots() {
+        [None, None]
+    } else {
+        let shader = shader("subgroup", include_str!("subgroup.comp"), &[])?;
+        [Some(rate(shader, 0, ROUNDS / 4)?), Some(rate(shader, 1, ROUNDS / 4)?)]
+    };
+    let operations = 2.0 * rate(rates, 0, ROUNDS)?;
+    let (exp2, divisions) = (rate(rates, 1, ROUNDS / 4)?, rate(rates, 2, ROUNDS / 4)?);
+    let shared_bytes = 16.0 * rate(rates, 3, ROUNDS / 4)?;
+    let (atomics, atomics_to_one) = (rate(rates, 4, ROUNDS / 16)?, rate(rates, 5, ROUNDS / 64)?);
+    let copy = shader("copy", include_str!("copy.comp"), &texel_define(texel))?;
     let mut list = PassList::new("copy");
-    list.pass(PassDecl::new(copy, vec![from, to], Grid::Groups(vecs / 64, 1, 1)));
+    list.pass(PassDecl::new(copy, vec![FROM, TO], Grid::Groups(vecs / 64, 1, 1)));
     let bytes = 32.0 * f64::from(vecs) / least(&mut sched, &list)?;
-    let mut list = PassList::new("dispatches");
-    for _ in 0..EMPTY {
-        list.pass(PassDecl::new(arithmetic, vec![to], Grid::Groups(1, 1, 1)).spec(vec![0, 1]));
-    }
-    let dispatch = least(&mut sched, &list)? / f64::from(EMPTY);
-    Ok(Ceilings { operations, exp2, divisions, bytes, dispatch })
+    drop(sched);
+    // By the clock of the host: a timestamp after each dispatch costs more than the dispatch.
+    let mut sched = Scheduler::new(Arc::clone(gpu), table, Vec::new(), SchedulerOptions::default())?;
+    sched.upload(GRID, 0, 0, &[1_u32; 64])?;
+    let writes = shader("dispatch", include_str!("dispatch.comp"), &[])?;
+    let empty = shader("empty", include_str!("dispatch.comp"), &[("EMPTY".to_owned(), None)])?;
+    let (one, indirect) = (Grid::Groups(1, 1, 1), Grid::Indirect(GRID, 0));
+    let mut dispatch = |shader: &'static ShaderDesc, buffers: Vec<Buf>, grid: Grid| -> Result<f64> {
+        let mut seconds = |count: u32| -> Result<f64> {
+            let mut list = PassList::new("dispatches");
+            for _ in 0..count {
+                list.pass(PassDecl::new(shader, buffers.clone(), grid));
+            }
+            let id = sched.prepare(&list)?;
+            let times = (0..=REPETITIONS).map(|_| {
+                let start = Instant::now();
+                sched.run(id, 0).map(|()| start.elapsed().as_secs_f64())
+            });
+            let times = times.collect::<Result<Vec<f64>>>()?;
+            Ok(times[1..].iter().copied().fold(f64::INFINITY, f64::min))
+        };
+        Ok((seconds(DISPATCHES)? - seconds(1)?).max(0.0) / f64::from(DISPATCHES - 1))
+    };
+    let dispatch_alone = dispatch(empty, Vec::new(), one)?;
+    let dispatch_after = dispatch(writes, vec![TO], one)?;
+    let indirect_alone = dispatch(empty, Vec::new(), indirect)?;
+    let indirect_after = dispatch(writes, vec![GRID], indirect)?;
+    let [submit_wait, submit_poll] = [false, true].map(|polls| latency(&mut sched, empty, polls));
+    Ok(Ceilings {
+        operations,
+        exp2,
+        divisions,
+        bytes,
+        shuffles,
+        ballots,
+        shared_bytes,
+        atomics,
+        atomics_to_one,
+        dispatch_alone,
+        dispatch: dispatch_after,
+        indirect: indirect_alone,
+        indirect_after,
+        submit_wait: submit_wait?,
+        submit_poll: submit_poll?,
+        host_bytes: host(&mut sched, host_vecs)?,
+    })
 }
 
 /// The shortest of several runs of a list, seconds; the first is left out, in which drivers compile.
@@ -94,4 +213,33 @@ fn least(sched: &mut Scheduler, list: &PassList) -> Result<f64> {
         }
     }
     Ok(shortest)
+}
+
+/// Median seconds from the submit of a dispatch until the host knows of its end.
+fn latency(sched: &mut Scheduler, empty: &'static ShaderDesc, polls: bool) -> Result<f64> {
+    let mut list = PassList::new("one dispatch");
+    list.pass(PassDecl::new(empty, Vec::new(), Grid::Groups(1, 1, 1)));
+    let id = sched.prepare(&list)?;
+    let times = (0..SUBMITS).map(|_| {
+        let start = Instant::now();
+        let ticket = sched.submit(id, 0)?;
+        while polls && !sched.is_done(ticket)? {
+            std::hint::spin_loop();
+        }
+        sched.wait(ticket)?;
+        Ok(start.elapsed().as_secs_f64())
+    });
+    Ok(median(times.collect::<Result<Vec<f64>>>()?))
+}
+
+/// Bytes a second that the host writes.
+fn host(sched: &mut Scheduler, vecs: u32) -> Result<f64> {
+    let data = vec![[1.0_f32; 4]; vecs as usize];
+    let mut shortest = f64::INFINITY;
+    for _ in 0..=REPETITIONS {
+        let start = Instant::now();
+        sched.upload(HOST, 0, 0, &data)?;
+        shortest = shortest.min(start.elapsed().as_secs_f64());
+    }
+    Ok(16.0 * f64::from(vecs) / shortest)
 }

@@ -1,14 +1,14 @@
 //! How near each stage of a step comes to the limit of the device.
 //!
 //! The limit of a stage is the larger of its arithmetic by the rate of arithmetic and of its bytes by the rate of a
-//! copy, both measured in the same run, plus the time of empty dispatches. The counts are lower bounds: the work of the
-//! method, not of the kernels.
+//! copy, both measured in the same run, plus the time of dispatches that do nothing. The counts are lower bounds: the work of
+//! the method, not of the kernels, and without that of labels.
 
 mod ceilings;
 
 use super::measure::{self, median, table};
 use super::pace::{Pace, race};
-use super::trained::{TEST_EVERY, plain_model, without_masks};
+use super::trained::{TEST_EVERY, plain_model};
 use super::{Common, device};
 use ceilings::Ceilings;
 use labelgs::Result;
@@ -45,16 +45,19 @@ struct Step {
     tiles: u32,
 }
 
-/// Work of each stage of a step without labels, for colours of degree 0.
+/// vec4 of the coefficients of colour above the constant one, at degree 3: 45 floats.
+const HIGHER: f64 = 45.0 / 4.0;
+
+/// Work of each stage of a step, for colours of degree 3.
 fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
     let passes = |bits: u32| f64::from(bits.div_ceil(digit_bits));
     let tile_bits = u32::BITS - s.tiles.saturating_sub(1).leading_zeros();
     let vec4 = 16.0;
     match stage {
-        // Means and scales of all; four planes in, three records out of the visible.
+        // Means and scales of all; all planes in, three records out of the visible.
         Stage::PROJECT => Need {
-            operations: 40.0 * s.gaussians + 150.0 * s.splats,
-            bytes: (2.0 * vec4 + 8.0) * s.gaussians + (7.0 * vec4 + 8.0) * s.splats,
+            operations: 40.0 * s.gaussians + 280.0 * s.splats,
+            bytes: (2.0 * vec4 + 8.0) * s.gaussians + ((7.0 + HIGHER) * vec4 + 8.0) * s.splats,
             ..Need::default()
         },
         // A pass reads the keys twice and keys and values once, and writes both.
@@ -87,13 +90,14 @@ fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
             ..Need::default()
         },
         Stage::GATHER => Need { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Need::default() },
+        // Coefficients in, and the gradients of them and of their directions out.
         Stage::PROJECT_BACKWARD => {
-            Need { operations: 400.0 * s.splats, bytes: 11.0 * vec4 * s.splats, ..Need::default() }
+            Need { operations: 700.0 * s.splats, bytes: (11.0 + 2.0 * HIGHER) * vec4 * s.splats, ..Need::default() }
         }
-        // Four planes of parameters with two moments, read and written, and the gradients of the visible.
+        // All planes of parameters with two moments, read and written, and the gradients of the visible.
         Stage::OPTIMISE => Need {
-            operations: 16.0 * 12.0 * s.gaussians,
-            bytes: 4.0 * 6.0 * vec4 * s.gaussians + 4.0 * vec4 * s.splats,
+            operations: 12.0 * 4.0 * (4.0 + HIGHER) * s.gaussians,
+            bytes: (4.0 + HIGHER) * vec4 * (6.0 * s.gaussians + s.splats),
             ..Need::default()
         },
         _ => Need::default(),
@@ -110,47 +114,30 @@ pub fn run(common: &Common) -> Result<()> {
     let gpu = device::open()?;
     let shape = KernelShape::of(gpu.capabilities());
     let c = ceilings::measure(&gpu, shape.texel, common.small)?;
-    println!(
-        "{}: {:.1} G multiplications and additions, {:.2} G exp2, {:.2} G divisions, {:.1} GB read and written a second; \
-         {:.1} us a dispatch",
-        gpu.capabilities().name,
-        c.operations / 1e9,
-        c.exp2 / 1e9,
-        c.divisions / 1e9,
-        c.bytes / 1e9,
-        c.dispatch * 1e6
-    );
+    println!("{}\n{}", gpu.capabilities().name, c.to_text());
     let model = plain_model(&gpu, &options, training)?;
-    let dataset = without_masks(&synth::dataset(&options, TEST_EVERY));
-    let mut paces = [Pace::new("plain step", &gpu, dataset, &model)?];
+    let dataset = synth::dataset(&options, TEST_EVERY);
+    let mut paces = [Pace::new("step", &gpu, dataset, &model)?];
     race(&mut paces, timed)?;
-    let [pace] = &paces;
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let [pace] = &mut paces;
+    let (about, found) = pace.about();
     let (tiles_x, tiles_y) = shape.tiles(options.width, options.height);
     let step = Step {
         gaussians: model.len() as f64,
-        splats: mean(&pace.splats),
-        instances: mean(&pace.instances),
-        pairs: mean(&pace.pairs),
+        splats: pace.median(|report| f64::from(report.report.counters.visible_count)),
+        instances: pace.median(|report| f64::from(report.report.counters.instance_count)),
+        pairs: median(pace.pairs()),
         pixels: f64::from(options.width) * f64::from(options.height),
         tiles: tiles_x * tiles_y,
     };
-    println!(
-        "{} Gaussians, {} x {} px: {:.1} M pairs, {:.0} a pixel; load {:.1}\n",
-        model.len(),
-        options.width,
-        options.height,
-        step.pairs / 1e6,
-        step.pairs / step.pixels,
-        measure::load().unwrap_or(f64::NAN)
-    );
+    println!("{about}; load {:.1}\n", measure::load().unwrap_or(f64::NAN));
     let mut rows = vec![["stage", "ms", "limit ms", "fraction"].map(str::to_owned).to_vec()];
-    let mut found: Vec<Value> = Vec::new();
+    let mut stages: Vec<Value> = Vec::new();
     let (mut all, mut limits) = (0.0, 0.0);
     for (stage, times) in &pace.stages {
         let (ms, limit) = (median(times.iter().copied()), need(*stage, &step, shape.digit_bits).seconds(&c) * 1e3);
         (all, limits) = (all + ms, limits + limit);
-        found.push(json!({ "stage": stage.name, "ms": ms, "limit_ms": limit }));
+        stages.push(json!({ "stage": stage.name, "ms": ms, "limit_ms": limit }));
         rows.push(vec![stage.name.to_owned(), format!("{ms:.2}"), format!("{limit:.2}"), format!("{:.2}", limit / ms)]);
     }
     let dispatches = pace.items as f64 * c.dispatch * 1e3;
@@ -160,7 +147,7 @@ pub fn run(common: &Common) -> Result<()> {
     println!("{}", table(&rows));
     measure::write_json(
         &common.output.join("limits.json"),
-        &json!({ "schema_version": 1, "ceilings": c, "gaussians": model.len(), "pairs": step.pairs, "stages": found,
-            "dispatches": pace.items, "step_ms": all, "limit_ms": limits }),
+        &json!({ "schema_version": 2, "ceilings": c, "step": found, "stages": stages, "dispatches": pace.items,
+            "passes_ms": all, "pipeline_ms": median(pace.wall.iter().copied()), "limit_ms": limits }),
     )
 }

@@ -2,7 +2,7 @@
 
 pub mod compare;
 pub(crate) mod report;
-pub(crate) mod timed;
+pub mod timed;
 
 use crate::cli::commands::profile::report::{Clocks, Measured, Profile, Window, Workers};
 use crate::cli::support::parsers::share;
@@ -13,7 +13,7 @@ use crate::scene::{Dataset, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
 use crate::synth::{self, SynthOptions};
-use crate::train::{TrainConfig, Trainer, first_model};
+use crate::train::{StepReport, TrainConfig, Trainer, first_model};
 use crate::{Error, Result, Setting};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -107,7 +107,7 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         None => TrainConfig::default(),
     };
     let Window { steps, warm_up, from_step, .. } = args.window;
-    let steps = u64::from(from_step) + u64::from(warm_up) + u64::from(steps.saturating_add(COUNTED)) + 1;
+    let steps = u64::from(from_step) + 2 * (u64::from(warm_up) + u64::from(steps)) + u64::from(COUNTED) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
     if !args.as_scheduled {
@@ -152,30 +152,29 @@ pub(crate) fn profile(
 
 fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<Measured> {
     let before = window.from_step + window.warm_up;
-    let mut progress = Progress::new(u64::from(before + window.steps), "steps", &context.global);
-    for step in 1..=before {
-        if step == window.from_step + 1 {
+    let all = u64::from(before) + u64::from(window.warm_up) + 2 * u64::from(window.steps);
+    let mut progress = Progress::new(all, "steps", &context.global);
+    let mut step = |trainer: &mut Trainer| {
+        let done = trainer.step();
+        progress.set(u64::from(trainer.steps_done()), String::new);
+        done
+    };
+    for number in 1..=before {
+        if number == window.from_step + 1 {
             trainer.keep_times();
         }
-        trainer.step()?;
-        progress.set(u64::from(step), String::new);
+        step(trainer)?;
     }
     trainer.keep_times();
-    let (wall, cpu) = (Instant::now(), cpu_time());
-    let mut steps = Vec::new();
     let mut reports = Vec::new();
-    for step in 1..=window.steps {
-        let start = Instant::now();
-        reports.extend(trainer.step()?);
-        steps.push(start.elapsed());
-        progress.set(u64::from(before + step), String::new);
+    for _ in 0..window.steps {
+        reports.extend(step(trainer)?);
     }
-    let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
-    let clocks = Clocks { wall: wall.elapsed(), steps, cpu };
     reports.extend(trainer.drain()?);
     reports.retain(|report| report.step > before);
     let times = trainer.take_times().into_iter().filter(|times| times.step > before).collect();
     let gaussians = trainer.gaussian_count();
+    let clocks = in_the_pipeline(trainer, window, step)?;
     trainer.count_pairs(true);
     let mut counted = Vec::new();
     for _ in 0..COUNTED.min(window.steps) {
@@ -183,6 +182,30 @@ fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<M
     }
     counted.extend(trainer.drain()?);
     Ok(Measured { clocks, reports, times, counted, gaussians })
+}
+
+/// Runs further steps as in a training: without timestamps, and with as many in flight as there are frames. The clock ends
+/// after the last of them.
+fn in_the_pipeline(
+    trainer: &mut Trainer,
+    window: Window,
+    mut step: impl FnMut(&mut Trainer) -> Result<Vec<StepReport>>,
+) -> Result<Clocks> {
+    trainer.stop_times()?;
+    for _ in 0..window.warm_up {
+        step(trainer)?;
+    }
+    trainer.drain()?;
+    let (wall, cpu) = (Instant::now(), cpu_time());
+    let mut steps = Vec::new();
+    for _ in 0..window.steps {
+        let start = Instant::now();
+        step(trainer)?;
+        steps.push(start.elapsed());
+    }
+    trainer.drain()?;
+    let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
+    Ok(Clocks { wall: wall.elapsed(), steps, cpu })
 }
 
 /// Returns the host threads that run the passes; `None` on a graphics card.

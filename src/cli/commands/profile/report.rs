@@ -35,15 +35,14 @@ pub struct Window {
     /// size, all bands of colour and, with masks, labels, as at the end of a run.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub from_step: u32,
-    /// Let passes overlap as in training. Wall-clock times are then those of training; the time of a pass is what it
-    /// adds.
+    /// Let passes overlap as in training. The time of a pass is then what it adds.
     #[arg(long)]
     pub overlap: bool,
 }
 
 /// What was measured of a training.
 pub(crate) struct Measured {
-    /// Times by the clocks of the host.
+    /// Times of further steps by the clocks of the host.
     pub clocks: Clocks,
     /// Reports of the timed steps.
     pub reports: Vec<StepReport>,
@@ -55,11 +54,11 @@ pub(crate) struct Measured {
     pub gaussians: u32,
 }
 
-/// Times by the clocks of the host.
+/// Times by the clocks of the host, of steps without timestamps, with several in flight.
 pub(crate) struct Clocks {
-    /// From the start of the first timed step to the end of the last.
+    /// From the start of the first of them to the end of the last.
     pub wall: Duration,
-    /// Each call of the trainer. Two steps are in flight, so a call waits for an earlier step.
+    /// Each call of the trainer, which waits for an earlier step.
     pub steps: Vec<Duration>,
     /// Processor time of the process, if the system reports it.
     pub cpu: Option<Duration>,
@@ -130,7 +129,7 @@ pub(crate) struct Profile {
     stages: Vec<Row>,
     passes: Vec<Row>,
     passes_ms: Spread,
-    host_ms: Spread,
+    pipeline_ms: Spread,
     processor_ms: Option<f64>,
     counters: BTreeMap<&'static str, Spread>,
     pairs_walked: f64,
@@ -186,7 +185,7 @@ impl Profile {
             stages: rows(&times, |_| ""),
             passes: rows(&times, |name| name),
             passes_ms: spread(times.iter().map(|times| times.items.iter().map(|item| ms(item.2)).sum())),
-            host_ms: Spread { mean, ..spread(clocks.steps.iter().map(|time| time.as_secs_f64() * 1e3)) },
+            pipeline_ms: Spread { mean, ..spread(clocks.steps.iter().map(|time| time.as_secs_f64() * 1e3)) },
             processor_ms: clocks.cpu.map(|time| time.as_secs_f64() * 1e3 / each),
             counters: COUNTERS.iter().map(|&(name, _, value)| (name, counter(value))).collect(),
             pairs_walked,
@@ -228,8 +227,8 @@ impl Profile {
             }
         }
         text += &format!("\n{:<34} {:>16} {:>10} {:>10}\n", "per step", "median", "p90", "mean");
-        text += &spread_line("passes, ms", self.passes_ms, 3);
-        text += &spread_line("host's clock, ms", self.host_ms, 3);
+        text += &spread_line("sum of the passes' timestamps, ms", self.passes_ms, 3);
+        text += &spread_line("host's clock, steps in flight, ms", self.pipeline_ms, 3);
         if let Some(cpu) = self.processor_ms {
             text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "processor time, all threads, ms", "", "");
         }

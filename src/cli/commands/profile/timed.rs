@@ -6,20 +6,22 @@ use std::collections::BTreeSet;
 
 /// What the timed steps worked on.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Timed {
+pub struct Timed {
     /// Sizes of photos, px, the smallest first.
-    pub(crate) sizes: BTreeSet<(u32, u32)>,
+    pub sizes: BTreeSet<(u32, u32)>,
     /// Degrees of the spherical harmonics.
-    pub(crate) degrees: BTreeSet<u32>,
-    /// Steps with object layers, and with the disagreement of labels.
-    pub(crate) layers: usize,
-    pub(crate) disagreement: usize,
+    pub degrees: BTreeSet<u32>,
+    /// Steps with object layers.
+    pub layers: usize,
+    /// Steps with the disagreement of labels.
+    pub disagreement: usize,
     /// Mean number of pixels.
-    pub(crate) pixels: f64,
+    pub pixels: f64,
 }
 
 impl Timed {
-    pub(crate) fn new(reports: &[StepReport]) -> Self {
+    /// Sums steps up.
+    pub fn new(reports: &[StepReport]) -> Self {
         let with = |labels| reports.iter().filter(|report| report.kind.labels == labels).count();
         let pixels = reports.iter().map(|report| f64::from(report.kind.size.0) * f64::from(report.kind.size.1));
         Self {
@@ -32,7 +34,7 @@ impl Timed {
     }
 
     /// Returns the largest size.
-    pub(crate) fn size(&self) -> (u32, u32) {
+    pub fn size(&self) -> (u32, u32) {
         self.sizes
             .iter()
             .copied()
@@ -40,7 +42,8 @@ impl Timed {
             .unwrap_or_default()
     }
 
-    pub(crate) fn to_text(&self) -> String {
+    /// Returns it in words.
+    pub fn to_text(&self) -> String {
         let (width, height) = self.size();
         let sizes = if self.sizes.len() > 1 { "up to " } else { "" };
         let range =

@@ -1,0 +1,134 @@
+//! The sort alone, in each form that the device has.
+
+use crate::measure::{median, table, write_json};
+use crate::{Common, device};
+use bytemuck::Zeroable;
+use labelgs::engine::{Engine, EngineSize};
+use labelgs::gpu::Gpu;
+use labelgs::pass::buffers::Capacity;
+use labelgs::pass::build::Count;
+use labelgs::pass::sort::{SortBuffers, sort};
+use labelgs::pass::{Builder, KernelShape};
+use labelgs::scheduler::SchedulerOptions;
+use labelgs::scheduler::plan::{Buf, PlanOptions};
+use labelgs::shaders::constants::{ARGS_SWEEP_INSTANCES, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES, SWEEP_WORDS};
+use labelgs::shaders::structs::{Counters, StepUniforms};
+use labelgs::verify::selftest::scenes::generator;
+use labelgs::{Error, Result};
+use rand::Rng;
+use serde_json::json;
+use std::sync::Arc;
+
+/// The same buffers for keys of depths and of tiles; the sort starts in the first pair.
+const BUFFERS: SortBuffers =
+    SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+/// Has the keys of every run, which the sort overwrites.
+const SOURCE: Buf = Buf::SPLAT_FROM_INSTANCE;
+/// Has the digits that the pass which writes keys counts.
+const DIGITS: Buf = Buf::INSTANCE_OFFSETS;
+/// Bits of depths, and of the tiles of a large picture.
+const BITS: [u32; 2] = [32, 13];
+
+/// Runs it.
+pub fn run(common: &Common) -> Result<()> {
+    let gpu = device::open()?;
+    let (counts, rounds): (&[usize], _) = match (common.small, gpu.is_cpu()) {
+        (true, _) => (&[2_000, 20_000], 2),
+        (false, true) => (&[20_000, 450_000], 10),
+        (false, false) => (&[20_000, 450_000, 2_000_000, 10_000_000], 10),
+    };
+    let own = KernelShape::of(gpu.capabilities());
+    let lanes =
+        KernelShape { sweep_items: 0, digit_bits: KernelShape::new(own.subgroup, gpu.is_cpu()).digit_bits, ..own };
+    let sweep = own.with_sweeps(gpu.capabilities());
+    let forms = [("lanes", Some(lanes)), ("sweep", sweep)];
+    println!("{}: sorts of random keys; positions are the values", gpu.capabilities().name);
+    let mut rows = vec![["form", "bits", "items", "ms", "G items/s"].map(str::to_owned).to_vec()];
+    let mut found = Vec::new();
+    for (name, shape) in forms.into_iter().filter_map(|(name, shape)| Some((name, shape?))) {
+        for (&count, bits) in counts.iter().flat_map(|count| BITS.map(|bits| (count, bits))) {
+            let ms = timed(&gpu, shape, (count, bits), rounds)?;
+            let rate = count as f64 / ms / 1e6;
+            let cells =
+                [name.to_owned(), bits.to_string(), count.to_string(), format!("{ms:.3}"), format!("{rate:.3}")];
+            rows.push(cells.to_vec());
+            found.push(json!({ "form": name, "bits": bits, "items": count, "ms": ms }));
+        }
+    }
+    println!("{}", table(&rows));
+    let all = json!({ "schema_version": 1, "device": gpu.capabilities().name, "sorts": found });
+    write_json(&common.output.join("sort.json"), &all)
+}
+
+/// Median ms of a sort, whose result is checked.
+fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits): (usize, u32), rounds: usize) -> Result<f64> {
+    let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
+    let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
+    let shape = KernelShape { texel: false, ..shape };
+    let size = EngineSize::new(u64::from(SWEEP_WORDS), (64, 64));
+    let mut engine = Engine::with_shape(Arc::clone(gpu), shape, size, options)?;
+    let items = count as u64;
+    let sort_lanes = u64::from(shape.lanes(items));
+    let sort_cells = sort_lanes << shape.digit_bits;
+    engine.set_capacity(Capacity {
+        instances: items,
+        sort_lanes,
+        sort_cells,
+        sort_totals: sort_cells / u64::from(shape.subgroup),
+        sweep_cells: shape.sweep_cells(items),
+        ..*engine.capacity()
+    })?;
+    let capacity = *engine.capacity();
+    let mut builder = Builder::new("sort", &shape, &capacity);
+    builder.list.copy(SOURCE, BUFFERS.keys[0], 0);
+    if shape.sweeps() {
+        builder.list.fill(Buf::SWEEP, 0).copy(DIGITS, Buf::SWEEP, u64::from(SWEEP_WORDS) * 4);
+    }
+    let before = builder.list.work.len();
+    let (keys_out, _) = sort(&mut builder, BUFFERS, bits, Count::Instances, "alone", true);
+    let list = builder.list;
+    let id = engine.raw_mut().prepare(&list)?;
+    let mut random = generator(9);
+    let mut keys: Vec<u32> = (0..count).map(|_| random.random::<u32>() >> (32 - bits)).collect();
+    announce(&mut engine, &keys)?;
+    let mut times = Vec::new();
+    for round in 0..=rounds {
+        engine.raw_mut().run(id, 0)?;
+        let ns = engine.raw().timings(id, 0)?.iter().skip(before).map(|(_, ns)| *ns as f64).sum::<f64>();
+        if ns == 0.0 {
+            return Err(Error::NoDevice("this device has no timestamps on its compute queue".to_owned()));
+        }
+        if round > 0 {
+            times.push(ns / 1e6);
+        }
+    }
+    keys.sort_unstable();
+    if engine.raw_mut().download::<u32>(keys_out, 0, 0, count)? != keys {
+        return Err(Error::Check(format!("{count} keys of {bits} bits are not in order after the sort")));
+    }
+    Ok(median(times))
+}
+
+/// Uploads the keys, their number, and what the pass that writes keys counts of them.
+fn announce(engine: &mut Engine, keys: &[u32]) -> Result<()> {
+    let (bits, items) = (engine.shape().digit_bits, engine.shape().sweep_items);
+    let mut digits = vec![0_u32; SWEEP_WORDS as usize];
+    for pass in 0..32 / bits {
+        for key in keys {
+            let digit = key >> (pass * bits) & ((1 << bits) - 1);
+            digits[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
+        }
+    }
+    let count = keys.len() as u32;
+    let sweeps = engine.shape().sweeps();
+    let sched = engine.raw_mut();
+    sched.upload(SOURCE, 0, 0, keys)?;
+    sched.upload(Buf::STEP, 0, 0, &[StepUniforms::zeroed()])?;
+    sched.upload(Buf::COUNTERS, 0, 0, &[Counters { instance_count: count, ..Counters::zeroed() }])?;
+    if sweeps {
+        let partitions = count.div_ceil(SWEEP_LANES * items);
+        sched.upload(DIGITS, 0, 0, &digits)?;
+        sched.upload(Buf::DISPATCH_ARGS, 0, u64::from(ARGS_SWEEP_INSTANCES), &[partitions, 1, 1])?;
+    }
+    Ok(())
+}
