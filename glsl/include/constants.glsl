@@ -32,6 +32,7 @@ const uint RELOCATE_MOST = 51u;              // most copies of a Gaussian (3DGS-
 const float NOISE_STEEP = 100.0;             // Gaussians move at random below
 const float NOISE_OPACITY = 0.005;           // this opacity, and hardly above (3DGS-MCMC)
 const uint FOLD = 32768u;                    // groups of one axis, over which one-dimensional work folds
+const uint FINITE_GROUPS = 256u;            // workgroups of find_nonfinite
 const uint EXPOSED = 512u;                   // pixels of a workgroup of expose_backward
 const uint EXPOSURE_ROWS = 3u;               // rows of a photo (exposure.glsl)
 const float EXPOSURE_SHARE = 0.24;           // limit of what a channel takes of another one

@@ -43,6 +43,9 @@ layout(push_constant, scalar) uniform PassWords {
     uint SWEEP_HELD;   // for tests: 1 + the partition that tells nothing
     uint SORT_SLOT;    // first pass of the sort of the keys that are written
     uint PARTIALS;     // sums of the loss, or of the exposure
+    uint PLANE;        // of a state (find_nonfinite.comp),
+    uint ROW_WORDS;    // the words of its rows,
+    uint ROWS_FIXED;   // and their number, 0 for one of each Gaussian
 };
 
 #ifdef TEXEL

@@ -40,6 +40,8 @@ pub enum ListKey {
     RelocateApply,
     /// Opacity reset.
     OpacityReset,
+    /// Looks for numbers of the state that are not finite, with the buffers that the strategy keeps.
+    Nonfinite(&'static [Buf]),
 }
 
 /// Results of a list.
@@ -101,6 +103,7 @@ impl Engine {
             ListKey::RelocateCount => pass::relocate_count(shape, capacity),
             ListKey::RelocateApply => pass::relocate_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::OpacityReset => pass::opacity_reset(shape, capacity),
+            ListKey::Nonfinite(kept) => pass::find_nonfinite(shape, capacity, &self.floats(kept)),
         }
     }
 

@@ -1,12 +1,16 @@
 //! Device state that a training needs to continue: the buffers of kind Model, unchanged. All other buffers start at
 //! zero, both in a new and in a continued training.
 
-use super::Engine;
+use super::{Engine, ListKey};
 use crate::error::Result;
 use crate::pass::buffers::TABLE;
 use crate::pass::{ATTRIBUTES, SHARED_PLANES};
 use crate::records::checkpoint::Plane;
+use crate::scheduler::Snapshot;
 use crate::scheduler::plan::{Buf, Domain};
+use crate::shaders::constants::NO_ROW;
+use crate::shaders::structs::StepUniforms;
+use bytemuck::Zeroable;
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -79,17 +83,71 @@ pub(crate) fn check(
     given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
 }
 
+/// A state on its way from the device, for any thread.
+pub(crate) struct Copied {
+    shapes: Vec<(Buf, u64)>,
+    words: Words,
+}
+
+enum Words {
+    Read(Vec<Vec<u32>>),
+    OnDevice(Snapshot),
+}
+
+impl Copied {
+    /// Returns the planes, read from the device if need be.
+    pub(crate) fn planes(self) -> Result<Vec<Plane>> {
+        let all = match self.words {
+            Words::Read(all) => all,
+            Words::OnDevice(snapshot) => snapshot.read()?,
+        };
+        let plane = |((buf, _), data): ((Buf, u64), _)| Plane {
+            name: TABLE[buf.index()].name.to_owned(),
+            words: words(buf),
+            data,
+        };
+        Ok(self.shapes.into_iter().zip(all).map(plane).collect())
+    }
+}
+
 impl Engine {
-    /// Downloads the state, including the buffers that the strategy keeps. No list may be in flight.
-    pub(crate) fn download_state(&mut self, kept: &[Buf]) -> Result<Vec<Plane>> {
+    /// Copies the state, including the buffers that the strategy keeps: on a card in its memory, to be read while lists go on,
+    /// else to the host at once. No list may be in flight.
+    pub(crate) fn copy_state(&mut self, kept: &[Buf]) -> Result<Copied> {
+        self.check_idle()?;
         let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
         let counts = Counts { gaussians, frozen, shared: self.size.shared_rows };
-        let planes =
-            buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter().map(|(buf, count)| {
-                let data = self.sched.download(buf, 0, 0, count as usize * words(buf) as usize)?;
-                Ok(Plane { name: TABLE[buf.index()].name.to_owned(), words: words(buf), data })
-            });
-        planes.collect()
+        let buffers = buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter();
+        let shapes: Vec<(Buf, u64)> =
+            buffers.map(|(buf, count)| (buf, u64::from(count) * u64::from(words(buf)))).collect();
+        if self.runs_ahead() {
+            match self.sched.snapshot(&shapes) {
+                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(snapshot) }),
+                Err(error) if error.is_out_of_memory() => {
+                    tracing::debug!("{error}; the state is read at once, and the training waits");
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let read = shapes.iter().map(|&(buf, words)| self.sched.download(buf, 0, 0, words as usize));
+        let words = Words::Read(read.collect::<Result<_>>()?);
+        Ok(Copied { shapes, words })
+    }
+
+    /// Planes of floats of the state.
+    pub(super) fn floats(&self, kept: &[Buf]) -> Vec<Buf> {
+        let counts = Counts { gaussians: 0, frozen: 0, shared: self.size.shared_rows };
+        buffers(self.sh_degree, false, kept, counts).into_iter().map(|(buf, _)| buf).collect()
+    }
+
+    /// Returns the name and the row of a number of the state that is not finite, and whether the row is a shared one; `None`
+    /// if all are finite. No list may be in flight.
+    pub(crate) fn nonfinite(&mut self, kept: &'static [Buf]) -> Result<Option<(&'static str, u32, bool)>> {
+        self.run(ListKey::Nonfinite(kept), &StepUniforms::zeroed())?;
+        let planes = self.floats(kept);
+        let rows = self.sched.download::<u32>(Buf::NONFINITE_ROWS, 0, 0, planes.len())?;
+        let found = planes.into_iter().zip(rows).find(|(_, row)| *row != NO_ROW);
+        Ok(found.map(|(buf, row)| (TABLE[buf.index()].name, row, SHARED_PLANES.contains(&buf))))
     }
 
     /// Uploads a state that has passed [`check`] to a new engine.

@@ -165,6 +165,8 @@ pub struct Capabilities {
     pub needs: Vec<Need>,
     pub(super) features: Features,
     pub(super) queue_family: u32,
+    /// Family of a queue that copies beside the compute queue.
+    pub(super) transfer_family: Option<u32>,
     /// True if subgroup size control is an extension, not part of Vulkan 1.3.
     pub(super) size_control_is_extension: bool,
 }

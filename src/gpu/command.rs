@@ -1,7 +1,7 @@
 //! Command buffers.
 
-use super::Gpu;
 use super::call::vk_call;
+use super::{Gpu, Lane};
 use ash::vk;
 use std::sync::Arc;
 
@@ -15,9 +15,10 @@ pub(crate) struct CommandBuffer {
 }
 
 impl CommandBuffer {
-    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, lane: Lane) -> Result<Self> {
+        let own = gpu.capabilities.transfer_family.filter(|_| lane == Lane::Transfer);
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(gpu.capabilities.queue_family)
+            .queue_family_index(own.unwrap_or(gpu.capabilities.queue_family))
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
         // SAFETY: the device was created with this family.
         let pool = vk_call("vkCreateCommandPool", || unsafe { gpu.raw().create_command_pool(&info, None) })?;

@@ -7,8 +7,17 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const NAMES: [&str; 8] =
-    ["memory_model", "scalar", "timeline", "robust", "size_control", "full_subgroups", "shuffle", "timestamps"];
+const NAMES: [&str; 9] = [
+    "memory_model",
+    "scalar",
+    "timeline",
+    "robust",
+    "size_control",
+    "full_subgroups",
+    "shuffle",
+    "timestamps",
+    "transfer",
+];
 
 /// The names in `LABELGS_HIDE`, separated by commas.
 #[derive(Clone, Debug, Default)]
@@ -43,6 +52,10 @@ impl Hidden {
         if self.has("shuffle") {
             subgroup.operations &= !vk::SubgroupFeatureFlags::SHUFFLE;
         }
+    }
+
+    pub(super) fn transfer(&self, family: Option<u32>) -> Option<u32> {
+        family.filter(|_| !self.has("transfer"))
     }
 
     pub(super) fn limits(&self, limits: &mut Limits) {

@@ -62,7 +62,16 @@ impl Buffer {
             | vk::BufferUsageFlags::INDIRECT_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
-        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        let families: Vec<u32> =
+            gpu.capabilities.transfer_family.into_iter().chain([gpu.capabilities.queue_family]).collect();
+        // Both queues use buffers as they come: for buffers, unlike images, that costs nothing.
+        let sharing = if families.len() > 1 { vk::SharingMode::CONCURRENT } else { vk::SharingMode::EXCLUSIVE };
+        let shared_by = if families.len() > 1 { &families[..] } else { &[] };
+        let info = vk::BufferCreateInfo::default()
+            .size(bytes)
+            .usage(usage)
+            .sharing_mode(sharing)
+            .queue_family_indices(shared_by);
         // SAFETY: the device is alive and the size is not 0 (the planner reserves at least one element).
         let handle = vk_call("vkCreateBuffer", || unsafe { gpu.raw().create_buffer(&info, None) })?;
         // From here on, dropping `buffer` destroys the handle.

@@ -1,6 +1,6 @@
 //! Opens Vulkan devices: [`Gpu::new`] opens one, [`devices`] lists all with their [`Capabilities`].
 //!
-//! A thin layer over Vulkan: one instance, one device, one compute queue, and owners of the objects made from them.
+//! A thin layer over Vulkan: one instance, one device, one compute queue and perhaps one that copies, and owners of the objects made from them.
 //! This module and `scheduler/recorder.rs` fulfil all guarantees that Vulkan demands of the caller, so the rest of the
 //! crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
 // Vulkan calls are foreign functions: every call is unsafe. Only this module and the recorder make them.
@@ -92,12 +92,23 @@ impl GpuOptions {
     }
 }
 
+/// Queue of a command buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Lane {
+    /// Runs lists, and all else.
+    Compute,
+    /// Copies beside them; the compute queue on a device without a queue for that.
+    Transfer,
+}
+
 /// An opened device.
 pub struct Gpu {
     pipelines: Mutex<HashMap<PipelineKey, PipelineSlot>>,
     allocator: Mutex<Option<Allocator>>,
     used: memory::Used,
     queue: Mutex<vk::Queue>,
+    /// The queue for copies beside the compute queue.
+    transfer: Option<Mutex<vk::Queue>>,
     names: Option<ash::ext::debug_utils::Device>,
     statistics: Option<statistics::Functions>,
     cache: Mutex<cache::PipelineCache>,
@@ -117,6 +128,9 @@ impl Gpu {
         let device = select::open(&instance, physical, &capabilities, options)?;
         // SAFETY: the device has this family and was created with one queue of it.
         let queue = unsafe { device.get_device_queue(capabilities.queue_family, 0) };
+        // SAFETY: likewise.
+        let transfer =
+            capabilities.transfer_family.map(|family| Mutex::new(unsafe { device.get_device_queue(family, 0) }));
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw().clone(),
             device: device.clone(),
@@ -139,6 +153,7 @@ impl Gpu {
             allocator: Mutex::new(Some(allocator)),
             used: memory::Used::default(),
             queue: Mutex::new(queue),
+            transfer,
             names,
             statistics,
             device,
@@ -186,19 +201,38 @@ impl Gpu {
 
     /// Waits until the device is idle.
     pub(crate) fn wait_idle(&self) -> Result<()> {
-        let _queue = lock(&self.queue);
-        // SAFETY: the lock on the queue prevents submits meanwhile.
+        let (_queue, _transfer) = (lock(&self.queue), self.transfer.as_ref().map(lock));
+        // SAFETY: the locks on the queues prevent submits meanwhile.
         vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })
     }
 
-    /// Submits command buffers; the timeline reaches `value` when the commands are done.
-    pub(crate) fn submit(&self, commands: &[&CommandBuffer], timeline: &Timeline, value: u64) -> Result<()> {
+    /// Submits command buffers of a lane, to begin when the timeline of `after` has reached its value; the timeline reaches
+    /// `value` when the commands are done.
+    pub(crate) fn submit(
+        &self,
+        lane: Lane,
+        commands: &[&CommandBuffer],
+        after: Option<(&Timeline, u64)>,
+        (timeline, value): (&Timeline, u64),
+    ) -> Result<()> {
         let (semaphores, values) = ([timeline.raw()], [value]);
+        let (before, before_values): (Vec<_>, Vec<_>) =
+            after.map(|(timeline, value)| (timeline.raw(), value)).into_iter().unzip();
+        let stages = [vk::PipelineStageFlags::ALL_COMMANDS];
         let commands: Vec<vk::CommandBuffer> = commands.iter().map(|command| command.raw()).collect();
-        let mut signal = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
-        let info =
-            vk::SubmitInfo::default().command_buffers(&commands).signal_semaphores(&semaphores).push_next(&mut signal);
-        let queue = lock(&self.queue);
+        let mut values = vk::TimelineSemaphoreSubmitInfo::default()
+            .wait_semaphore_values(&before_values)
+            .signal_semaphore_values(&values);
+        let info = vk::SubmitInfo::default()
+            .command_buffers(&commands)
+            .wait_semaphores(&before)
+            .wait_dst_stage_mask(&stages[..before.len()])
+            .signal_semaphores(&semaphores)
+            .push_next(&mut values);
+        let queue = lock(match (lane, &self.transfer) {
+            (Lane::Transfer, Some(queue)) => queue,
+            _ => &self.queue,
+        });
         // SAFETY: the scheduler submits recorded command buffers that are not pending, with growing values.
         vk_call("vkQueueSubmit", || unsafe { self.device.queue_submit(*queue, &[info], vk::Fence::null()) })
     }

@@ -70,6 +70,7 @@ impl Capabilities {
             needs: Vec::new(),
             features,
             queue_family: family.map_or(0, |(index, _)| index),
+            transfer_family: hidden.transfer(transfer_family(&families)),
             size_control_is_extension: has_size_control && !is_1_3,
         };
         found.needs = needs(&found, family.is_some());
@@ -117,6 +118,13 @@ fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::Qu
     let rank =
         |family: &&(u32, vk::QueueFamilyProperties)| (family.1.timestamp_valid_bits == 0, draws(family), family.0);
     numbered.iter().filter(computes).min_by_key(rank).copied()
+}
+
+/// Picks a queue family that does nothing but copy, if there is one.
+fn transfer_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let only = vk::QueueFlags::TRANSFER | vk::QueueFlags::SPARSE_BINDING | vk::QueueFlags::PROTECTED;
+    let copies = |flags: vk::QueueFlags| flags.contains(vk::QueueFlags::TRANSFER) && only.contains(flags);
+    families.iter().position(|family| copies(family.queue_flags)).map(|index| index as u32)
 }
 
 /// Size of the device's largest heap, and the part of it that the engine may use.

@@ -108,7 +108,7 @@ fn line(device: &Capabilities) -> String {
     format!("{}: {}, {lacks}", device.index, device.name)
 }
 
-/// Creates the logical device with one compute queue and the known features that the device has.
+/// Creates the logical device with one compute queue, one for copies if there is such a family, and the known features that the device has.
 pub(super) fn open(
     instance: &Instance,
     physical: vk::PhysicalDevice,
@@ -127,9 +127,9 @@ pub(super) fn open(
         .subgroup_size_control(features.size_control)
         .compute_full_subgroups(features.full_subgroups);
     let priorities = [1.0];
-    let queues = [vk::DeviceQueueCreateInfo::default()
-        .queue_family_index(capabilities.queue_family)
-        .queue_priorities(&priorities)];
+    let families = [capabilities.queue_family].into_iter().chain(capabilities.transfer_family);
+    let queue = |family| vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities);
+    let queues: Vec<_> = families.map(queue).collect();
     let mut extensions = Vec::new();
     if capabilities.size_control_is_extension {
         extensions.push(ash::ext::subgroup_size_control::NAME.as_ptr());

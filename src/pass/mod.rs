@@ -16,6 +16,7 @@ pub mod scan;
 pub(crate) mod shape;
 pub mod sort;
 pub mod stage;
+mod state;
 mod tile;
 
 pub use build::Builder;
@@ -238,6 +239,13 @@ pub fn relocate_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) ->
     let mut b = begin("relocation", shape, capacity, 0);
     densify::relocate(&mut b);
     densify::apply(&mut b, labels);
+    end(b)
+}
+
+/// Looks for numbers of these planes of a training's state that are not finite.
+pub fn find_nonfinite(shape: &KernelShape, capacity: &Capacity, planes: &[Buf]) -> PassList {
+    let mut b = begin("finite state", shape, capacity, 0);
+    state::find_nonfinite(&mut b, planes);
     end(b)
 }
 

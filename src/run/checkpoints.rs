@@ -1,14 +1,18 @@
-//! The checkpoints that a run writes.
+//! The checkpoints that a run writes: by a thread, while the training goes on.
 
 use super::history::{Recorder, Sums};
 use super::resume::Record;
 use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::files::run_folder::Lock;
+use crate::lab::fault;
 use crate::records::checkpoint_folder;
+use crate::run::Every;
 use crate::train::between::Between;
-use crate::train::{TrainState, Trainer};
+use crate::train::{PendingState, TrainState, Trainer};
 use std::path::{Path, PathBuf};
+use std::thread::{self, JoinHandle};
+use std::time::Instant;
 
 /// Number of checkpoints that a run keeps while it goes on. The older one is the fallback if the newest is damaged.
 const FILES_MAX: usize = 2;
@@ -19,7 +23,53 @@ pub(super) struct Checkpoints {
     record: Record,
     /// Files of this run, the newest last.
     kept: Vec<PathBuf>,
+    /// Step of the last one that was begun, and when that was.
     step: u32,
+    since: Instant,
+    writer: Option<Writer>,
+}
+
+/// A checkpoint that is being written.
+struct Writer {
+    step: u32,
+    path: PathBuf,
+    /// Taken when it is joined.
+    thread: Option<JoinHandle<Result<()>>>,
+}
+
+impl Writer {
+    /// Begins to write; without a thread it is done when this returns.
+    fn begin(step: u32, path: PathBuf, pending: PendingState) -> Result<Self> {
+        let to = path.clone();
+        let write = move || {
+            // A fault can only be slow here.
+            fault::at("checkpoint");
+            pending.whole()?.write(&to)
+        };
+        let thread = thread::Builder::new().name("checkpoint".to_owned()).spawn(write);
+        let thread = thread.map_err(Error::write(&path))?;
+        Ok(Self { step, path, thread: Some(thread) })
+    }
+
+    fn is_done(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Waits for the file. Returns its step and its path.
+    fn end(mut self) -> (u32, Result<PathBuf>) {
+        let ended = self.thread.take().map_or(Ok(Ok(())), JoinHandle::join);
+        let written = ended.unwrap_or_else(|_| Err(Error::Bug(format!("{}: its thread ended", self.path.display()))));
+        (self.step, written.map(|()| self.path.clone()))
+    }
+}
+
+impl Drop for Writer {
+    fn drop(&mut self) {
+        // What was begun is completed, also when the run has failed.
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
 }
 
 impl Checkpoints {
@@ -34,7 +84,7 @@ impl Checkpoints {
             );
         }
         let (kept, step) = resumed.map_or((Vec::new(), 0), |state| (vec![state.path.clone()], state.step));
-        Ok(Self { out: out.to_owned(), lock, record, kept, step })
+        Ok(Self { out: out.to_owned(), lock, record, kept, step, since: Instant::now(), writer: None })
     }
 
     /// Checks that the folder still belongs to this run. Call it before each write: somebody may have deleted the
@@ -46,12 +96,15 @@ impl Checkpoints {
     /// Returns true if the schedule has a checkpoint at `step`.
     fn is_due(&self, step: u32, last: u32) -> bool {
         let every = self.record.run.checkpoint_every;
-        every > 0 && (step.is_multiple_of(every) || step == last)
+        every != Every::NEVER && (step == last || every.is_due(step, self.since))
     }
 
     /// Puts the training back to its last whole checkpoint after the failure `reason`. Returns its step and the sums of
     /// its history, none if there is no checkpoint.
     pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<Option<(u32, Sums)>> {
+        if let Some((step, Err(error))) = self.settle() {
+            tracing::warn!("the checkpoint of step {step} is missing: {error}");
+        }
         while let Some(path) = self.kept.last() {
             match TrainState::read(path).and_then(|state| Ok((Record::of(&state)?, state))) {
                 Ok((record, state)) => {
@@ -67,38 +120,36 @@ impl Checkpoints {
         Ok(None)
     }
 
-    /// Writes the checkpoint that is due. A failed write or listing is only a warning: the next one may succeed.
-    fn save_due(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
-        self.hold_folder()?;
-        match self.save(trainer, history) {
-            Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
-                let last = self.kept.last().map_or("there is no checkpoint yet".to_owned(), |path| {
-                    format!("the last checkpoint is {}", path.display())
-                });
-                tracing::warn!("{error}; training goes on, {last}");
-                Ok(None)
-            }
-            other => other,
-        }
-    }
-
-    /// Writes a checkpoint unless this step has one. Deletes old ones after the new one is complete. Nothing may be in
-    /// flight, so that the history has all steps.
-    pub(super) fn save(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<Option<PathBuf>> {
+    /// Begins a checkpoint unless this step has one. Nothing may be in flight, so that the history has all steps, and no other
+    /// checkpoint is being written.
+    fn begin(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<()> {
         let step = trainer.steps_done();
         if step == self.step {
-            return Ok(None);
+            return Ok(());
         }
         history.sync();
         self.record.history = history.unfinished();
-        let mut state = trainer.state()?;
-        state.run = serde_json::to_value(&self.record).map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
-        let path = checkpoint_folder::next(&self.out, step)?;
-        state.write(&path)?;
-        self.step = step;
-        self.kept.push(path.clone());
-        self.keep(FILES_MAX)?;
-        Ok(Some(path))
+        let mut pending = trainer.copied_state()?;
+        pending.state.run =
+            serde_json::to_value(&self.record).map_err(|error| Error::Bug(format!("checkpoint: {error}")))?;
+        (self.step, self.since) = (step, Instant::now());
+        self.writer = Some(Writer::begin(step, checkpoint_folder::next(&self.out, step)?, pending)?);
+        Ok(())
+    }
+
+    /// Waits for the checkpoint that is being written, and deletes old ones after it is complete. Returns its step and its path,
+    /// `None` if there is none.
+    fn settle(&mut self) -> Option<(u32, Result<PathBuf>)> {
+        let (step, written) = self.writer.take()?.end();
+        let written = written.and_then(|path| {
+            self.kept.push(path.clone());
+            self.keep(FILES_MAX).map(|()| path)
+        });
+        if written.is_err() {
+            // The step may be saved again.
+            self.step = 0;
+        }
+        Some((step, written))
     }
 
     /// Deletes all but the last checkpoint at the end of the run.
@@ -112,7 +163,7 @@ impl Checkpoints {
     }
 }
 
-/// Writes a checkpoint.
+/// Begins a checkpoint.
 pub(super) struct CheckpointJob;
 
 impl Between<Run<'_>> for CheckpointJob {
@@ -120,20 +171,20 @@ impl Between<Run<'_>> for CheckpointJob {
         run.checkpoints.is_due(step, run.settings.train.iterations)
     }
 
-    fn run(&mut self, step: u32, run: &mut Run) -> Result<()> {
-        match run.save_due()? {
-            Some(path) => run.tell(Event::Checkpoint { step, path: &path }),
-            // If the observer answers Save again, the step has its checkpoint already: no endless loop.
-            None => Ok(()),
-        }
+    fn run(&mut self, _step: u32, run: &mut Run) -> Result<()> {
+        run.end_checkpoint()?;
+        run.begin_checkpoint()
     }
 }
 
 impl Run<'_> {
-    /// Writes a checkpoint outside of the schedule.
+    /// Writes a checkpoint outside of the schedule, and waits for it.
     pub(super) fn save_checkpoint(&mut self) -> Result<()> {
         self.hold_folder()?;
-        CheckpointJob.run(self.trainer.steps_done(), self)
+        self.end_checkpoint()?;
+        self.begin_checkpoint()?;
+        // If the observer answers Save again, the step has its checkpoint already: no endless loop.
+        self.end_checkpoint()
     }
 
     /// Writes the checkpoint of a stopped run. Returns whether there is one.
@@ -141,17 +192,47 @@ impl Run<'_> {
         if !self.stopped {
             return Ok(false);
         }
-        self.checkpoints.save(&mut self.trainer, &mut self.history).map(|_| true)
+        self.end_checkpoint()?;
+        self.checkpoints.begin(&mut self.trainer, &mut self.history)?;
+        self.checkpoints.settle().map_or(Ok(true), |(_, written)| written.map(|_| true))
     }
 
-    /// Writes a checkpoint, and what a report of the run until then needs.
-    fn save_due(&mut self) -> Result<Option<PathBuf>> {
-        self.history.drain(&mut self.trainer)?;
-        let saved = self.checkpoints.save_due(&mut self.trainer, &mut self.history)?;
-        // A checkpoint takes long enough for another run to come between.
+    /// Tells of a checkpoint that is complete by now.
+    pub(super) fn tell_checkpoint(&mut self) -> Result<()> {
+        if self.checkpoints.writer.as_ref().is_some_and(Writer::is_done) { self.end_checkpoint() } else { Ok(()) }
+    }
+
+    /// Waits for the checkpoint that is being written, if there is one, and tells of it. A failed write or listing is only a
+    /// warning: the next one may succeed.
+    pub(super) fn end_checkpoint(&mut self) -> Result<()> {
+        let Some((step, written)) = self.checkpoints.settle() else { return Ok(()) };
+        // It takes long enough for another run to come between.
         self.hold_folder()?;
+        match self.or_warned(written)? {
+            Some(path) => self.tell(Event::Checkpoint { step, path: &path }),
+            None => Ok(()),
+        }
+    }
+
+    /// Begins a checkpoint, and writes what a report of the run until then needs.
+    fn begin_checkpoint(&mut self) -> Result<()> {
+        self.history.drain(&mut self.trainer)?;
+        let begun = self.checkpoints.begin(&mut self.trainer, &mut self.history);
+        self.or_warned(begun)?;
         let written = self.write_info();
-        self.tolerate(written)?;
-        Ok(saved)
+        self.tolerate(written).map(|_| ())
+    }
+
+    fn or_warned<T>(&self, written: Result<T>) -> Result<Option<T>> {
+        match written {
+            Err(error @ (Error::Write { .. } | Error::Read { .. })) => {
+                let last = self.checkpoints.kept.last().map_or("there is no checkpoint yet".to_owned(), |path| {
+                    format!("the last checkpoint is {}", path.display())
+                });
+                tracing::warn!("{error}; training goes on, {last}");
+                Ok(None)
+            }
+            other => other.map(Some),
+        }
     }
 }

@@ -7,6 +7,7 @@
 mod block;
 mod checkpoints;
 mod depths;
+mod every;
 mod finish;
 pub(crate) mod history;
 pub(crate) mod info;
@@ -25,6 +26,7 @@ pub(crate) mod settings;
 mod steps;
 pub(crate) mod summary;
 
+pub use every::Every;
 pub use models::latest_model;
 pub use objects::ObjectSummary;
 pub use observer::{Event, Flow, Live, Observer};
@@ -47,6 +49,7 @@ use models::Models;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Makes the settings of a resumed run from those of its checkpoint. The argument is `None` if there is no checkpoint.
 pub type Changed<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
@@ -175,6 +178,8 @@ struct Run<'a> {
     dataset: Dataset,
     /// View of the preview pictures.
     preview: Option<View>,
+    /// When the last preview was written.
+    previewed: Instant,
     trainer: Trainer,
     checkpoints: Checkpoints,
     models: Models,

@@ -2,6 +2,7 @@
 
 use super::block::{self, Block};
 use super::checkpoints::Checkpoints;
+use super::every::Every;
 use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
@@ -24,7 +25,7 @@ use crate::train::shared::{Shared, exposure};
 use crate::train::{self, ExposureMode, TrainConfig, Trainer};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The state of a run before it opens a device.
 pub(super) struct Prepared {
@@ -65,7 +66,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
             settings
         }
     };
-    if request.restart && settings.run.checkpoint_every == 0 {
+    if request.restart && settings.run.checkpoint_every == Every::NEVER {
         return Err(Error::usage(
             Setting("restart"),
             format!("goes on from checkpoints, and {} is 0", Setting("checkpoint_every")),
@@ -91,7 +92,7 @@ fn check_new(settings: &Settings, request: &Request) -> Result<()> {
 /// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.
 fn clear(out: &Path, settings: &Settings) -> Result<()> {
     let checkpoints = out.join(checkpoint_folder::FOLDER);
-    if settings.run.checkpoint_every > 0 {
+    if settings.run.checkpoint_every != Every::NEVER {
         std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
     }
     // A missing or unreadable folder needs no clearing.
@@ -178,6 +179,7 @@ pub(super) fn begin<'a>(
         names,
         dataset,
         preview,
+        previewed: Instant::now(),
         trainer,
         checkpoints,
         models,

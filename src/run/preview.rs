@@ -7,17 +7,18 @@ use crate::eval::metrics::{label_iou, psnr};
 use crate::render::Parts;
 use crate::train::between::Between;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Writes a preview.
 pub(super) struct PreviewJob;
 
 impl Between<Run<'_>> for PreviewJob {
     fn is_due(&self, step: u32, run: &Run) -> bool {
-        let every = run.settings.run.preview_every;
-        step < run.settings.train.iterations && every > 0 && step.is_multiple_of(every)
+        step < run.settings.train.iterations && run.settings.run.preview_every.is_due(step, run.previewed)
     }
 
     fn run(&mut self, step: u32, run: &mut Run) -> Result<()> {
+        run.previewed = Instant::now();
         let written = write(run);
         match run.tolerate(written)?.flatten() {
             Some(path) => run.tell(Event::Preview { step, path: &path }),

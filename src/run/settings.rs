@@ -1,5 +1,6 @@
 //! All settings of a run, and the file that stores them.
 
+use super::every::Every;
 use crate::error::{Error, Result, Setting};
 use crate::files::{self, run_folder};
 use crate::options::parse::as_bytes;
@@ -23,15 +24,16 @@ crate::options! {
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new(), setting;
 
-            /// Steps between two preview pictures; 0 makes none.
+            /// Time between two preview pictures, such as 10min, or a number of steps; 0 makes none.
             ///
             /// They show the first held-out view.
-            preview_every <"N">: u32 = 1000, setting;
+            preview_every <"TIME">: Every = Every::Minutes(10.0), setting;
 
-            /// Steps between two checkpoints; 0 writes one only when the run is interrupted.
+            /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only when the run is
+            /// interrupted.
             ///
-            /// --resume continues from the newest checkpoint.
-            checkpoint_every <"N">: u32 = 1000;
+            /// The last step has one too. --resume continues from the newest checkpoint.
+            checkpoint_every <"TIME">: Every = Every::Minutes(10.0);
         }
         "Scene" {
             /// Memory for photos and masks, such as 800M or 4G.

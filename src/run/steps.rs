@@ -24,11 +24,13 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
         }
         let report = run.trainer.newest_report();
         run.tell(Event::Step { step, report: report.as_ref(), is_last: step == last })?;
+        run.tell_checkpoint()?;
         work_after(run, step)?;
         if run.stopped {
             break;
         }
     }
+    run.end_checkpoint()?;
     run.history.drain(&mut run.trainer)
 }
 

@@ -7,7 +7,7 @@ use super::Scheduler;
 use super::recorder::Recorder;
 use super::storage::Storage;
 use crate::error::Result;
-use crate::gpu::{Buffer, CommandBuffer, Gpu, MemoryKind};
+use crate::gpu::{Buffer, CommandBuffer, Gpu, Lane, MemoryKind, Timeline};
 use crate::scheduler::plan::Buf;
 use bytemuck::Pod;
 use std::borrow::Cow;
@@ -35,6 +35,8 @@ pub struct Traffic {
 /// The data of the steps in flight, and those that are kept.
 pub(super) struct Loads {
     frames: Vec<Frame>,
+    timeline: Timeline,
+    submitted: u64,
     kept: HashMap<(Buf, DataKey), Arc<Buffer>>,
     kept_bytes: u64,
 }
@@ -66,9 +68,10 @@ enum Source {
 impl Loads {
     /// Makes one if data go through staging on this device.
     pub(super) fn new(gpu: &Arc<Gpu>, frames: usize) -> Result<Self> {
-        let frame = || Ok(Frame { command: CommandBuffer::new(gpu)?, next: Vec::new(), last: Vec::new() });
+        let command = || CommandBuffer::new(gpu, Lane::Transfer);
+        let frame = || Ok(Frame { command: command()?, next: Vec::new(), last: Vec::new() });
         let frames = (0..frames).map(|_| frame()).collect::<Result<_>>()?;
-        Ok(Self { frames, kept: HashMap::new(), kept_bytes: 0 })
+        Ok(Self { frames, timeline: Timeline::new(gpu)?, submitted: 0, kept: HashMap::new(), kept_bytes: 0 })
     }
 
     /// Bytes of the data that are kept.
@@ -76,8 +79,9 @@ impl Loads {
         self.kept_bytes
     }
 
-    /// Records what the next list of a frame needs; `None` if it needs nothing.
-    pub(super) fn record(&mut self, gpu: &Gpu, storage: &Storage, frame: usize) -> Result<Option<&CommandBuffer>> {
+    /// Submits the copies that the next list of a frame needs, by the queue for copies if the device has one. Returns what the
+    /// list has to wait for, `None` if it needs nothing. No list of the frame runs.
+    pub(super) fn submit(&mut self, gpu: &Gpu, storage: &Storage, frame: usize) -> Result<Option<(&Timeline, u64)>> {
         let count = self.frames.len();
         let of = &mut self.frames[frame];
         of.last = std::mem::take(&mut of.next);
@@ -98,7 +102,14 @@ impl Loads {
             }
         }
         recorder.end()?;
-        Ok(Some(&of.command))
+        gpu.submit(Lane::Transfer, &[&of.command], None, (&self.timeline, self.submitted + 1))?;
+        self.submitted += 1;
+        Ok(Some((&self.timeline, self.submitted)))
+    }
+
+    /// Blocks until all copies are done.
+    pub(super) fn wait(&self) -> Result<()> {
+        self.timeline.wait(self.submitted)
     }
 
     /// Adds a load in front of the next list, in the place of an earlier one of a list that was not submitted.

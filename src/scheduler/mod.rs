@@ -9,14 +9,16 @@ pub mod plan;
 pub(crate) mod profiler;
 mod recorder;
 mod recording;
+mod snapshot;
 mod storage;
 mod transfer;
 
 pub use loads::{DataKey, Traffic};
 pub use profiler::{PassTime, Profiler};
+pub use snapshot::Snapshot;
 
 use crate::error::{Error, Result, Setting};
-use crate::gpu::{CommandBuffer, Gpu, Timeline};
+use crate::gpu::{CommandBuffer, Gpu, Lane, Timeline};
 use crate::phases::{self, Phase};
 use crate::scheduler::plan::{Buf, BufferDecl, Limits, MemoryReport, PassList, Plan, PlanOptions, Table, memory};
 use crate::stage::Stage;
@@ -78,7 +80,7 @@ pub struct Scheduler {
     staging: Staging,
     /// For transfers outside of lists.
     immediate: CommandBuffer,
-    timeline: Timeline,
+    timeline: Arc<Timeline>,
     /// Timeline value of the last submit.
     submitted: u64,
     /// Timeline value of the last submit of each frame.
@@ -107,8 +109,8 @@ impl Scheduler {
             lists: Vec::new(),
             storage: Storage::new(table.len()),
             staging: Staging::new(&gpu)?,
-            immediate: CommandBuffer::new(&gpu)?,
-            timeline: Timeline::new(&gpu)?,
+            immediate: CommandBuffer::new(&gpu, Lane::Compute)?,
+            timeline: Arc::new(Timeline::new(&gpu)?),
             submitted: 0,
             frame_busy: vec![0; limits.frames],
             loads: limits.stages.then(|| Loads::new(&gpu, limits.frames)).transpose()?,
@@ -184,12 +186,9 @@ impl Scheduler {
             markers.reset()?;
         }
         let value = self.submitted + 1;
-        let loads = match &mut self.loads {
-            Some(loads) => loads.record(&self.gpu, &self.storage, frame)?,
-            None => None,
-        };
-        let commands: Vec<&CommandBuffer> = loads.into_iter().chain([&recording.command]).collect();
-        let submitted = self.gpu.submit(&commands, &self.timeline, value);
+        let loads =
+            self.loads.as_mut().map(|loads| loads.submit(&self.gpu, &self.storage, frame)).transpose()?.flatten();
+        let submitted = self.gpu.submit(Lane::Compute, &[&recording.command], loads, (&self.timeline, value));
         submitted.map_err(|error| self.name_pass(error))?;
         self.submitted = value;
         self.frame_busy[frame] = value;
@@ -344,7 +343,8 @@ impl Scheduler {
         commands(&mut recorder, &self.storage, &self.staging)?;
         recorder.end()?;
         let value = self.submitted + 1;
-        self.gpu.submit(&[&self.immediate], &self.timeline, value).map_err(|error| self.name_pass(error))?;
+        let submitted = self.gpu.submit(Lane::Compute, &[&self.immediate], None, (&self.timeline, value));
+        submitted.map_err(|error| self.name_pass(error))?;
         self.submitted = value;
         self.wait(Ticket(value))
     }
@@ -373,6 +373,7 @@ impl Drop for Scheduler {
     fn drop(&mut self) {
         // Memory in use must not be freed. A lost device uses none.
         let _ = self.wait_all();
+        let _ = self.loads.as_ref().map(Loads::wait);
     }
 }
 

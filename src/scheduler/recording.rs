@@ -5,7 +5,7 @@ use super::guard;
 use super::recorder::{Groups, Recorder};
 use super::storage::Storage;
 use crate::error::{Error, Result};
-use crate::gpu::{Binding, BufferView, CommandBuffer, DescriptorPool, Gpu, Markers, QueryPool};
+use crate::gpu::{Binding, BufferView, CommandBuffer, DescriptorPool, Gpu, Lane, Markers, QueryPool};
 use crate::scheduler::plan::{Buf, Class, Grid, PassDecl, Plan, TexelFormat, Uses, Work};
 use crate::shaders::{BindingKind, PUSHED_WORDS};
 use ash::vk;
@@ -44,7 +44,7 @@ impl Recording {
     ) -> Result<Self> {
         let items = plan.items.len();
         let counts = plan.descriptors;
-        let command = CommandBuffer::new(gpu)?;
+        let command = CommandBuffer::new(gpu, Lane::Compute)?;
         let descriptors = DescriptorPool::new(gpu, counts.sets, counts.storage, counts.texel)?;
         let timed = options.timestamps && gpu.limits().timestamp_bits > 0;
         let queries = timed.then(|| QueryPool::new(gpu, items as u32 + 1)).transpose()?;

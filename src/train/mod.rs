@@ -42,7 +42,7 @@ pub use shared::poses::Poses;
 pub use shared::{Place, Shared, SharedLayout, SharedParameters};
 pub use state::TrainState;
 pub use strategy::{At, Densified, Population, Strategy};
-pub use trainer::Trainer;
+pub use trainer::{PendingState, Trainer};
 
 pub use alignment::aligned;
 pub use refit::{REFIT_STEPS, refitted};

@@ -80,6 +80,36 @@ fn kills_at_any_moment_cost_no_bit() {
     assert!(killed == kills && began > 0 && ended > 0);
 }
 
+/// A kill while a checkpoint is being written costs the steps since the one before, and no bit; also where the state waits in
+/// the device's memory.
+#[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
+fn a_kill_while_a_checkpoint_is_written_costs_no_bit() {
+    let Some(_turn) = device() else { return };
+    let card = || vec![("LABELGS_PHOTOS", "resident".to_owned()), ("LABELGS_FRAMES", "4".to_owned())];
+    let mut models = Vec::new();
+    for environment in [Vec::new(), card()] {
+        let place = Place::on(environment);
+        let settings = place.settings();
+        let flags = ["--config", settings.as_str()];
+        let mut child = place.spawned_with(Some("checkpoint:2:SLOW"), &place.train("out", &flags));
+        let history = place.path("out/history.jsonl");
+        // The second checkpoint is of step 8, the third one waits for it.
+        let goes_on = || std::fs::read_to_string(&history).is_ok_and(|text| text.contains("\"step\":10"));
+        wait_until(&mut child, goes_on);
+        child.kill().expect("it runs");
+        child.wait().expect("a child");
+        assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [4]);
+        all_whole(&place.path("out"));
+        succeeded(&place.trained("out", &["--resume"]));
+        models.push(place.model("out", 40));
+        succeeded(&place.trained("straight", &flags));
+        assert!(models.last() == Some(&place.model("straight", 40)));
+        assert_eq!(place.history("out"), place.history("straight"));
+    }
+    assert!(models[0] == models[1]);
+}
+
 #[test]
 fn leftovers_of_killed_runs_go_from_every_folder() {
     let Some(_turn) = device() else { return };

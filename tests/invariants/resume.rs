@@ -215,3 +215,28 @@ fn a_state_that_does_not_fit_together_is_refused() {
     refusal(&|state| state.updates = 7, "7 updates");
     refusal(&|state| state.planes[labels].data[0] = 4000, "4000");
 }
+
+/// A state that waits on the device is that of its step, whatever the steps after it do, and the training goes on as it would.
+#[test]
+fn a_state_that_is_read_later_is_of_its_step() {
+    let Some(turn) = device() else { return };
+    let config = TrainConfig { iterations: 30, ..long(LabelRule::Votes) };
+    let mut models = Vec::new();
+    for as_card in [false, true] {
+        let mut trainer =
+            fresh(&turn, config.clone(), &small(), SchedulerOptions { as_card, ..SchedulerOptions::default() });
+        let mut waiting = Vec::new();
+        while trainer.steps_done() < 30 {
+            trainer.step().expect("a step");
+            if [9, 20, 21].contains(&trainer.steps_done()) {
+                let whole = trainer.state().expect("a state");
+                waiting.push((trainer.copied_state().expect("a state"), whole));
+            }
+        }
+        for (later, at_once) in waiting {
+            assert!(std::thread::spawn(|| later.whole()).join().expect("a thread").expect("a state") == at_once);
+        }
+        models.push(trainer.state().expect("a state").planes);
+    }
+    assert!(models[0] == models[1]);
+}

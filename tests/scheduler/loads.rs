@@ -86,3 +86,19 @@ fn data_of_a_list_that_does_not_run_are_not_kept() {
     assert_eq!(scheduler.kept_bytes(), 0);
     assert_eq!(sent(&mut scheduler, &[(key(0, 1), 3), (key(0, 2), 4), (key(0, 1), 3)]), 2 * 2000);
 }
+
+#[test]
+fn a_snapshot_keeps_what_lists_change_afterwards() {
+    let Some(gpu) = device() else { return };
+    let need = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap().memory_total();
+    let options = SchedulerOptions { memory_limit: Some(need + 500), ..CARD };
+    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(500), options).unwrap();
+    let before: Vec<u32> = (0..100).collect();
+    scheduler.upload(MODEL, 0, 0, &before).unwrap();
+    let snapshot = scheduler.snapshot(&[(MODEL, 90), (PLANES, 0)]).unwrap();
+    scheduler.fill(MODEL, 7).unwrap();
+    let read = std::thread::spawn(|| snapshot.read()).join().unwrap().unwrap();
+    assert_eq!(read, [before[..90].to_vec(), Vec::new()]);
+    // Without room for it, the owner reads at once.
+    assert!(scheduler.snapshot(&[(MODEL, 100), (PLANES, 400)]).is_err_and(|error| error.is_out_of_memory()));
+}

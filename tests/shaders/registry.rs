@@ -5,7 +5,7 @@ use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::pass::buffers::{Capacity, TABLE};
 use labelgs::pass::{KernelShape, Supervision, Variant};
 use labelgs::run::StrategyKind;
-use labelgs::scheduler::plan::{Grid, Limits, PassList, Plan, PlanOptions, Work};
+use labelgs::scheduler::plan::{Buf, Grid, Limits, PassList, Plan, PlanOptions, Work};
 use labelgs::train::shared::exposure::Exposure;
 use labelgs::train::shared::poses::Poses;
 use labelgs::train::shared::{Place, SharedParameters};
@@ -87,6 +87,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::relocate_count(&shape, &capacity));
             add(pass::relocate_apply(&shape, &capacity, true));
             add(pass::opacity_reset(&shape, &capacity));
+            add(pass::find_nonfinite(&shape, &capacity, &[Buf::MEANS, Buf::M_SH3, Buf::SHARED]));
         }
     }
     all

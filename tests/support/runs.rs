@@ -92,9 +92,14 @@ impl Place {
 
     /// Starts the tool.
     pub fn spawned(&self, args: &[String]) -> Child {
+        self.spawned_with(None, args)
+    }
+
+    /// Starts it with a fault.
+    pub fn spawned_with(&self, fault: Option<&str>, args: &[String]) -> Child {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", self.path("cache")).args(args);
-        command.envs(self.environment.iter().cloned());
+        command.envs(self.environment.iter().cloned()).envs(fault.map(|fault| ("LABELGS_FAULT", fault)));
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it runs")
     }
 

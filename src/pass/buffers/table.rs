@@ -56,6 +56,7 @@ crate::buffers! { cures::whole;
     LABEL_TABLES "label_tables": 16, Domain::LABEL_TABLES, Class::Step, None, "Labels that each walk of a tile sums, `[T, rounds]`.";
     VOTES_LOW "votes_low": 4, Domain::VOTE_CELLS, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words.";
     VOTES_HIGH "votes_high": 4, Domain::VOTE_CELLS, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: high words.";
+    NONFINITE_ROWS "nonfinite_rows": 4, Domain::fixed(64), Class::Persistent, None, "First row of each plane of the state with a NaN or infinity.";
     FAILURE "failure": 4, Domain::ONE, Class::Persistent, None, "Sticky failure bits; while one is set, passes do not change the model.";
     V_INSTANCES_A "v_instances_a": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_mean2d, v_conic xy.";
     V_INSTANCES_B "v_instances_b": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_conic z, v_log_opacity, v_colour rg.";

@@ -1,13 +1,10 @@
 //! Checkpoints of a trainer. A resumed training gives the same bits as an uninterrupted one.
 
 use super::Trainer;
+use crate::engine::state::Copied;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::pass::SHARED_PLANES;
-use crate::pass::buffers::TABLE;
-use crate::records::checkpoint::Plane;
 use crate::scene::Dataset;
-use crate::scheduler::plan::Buf;
 use crate::train::input::sampler::ViewOrder;
 use crate::train::input::step_input::TrainView;
 use crate::train::setup::region::Region;
@@ -18,16 +15,37 @@ use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// The state of a training on its way from the device, for any thread.
+pub struct PendingState {
+    /// All but the planes.
+    pub state: TrainState,
+    planes: Copied,
+}
+
+impl PendingState {
+    /// Returns the whole state, read from the device if need be.
+    pub fn whole(self) -> Result<TrainState> {
+        Ok(TrainState { planes: self.planes.planes()?, ..self.state })
+    }
+}
+
 impl Trainer {
     /// Waits for the steps in flight and returns the state of the training.
     pub fn state(&mut self) -> Result<TrainState> {
+        self.copied_state()?.whole()
+    }
+
+    /// Waits for the steps in flight and copies the state of the training: on a card in its memory, so that steps go on before
+    /// it is read.
+    pub fn copied_state(&mut self) -> Result<PendingState> {
         self.drain()?;
+        self.check_finite()?;
         let print =
             |view: &TrainView| ViewFingerprint::new(&view.name, &view.camera, Some(&view.photo), view.mask.as_ref());
         if self.fingerprints.is_empty() {
             self.fingerprints = self.context.views.iter().map(print).collect();
         }
-        Ok(TrainState {
+        let state = TrainState {
             labelgs: env!("CARGO_PKG_VERSION").to_owned(),
             device: device(self.context.engine.gpu()),
             step: self.step,
@@ -46,29 +64,23 @@ impl Trainer {
             run: serde_json::Value::Null,
             strategy: StrategyState::of(&*self.context.strategy),
             shared: self.context.shared.kept(),
-            planes: self.finite_planes()?,
+            planes: Vec::new(),
             path: PathBuf::new(),
-        })
+        };
+        Ok(PendingState { state, planes: self.context.engine.copy_state(self.context.strategy.planes())? })
     }
 
-    /// Reads the planes of the state. A NaN or infinity is an error: the checkpoint would be useless. No pass has
-    /// checked the result of the last step yet.
-    fn finite_planes(&mut self) -> Result<Vec<Plane>> {
-        let planes = self.context.engine.download_state(self.context.strategy.planes())?;
-        let is_finite = |word: &u32| f32::from_bits(*word).is_finite();
-        for plane in planes.iter().filter(|plane| plane.name != TABLE[Buf::LABELS.index()].name) {
-            if let Some(at) = plane.data.iter().position(|word| !is_finite(word)) {
-                let row = at / plane.words.max(1) as usize;
-                let is_shared = SHARED_PLANES.iter().any(|buf| TABLE[buf.index()].name == plane.name);
-                let of = if is_shared { "row" } else { "Gaussian" };
-                return Err(Error::Numeric {
-                    quantity: format!("{} of {of} {row} is not finite, so there is no checkpoint", plane.name),
-                    step: u64::from(self.step),
-                    view: "of this step or one before".to_owned(),
-                });
-            }
-        }
-        Ok(planes)
+    /// Looks for a NaN or infinity in the planes of the state: the checkpoint would be useless. No pass has checked the result
+    /// of the last step yet.
+    fn check_finite(&mut self) -> Result<()> {
+        let found = self.context.engine.nonfinite(self.context.strategy.planes())?;
+        let Some((name, row, is_shared)) = found else { return Ok(()) };
+        let of = if is_shared { "row" } else { "Gaussian" };
+        Err(Error::Numeric {
+            quantity: format!("{name} of {of} {row} is not finite, so there is no checkpoint"),
+            step: u64::from(self.step),
+            view: "of this step or one before".to_owned(),
+        })
     }
 
     /// Resumes a training from `state`, with the same bits on the same device as without the interruption. `dataset`

@@ -5,6 +5,7 @@ mod results;
 mod sentinel;
 mod timing;
 
+pub use checkpoint::PendingState;
 pub(crate) use timing::StepTimes;
 
 use crate::engine::{Engine, EngineSize, InFlight};

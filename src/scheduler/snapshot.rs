@@ -1,0 +1,125 @@
+//! Copies of buffers as they are between two lists, read by another thread while lists go on.
+
+use super::Scheduler;
+use super::recorder::Recorder;
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, CommandBuffer, Gpu, Lane, MemoryKind, Timeline};
+use crate::scheduler::plan::{Buf, memory};
+use std::sync::Arc;
+
+/// Copies of buffers in device memory.
+pub struct Snapshot {
+    gpu: Arc<Gpu>,
+    /// Copies, in the order in which they were asked for; none for a buffer without words.
+    copies: Vec<Option<Buffer>>,
+    /// The submit that makes them.
+    made: (Arc<Timeline>, u64),
+}
+
+impl Scheduler {
+    /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice.
+    pub fn snapshot(&mut self, buffers: &[(Buf, u64)]) -> Result<Snapshot> {
+        let bytes = buffers.iter().map(|(_, words)| words * 4).sum::<u64>();
+        self.check_fits("snapshot", bytes)?;
+        let mut copies = Vec::new();
+        for &(buf, words) in buffers {
+            self.range(buf, 0, 0, words * 4)?;
+            let copy = |words: u64| Buffer::new(&self.gpu, "snapshot", words * 4, MemoryKind::Device);
+            copies.push((words > 0).then(|| copy(words)).transpose()?);
+        }
+        let made = &copies;
+        self.immediately(|recorder, storage, _| {
+            for (&(buf, _), copy) in buffers.iter().zip(made) {
+                let Some(copy) = copy else { continue };
+                recorder.copy((storage.own(buf, 0)?, 0), (copy, 0), copy.bytes())?;
+            }
+            Ok(())
+        })?;
+        Ok(Snapshot { gpu: Arc::clone(&self.gpu), copies, made: (Arc::clone(&self.timeline), self.submitted) })
+    }
+
+    /// Fails if the bytes of a further buffer do not fit under the limit.
+    fn check_fits(&self, what: &str, bytes: u64) -> Result<()> {
+        let (needed, limit) = (self.memory_total().saturating_add(bytes), self.limits.max_memory);
+        if needed <= limit {
+            return Ok(());
+        }
+        Err(Error::OutOfMemory {
+            what: what.to_owned(),
+            needed,
+            limit_name: "the memory of this device that may be used".to_owned(),
+            limit,
+            cure: (self.table.cure)(),
+        })
+    }
+}
+
+impl Snapshot {
+    /// Reads the words of all copies, by the queue for copies if the device has one. For any thread.
+    pub fn read(self) -> Result<Vec<Vec<u32>>> {
+        let mut halves = Halves::new(&self.gpu)?;
+        let mut all = Vec::new();
+        for copy in &self.copies {
+            let mut words = vec![0_u32; copy.as_ref().map_or(0, |copy| copy.bytes() as usize / 4)];
+            if let Some(copy) = copy {
+                halves.read(copy, bytemuck::cast_slice_mut(&mut words), (&self.made.0, self.made.1))?;
+            }
+            all.push(words);
+        }
+        Ok(all)
+    }
+}
+
+/// Two halves of staging memory: one is filled while the other is read.
+struct Halves {
+    gpu: Arc<Gpu>,
+    staging: [Buffer; 2],
+    commands: [CommandBuffer; 2],
+    timeline: Timeline,
+    submitted: u64,
+}
+
+impl Halves {
+    fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+        let staging = || Buffer::new(gpu, "staging down", memory::STAGING_BYTES / 2, MemoryKind::Download);
+        let command = || CommandBuffer::new(gpu, Lane::Transfer);
+        Ok(Self {
+            gpu: Arc::clone(gpu),
+            staging: [staging()?, staging()?],
+            commands: [command()?, command()?],
+            timeline: Timeline::new(gpu)?,
+            submitted: 0,
+        })
+    }
+
+    /// Reads all of a buffer after the value of a timeline.
+    fn read(&mut self, from: &Buffer, to: &mut [u8], after: (&Timeline, u64)) -> Result<()> {
+        let half = self.staging[0].bytes() as usize;
+        let mut waiting: Option<(u64, &mut [u8])> = None;
+        for (piece, to) in to.chunks_mut(half).enumerate() {
+            let value = self.submitted + 1;
+            let side = value as usize % 2;
+            let recorder = Recorder::begin(&self.gpu, &self.commands[side])?;
+            recorder.copy((from, (piece * half) as u64), (&self.staging[side], 0), to.len() as u64)?;
+            recorder.end()?;
+            self.gpu.submit(Lane::Transfer, &[&self.commands[side]], Some(after), (&self.timeline, value))?;
+            self.submitted = value;
+            if let Some((value, to)) = waiting.replace((value, to)) {
+                self.take(value, to)?;
+            }
+        }
+        waiting.map_or(Ok(()), |(value, to)| self.take(value, to))
+    }
+
+    fn take(&self, value: u64, to: &mut [u8]) -> Result<()> {
+        self.timeline.wait(value)?;
+        self.staging[value as usize % 2].read(0, to)
+    }
+}
+
+impl Drop for Halves {
+    fn drop(&mut self) {
+        // Memory in use must not be freed.
+        let _ = self.timeline.wait(self.submitted);
+    }
+}
