@@ -9,6 +9,7 @@ pub mod blend;
 pub mod densify;
 pub mod disagreement;
 pub mod exposure;
+pub mod finite;
 pub mod lift;
 pub mod loss;
 pub mod model;

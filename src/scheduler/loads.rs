@@ -208,9 +208,15 @@ impl Scheduler {
     }
 
     /// Frees the data that are kept, to make room. Returns whether there were some.
-    pub(super) fn free_kept(&mut self) -> Result<bool> {
+    fn free_kept(&mut self) -> Result<bool> {
         self.wait_all()?;
         Ok(self.loads.as_mut().is_some_and(Loads::free))
+    }
+
+    /// Frees the data that are kept, and waits for the memory of snapshots. Returns whether there was something.
+    pub(super) fn free_more(&mut self) -> Result<bool> {
+        let was_kept = self.free_kept()?;
+        Ok(self.wait_for_snapshots() || was_kept)
     }
 
     /// Frees the data that are kept unless `bytes` fit beside them.

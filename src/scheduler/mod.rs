@@ -25,7 +25,7 @@ use crate::stage::Stage;
 use loads::Loads;
 use recorder::Recorder;
 use recording::Recording;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use storage::Storage;
 use transfer::Staging;
 
@@ -88,6 +88,8 @@ pub struct Scheduler {
     /// On a device whose data go through staging.
     loads: Option<Loads>,
     traffic: Traffic,
+    /// Those whose memory is not free yet.
+    snapshots: Vec<Weak<()>>,
     /// The list that was prepared or submitted last; `upload` and `download` access its scratch buffers.
     current: Option<usize>,
     generation: u64,
@@ -115,6 +117,7 @@ impl Scheduler {
             frame_busy: vec![0; limits.frames],
             loads: limits.stages.then(|| Loads::new(&gpu, limits.frames)).transpose()?,
             traffic: Traffic::default(),
+            snapshots: Vec::new(),
             current: None,
             generation: 0,
             counts,
@@ -247,7 +250,7 @@ impl Scheduler {
         self.storage.drop_arena();
         match self.resize_own(counts.clone()) {
             // Drivers may offer less memory than they report.
-            Err(error) if error.is_out_of_memory() && self.free_kept()? => self.resize_own(counts),
+            Err(error) if error.is_out_of_memory() && self.free_more()? => self.resize_own(counts),
             other => other,
         }
     }

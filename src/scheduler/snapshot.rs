@@ -6,6 +6,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Lane, MemoryKind, Timeline};
 use crate::scheduler::plan::{Buf, memory};
 use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 
 /// Copies of buffers in device memory.
 pub struct Snapshot {
@@ -14,10 +16,13 @@ pub struct Snapshot {
     copies: Vec<Option<Buffer>>,
     /// The submit that makes them.
     made: (Arc<Timeline>, u64),
+    /// The scheduler waits for its end where memory is short.
+    _alive: Arc<()>,
 }
 
 impl Scheduler {
-    /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice.
+    /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice. Another
+    /// thread has to read or drop the copies: growth may wait for their memory.
     pub fn snapshot(&mut self, buffers: &[(Buf, u64)]) -> Result<Snapshot> {
         let bytes = buffers.iter().map(|(_, words)| words * 4).sum::<u64>();
         self.check_fits("snapshot", bytes)?;
@@ -35,7 +40,22 @@ impl Scheduler {
             }
             Ok(())
         })?;
-        Ok(Snapshot { gpu: Arc::clone(&self.gpu), copies, made: (Arc::clone(&self.timeline), self.submitted) })
+        let alive = Arc::new(());
+        self.snapshots.retain(|old| old.strong_count() > 0);
+        self.snapshots.push(Arc::downgrade(&alive));
+        let made = (Arc::clone(&self.timeline), self.submitted);
+        Ok(Snapshot { gpu: Arc::clone(&self.gpu), copies, made, _alive: alive })
+    }
+
+    /// Waits until other threads have read all snapshots, so that what fits in memory does not depend on when they do. Returns
+    /// whether there were some.
+    pub(super) fn wait_for_snapshots(&mut self) -> bool {
+        let was_there = self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0);
+        while self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0) {
+            thread::sleep(Duration::from_millis(1));
+        }
+        self.snapshots.clear();
+        was_there
     }
 
     /// Fails if the bytes of a further buffer do not fit under the limit.

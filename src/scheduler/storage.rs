@@ -203,7 +203,7 @@ impl Scheduler {
         for (page, bytes) in merged.iter().enumerate() {
             let name = format!("scratch page {page}");
             let page = match Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device) {
-                Err(error) if error.is_out_of_memory() && self.free_kept()? => {
+                Err(error) if error.is_out_of_memory() && self.free_more()? => {
                     Buffer::new(&self.gpu, &name, *bytes, MemoryKind::Device)?
                 }
                 other => other?,

@@ -10,6 +10,7 @@ mod bands;
 mod blend;
 mod depth_prior;
 mod disagreement;
+mod finite;
 pub mod fixture;
 mod label_map;
 mod labels;

@@ -102,3 +102,18 @@ fn a_snapshot_keeps_what_lists_change_afterwards() {
     // Without room for it, the owner reads at once.
     assert!(scheduler.snapshot(&[(MODEL, 100), (PLANES, 400)]).is_err_and(|error| error.is_out_of_memory()));
 }
+
+#[test]
+fn a_snapshot_may_outlive_its_scheduler() {
+    let Some(gpu) = device() else { return };
+    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap();
+    let snapshot = scheduler.snapshot(&[(MODEL, 100)]).unwrap();
+    let reader = std::thread::spawn(|| {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        snapshot.read().unwrap()
+    });
+    let error = scheduler.set_counts(counts(1 << 40, 500)).unwrap_err();
+    assert!(error.is_out_of_memory() && !reader.is_finished(), "what is beyond the limit is refused at once");
+    drop(scheduler);
+    assert_eq!(reader.join().unwrap()[0].len(), 100, "a snapshot outlives its scheduler");
+}
