@@ -9,7 +9,7 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
-// Work:    64 splats per workgroup, splats in depth order.
+// Work:    64 splats per workgroup, splats in depth order; variant group: the rows of their tiles are shared out.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
@@ -40,6 +40,10 @@ FETCHU(14, layer_from_label);
 
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
+#ifdef GROUP
+#include "rows.glsl"
+shared uint tiles[WALKERS];
+#endif
 
 // Writes the record of a splat. Returns where its tiles are.
 Ellipse project(StepUniforms u, uint s, uint i) {
@@ -74,11 +78,23 @@ Ellipse project(StepUniforms u, uint s, uint i) {
 
 // Counts the tiles of the splat of this invocation, which may have no rows.
 uint count_tiles(StepUniforms u, Ellipse e) {
+#ifdef GROUP
+    uint lane = gl_LocalInvocationID.x, unused;
+    tiles[lane] = 0u;
+    uint rows = share_rows(e, 0u, unused);
+    for (uint row = lane; row < rows; row += WALKERS) {
+        uint splat = entry_at(0u, row);
+        atomicAdd(tiles[splat], tiles_of_row(u, ellipse_of(splat), row - starts[splat]).y);
+    }
+    barrier();
+    return tiles[lane];
+#else
     uint count = 0u;
     for (uint row = 0u; row < e.rows; row++) {
         count += tiles_of_row(u, e, row).y;
     }
     return count;
+#endif
 }
 
 void main() {

@@ -8,7 +8,7 @@
 #include "ellipse.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile of a splat.
 // Work:    64 splats per workgroup. A splat's instances are contiguous: first those of the scene layer, then
-//          those of its object layer; keys are layer * tile_count + tile.
+//          those of its object layer; keys are layer * tile_count + tile. Variant group: rows and tiles are shared out.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  tile_keys [I]; splat_from_instance [I]; variant sweep: sweep (histograms of the digits of the keys)
@@ -31,6 +31,10 @@ FETCHU(10, layer_from_label);
 #ifdef SWEEP
 INOUT(11, uint, sweep);
 #include "digit_counts.glsl"
+#endif
+
+#ifdef GROUP
+#include "rows.glsl"
 #endif
 
 // Where the instances of a splat go.
@@ -60,6 +64,33 @@ void put_tile(StepUniforms u, Target t, uint n, uint tile) {
     }
 }
 
+#ifdef GROUP
+shared Target targets[WALKERS];
+shared uint tiles_before[WALKERS]; // of the splats before
+shared uvec2 row_tiles[WALKERS];   // of a row: first tile, splat
+
+// Rows of tiles by invocation, 64 at a time; then their tiles by invocation, so that neighbours write to neighbouring places.
+void emit(StepUniforms u, Target t, Ellipse e) {
+    uint lane = gl_LocalInvocationID.x, written = 0u;
+    targets[lane] = t;
+    uint rows = share_rows(e, t.count, tiles_before[lane]);
+    for (uint from = 0u; from < rows; from += WALKERS) {
+        uint row = from + lane, splat = entry_at(0u, row);
+        Ellipse shared_out = ellipse_of(splat);
+        uvec2 tiles = row < rows ? tiles_of_row(u, shared_out, row - starts[splat]) : uvec2(0u), all;
+        uint before = sums_before(uvec2(tiles.y, 0u), all).x;
+        starts[WALKERS + lane] = before;
+        row_tiles[lane] = uvec2((shared_out.y_min + row - starts[splat]) * u.tiles_x + tiles.x, splat);
+        barrier();
+        for (uint k = lane; k < all.x; k += WALKERS) {
+            uint r = entry_at(1u, k);
+            splat = row_tiles[r].y;
+            put_tile(u, targets[splat], written + k - tiles_before[splat], row_tiles[r].x + k - starts[WALKERS + r]);
+        }
+        written += all.x;
+    }
+}
+#else
 void emit(StepUniforms u, Target t, Ellipse e) {
     uint written = 0u;
     for (uint row = 0u; row < e.rows; row++) {
@@ -71,6 +102,7 @@ void emit(StepUniforms u, Target t, Ellipse e) {
         written += tiles.y;
     }
 }
+#endif
 
 void main() {
     StepUniforms u = step;

@@ -22,3 +22,4 @@ mod step;
 mod sweeps;
 mod tile;
 mod votes;
+mod walks;
