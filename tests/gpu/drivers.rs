@@ -56,13 +56,16 @@ fn the_selftest_passes_on_other_drivers() {
     }
 }
 
-/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either.
+/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either; and walks of
+/// workgroups give the same bits again.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn sorts_that_look_back_change_no_bit() {
     for driver in [Vec::new()].into_iter().chain(swiftshader()) {
         let model = |sort: &str| {
-            let place = Place::on([&driver[..], &[("LABELGS_SORT", sort.to_owned())]].concat());
+            let place = Place::on(
+                [&driver[..], &[("LABELGS_SORT", sort.to_owned()), ("LABELGS_WALK", "group".into())]].concat(),
+            );
             succeeded(&place.trained("out", &["--iterations", "3", "--set", "label_from=1"]));
             place.model("out", 3)
         };
