@@ -9,14 +9,14 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
-// Work:    64 splats per workgroup, splats in depth order.
+// Work:    64 splats per workgroup, splats in depth order; variant group: the rows of their tiles are shared out.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
 //          variant antialiased: opacity times the root of the coverage (Mip-Splatting).
-// Mirror:  src/reference/project.rs::project_forward
+// Mirror:  src/reference/project.rs::project_forward, tile.rs::row_interval
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;
@@ -40,14 +40,13 @@ FETCHU(14, layer_from_label);
 
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
+#ifdef GROUP
+#include "rows.glsl"
+shared uint tiles[WALKERS];
+#endif
 
-void main() {
-    StepUniforms u = step;
-    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (s >= counters.visible_count) {
-        return;
-    }
-    uint i = fetchu(gaussian_from_splat, s);
+// Writes the record of a splat. Returns where its tiles are.
+Ellipse project(StepUniforms u, uint s, uint i) {
     vec4 mean = fetch4(means, i);
     Projection p = project_gaussian(u, mean.xyz, fetch4(scales, i).xyz, fetch4(quats, i));
     vec3 q = exponent_from_conic(p.conic);
@@ -57,32 +56,62 @@ void main() {
 #endif
     vec2 centre = vec2(u.fx, u.fy) * p.slope_raw + vec2(u.cx, u.cy);
     float reach = 2.0 * LN2 * (log2_o - LOG2_ALPHA_MIN);
-    vec2 extent = sqrt(p.cov.xz * max(reach, 0.0)) * 1.0001 + 0.01;
+    vec2 extent = box_of(sqrt(p.cov.xz * max(reach, 0.0)));
     vec3 direction = normalize(mean.xyz - u.camera_centre);
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
     vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
 
-    TileRect rect = tile_rect(u, centre, extent);
-    uint touched = 0u, tx = rect.x_min, ty = rect.y_min;
     bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + raw.x + raw.y + raw.z);
     if (!sane) {
         atomicAdd(counters.unprojected_count, 1u);
         atomicMin(counters.unprojected_first, i);
     }
-    uint candidates = sane ? rect.count : 0u;
-    for (uint k = 0u; k < candidates; k++) {
-        touched += tile_touched(u, tx, ty, centre, q, log2_o) ? 1u : 0u;
-        bool wrap = tx == rect.x_max;
-        tx = wrap ? rect.x_min : tx + 1u;
-        ty += wrap ? 1u : 0u;
-    }
-#ifdef LABELS
-    touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
-#endif
     splats[3u * s] = vec4(centre, q.x, q.y);
     splats[3u * s + 1u] = vec4(q.z, log2_o, colour.x, colour.y);
     splats[3u * s + 2u] = vec4(colour.z, p.view.z, extent);
-    tiles_touched[s] = touched;
     splat_from_gaussian[i] = s;
+    Ellipse e = ellipse(u, centre, extent, q, log2_o);
+    e.rows = sane ? e.rows : 0u;
+    return e;
+}
+
+// Counts the tiles of the splat of this invocation, which may have no rows.
+uint count_tiles(StepUniforms u, Ellipse e) {
+#ifdef GROUP
+    uint lane = gl_LocalInvocationID.x, unused;
+    tiles[lane] = 0u;
+    uint rows = share_rows(e, 0u, unused);
+    for (uint row = lane; row < rows; row += WALKERS) {
+        uint splat = entry_at(0u, row);
+        atomicAdd(tiles[splat], tiles_of_row(u, ellipse_of(splat), row - starts[splat]).y);
+    }
+    barrier();
+    return tiles[lane];
+#else
+    uint count = 0u;
+    for (uint row = 0u; row < e.rows; row++) {
+        count += tiles_of_row(u, e, row).y;
+    }
+    return count;
+#endif
+}
+
+void main() {
+    StepUniforms u = step;
+    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x, i = 0u;
+    bool is_splat = s < counters.visible_count;
+    Ellipse e;
+    e.rows = 0u;
+    if (is_splat) {
+        i = fetchu(gaussian_from_splat, s);
+        e = project(u, s, i);
+    }
+    uint touched = count_tiles(u, e);
+    if (is_splat) {
+#ifdef LABELS
+        touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
+#endif
+        tiles_touched[s] = touched;
+    }
 }

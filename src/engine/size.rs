@@ -75,17 +75,17 @@ impl EngineSize {
         Self { depths, ..self }
     }
 
-    /// Returns the most tiles that the kernels of the device can walk; `None` without a limit.
-    fn most_tiles(&self, shape: &KernelShape) -> Option<u32> {
-        // A splat may touch every tile twice, with its object's layer; one loop walks them.
+    /// Returns the most tiles and rows of tiles that the kernels of the device can walk; `None` without a limit.
+    fn most_rounds(&self, shape: &KernelShape) -> Option<u32> {
+        // A splat may touch every tile twice, with its object's layer; one loop walks them, another one rows and their tiles.
         let times = if self.labels.is_some_and(|labels| labels.layers > 0) { 2 } else { 1 };
         shape.loop_rounds.map(|rounds| rounds / times)
     }
 
     /// Returns the most rows of a picture that a list can draw; `None` without a limit.
     pub(crate) fn band(&self, shape: &KernelShape) -> Option<u32> {
-        let tiles_x = shape.tiles(self.image.0, 1).0.max(1);
-        self.most_tiles(shape).map(|most| (most / tiles_x).max(1) * shape.tile_height)
+        let rounds = shape.tiles(self.image.0, 1).0 + 1;
+        self.most_rounds(shape).map(|most| (most / rounds).max(1) * shape.tile_height)
     }
 
     /// Limits the image to one band ([`Engine::bands`](super::Engine::bands)).
@@ -98,11 +98,11 @@ impl EngineSize {
     pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);
-        let tiles = u64::from(tiles_x) * u64::from(tiles_y);
-        let Some(most) = self.most_tiles(shape).filter(|&most| tiles > u64::from(most)) else { return Ok(()) };
+        let rounds = (u64::from(tiles_x) + 1) * u64::from(tiles_y);
+        let Some(most) = self.most_rounds(shape).filter(|&most| rounds > u64::from(most)) else { return Ok(()) };
         let problem = format!(
-            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} are supported on this device; choose a \
-             smaller size"
+            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} tiles and rows are supported on this \
+             device; choose a smaller size"
         );
         Err(Error::usage(Setting("max_resolution"), problem))
     }

@@ -8,7 +8,7 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Sums the records and updates the densification statistic.
 pub(super) fn gather(b: &mut Builder) {
     b.list.stage = Stage::GATHER;
-    pass!(b, gather(labels: b.supervision.has_layers()) {
+    pass!(b, gather(labels: b.supervision.has_layers(), group: b.shape.group_walks) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
         v_instances_c: Buf::V_INSTANCES_C, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS,

@@ -40,7 +40,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
 
 fn project_forward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    pass!(b, project_forward(labels: b.supervision.has_layers()) {
+    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks) {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,

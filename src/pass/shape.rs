@@ -27,6 +27,9 @@ pub struct KernelShape {
     pub loss_tile: u32,
     /// Pixels of a mask on the device have 16 bits.
     pub narrow_labels: bool,
+    /// The tiles of splats, and the records of those with many, are shared out among the invocations of a workgroup; else one
+    /// invocation walks those of a splat.
+    pub group_walks: bool,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -61,7 +64,8 @@ impl KernelShape {
         let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
-        let shape = Self { narrow_labels, ..shape };
+        let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
+        let shape = Self { narrow_labels, group_walks, ..shape };
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -137,6 +141,7 @@ impl KernelShape {
             sweep_items: 0,
             loss_tile: 0,
             narrow_labels: false,
+            group_walks: false,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),

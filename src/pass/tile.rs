@@ -14,7 +14,7 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
-    pass!(b, emit_instances(labels: b.supervision.has_layers(), sweep: sweep) {
+    pass!(b, emit_instances(labels: b.supervision.has_layers(), group: b.shape.group_walks, sweep: sweep) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,

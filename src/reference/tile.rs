@@ -1,4 +1,5 @@
-//! Tiles in which a splat counts: by testing every pixel, and by a continuous test over the tile's pixel centres.
+//! Tiles in which a splat counts: by testing every pixel, by a continuous test over the tile's pixel centres, and in closed form
+//! for a row of tiles.
 
 use super::Rules;
 use super::splat::Splat;
@@ -103,6 +104,31 @@ pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>
         }
     }
     (tiles, margin)
+}
+
+/// Columns of tiles `[start, end)` with a column of pixel centres that the splat's ellipse reaches within a row of tiles, between
+/// its first and last row of pixel centres; in closed form.
+pub fn row_interval(rules: &Rules, splat: &Splat, grid: &TileGrid, row: usize) -> (usize, usize) {
+    // A dx^2 + 2 B dx dy + C dy^2 <= size is A (dx + B dy / A)^2 + (C - B^2 / A) dy^2 <= size.
+    let [a, b, c] = splat.conic;
+    let size = 2.0 * std::f64::consts::LN_2 * (splat.opacity.log2() - rules.exponent_min());
+    let rest = (a * c - b * b) / a;
+    let (top, bottom) = grid.span_y(row);
+    let height = (size / rest).sqrt();
+    let from = (top as f64 + 0.5 - splat.mean2d[1]).max(-height);
+    let to = (bottom as f64 - 0.5 - splat.mean2d[1]).min(height);
+    if size < 0.0 || from > to {
+        return (0, 0);
+    }
+    // The rightmost point of the ellipse is where the normal has no dy: B dx + C dy = 0.
+    let tip = -b / c * (size / (a - b * b / c)).sqrt();
+    let ends = [-1.0, 1.0].map(|side| {
+        let dy = (side * tip).clamp(from, to);
+        splat.mean2d[0] - b / a * dy + side * ((size - rest * dy * dy).max(0.0) / a).sqrt()
+    });
+    let first = (ends[0] - 0.5).ceil().max(0.0);
+    let last = (ends[1] - 0.5).floor().min(grid.size.0 as f64 - 1.0);
+    if first > last { (0, 0) } else { (first as usize / grid.tile.0, last as usize / grid.tile.0 + 1) }
 }
 
 /// Tiles whose largest exponent is at most `slack` (log2 units) below the cut. An engine that may add tiles lists at

@@ -44,9 +44,10 @@ fn drivers() -> Vec<Driver> {
 #[test]
 fn the_selftest_passes_on_other_drivers() {
     for (i, driver) in drivers().into_iter().enumerate() {
-        // The loss of a card on one of them.
+        // The loss and the walks of a card on one of them.
         let loss = ("LABELGS_LOSS", ["shared", "columns"][i % 2].to_owned());
-        let place = Place::on([&driver[..], &[loss]].concat());
+        let walk = ("LABELGS_WALK", ["group", "lane"][i % 2].to_owned());
+        let place = Place::on([&driver[..], &[loss, walk]].concat());
         let said = String::from_utf8_lossy(&succeeded_output(&place.labelgs(&["selftest", "--json"]))).into_owned();
         let found: serde_json::Value = serde_json::from_str(&said).expect("JSON");
         assert_eq!(found["kernels"]["emulated"], true, "{driver:?}: {found}");
@@ -55,13 +56,16 @@ fn the_selftest_passes_on_other_drivers() {
     }
 }
 
-/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either.
+/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either; and walks of
+/// workgroups give the same bits again.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn sorts_that_look_back_change_no_bit() {
     for driver in [Vec::new()].into_iter().chain(swiftshader()) {
         let model = |sort: &str| {
-            let place = Place::on([&driver[..], &[("LABELGS_SORT", sort.to_owned())]].concat());
+            let place = Place::on(
+                [&driver[..], &[("LABELGS_SORT", sort.to_owned()), ("LABELGS_WALK", "group".into())]].concat(),
+            );
             succeeded(&place.trained("out", &["--iterations", "3", "--set", "label_from=1"]));
             place.model("out", 3)
         };
@@ -173,8 +177,11 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) };
         // The kernels of a card, but for the smallest size.
         let loss_tile = if size > 32 { 8 } else { 16 };
-        let shape =
-            if size > 4 { KernelShape { loss_tile, narrow_labels: true, ..shape }.with_sweeps_of(4) } else { shape };
+        let shape = if size > 4 {
+            KernelShape { loss_tile, narrow_labels: true, group_walks: true, ..shape }.with_sweeps_of(4)
+        } else {
+            shape
+        };
         assert!(shape.emulated && shape.subgroup == size, "{shape:?}");
         let passes = |check: selftest::Check| {
             assert!(check.verdict.is_ok(), "{} at {size}: {:?}", check.name, check.verdict);

@@ -26,7 +26,7 @@ fn bands_make_the_picture_of_the_whole() {
     };
     // Two rows of tiles at a time.
     let tiles_x = KernelShape::of(turn.capabilities()).tiles(61, 1).0;
-    let ((whole, expected, labels), (band, found, in_bands)) = (draw(None), draw(Some(2 * tiles_x + 1)));
+    let ((whole, expected, labels), (band, found, in_bands)) = (draw(None), draw(Some(2 * tiles_x + 3)));
     assert!(whole == 45 && band * 2 < 45, "bands of {band} rows");
     let floats = |drawn: &Rendered| -> Vec<f64> {
         let colours = drawn.rgb.as_flattened().iter().chain(&drawn.alpha).chain(&drawn.depth).chain(&drawn.top_weight);

@@ -23,3 +23,4 @@ mod step;
 mod sweeps;
 mod tile;
 mod votes;
+mod walks;

@@ -2,14 +2,16 @@
 
 use super::blend::opaque_scene;
 use super::fixture::{Fixture, prove};
+use crate::reference::Rules;
 use crate::reference::scan::{compact, exclusive_scan};
 use crate::reference::sort::radix_sort;
-use crate::reference::tile::{TileGrid, tile_lengths, tile_ranges, tiles_within, touched_tiles};
+use crate::reference::tile::{TileGrid, counted_tiles, row_interval, tile_lengths, tile_ranges, tiles_within};
 use crate::support::compare::{Summary, check, exact};
 use crate::support::device;
+use crate::support::scenes::{Shape, generator, scene, uniform};
 use labelgs::scheduler::plan::Buf;
 
-/// Log2 units that the device's test may err on the side of one tile too many: 0.01, and 2e-6 of the exponent's terms.
+/// Log2 units that the device may err on the side of one tile too many: 0.01, 2e-6 of the exponent's terms, and 0.001 px.
 const SLACK: f64 = 0.02;
 
 #[test]
@@ -45,7 +47,7 @@ fn tile_lists_equal_their_mirror() {
                 let moved = tiles.iter().map(|tile| (layer as u32 + 1) * uniforms.tile_count + tile);
                 exact(&all[tiles.len()..], &moved.collect::<Vec<_>>())?;
             }
-            let (least, most) = (touched_tiles(rules, splat, &grid).0, tiles_within(rules, splat, &grid, SLACK));
+            let (least, most) = (counted_tiles(rules, splat, &grid), tiles_within(rules, splat, &grid, SLACK));
             if !tiles.is_sorted() || !least.iter().all(|t| tiles.contains(t)) || !tiles.iter().all(|t| most.contains(t))
             {
                 return Err(format!(
@@ -77,4 +79,52 @@ fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_i
     let listed = compact(&flags);
     assert_eq!(counters.layer_tile_count as usize, listed.len());
     check("layer_tiles", exact(&fixture.get::<u32>(Buf::LAYER_TILES, listed.len()), &listed));
+}
+
+/// Round splats, needles in all directions, huge ones, and centres far outside: in every tile where a pixel counts, in no tile
+/// beyond the rounding, and in each row in neighbours.
+#[test]
+fn tiles_of_needles_and_giants_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let mut scene = scene(82, &Shape { gaussians: 600, width: 61, height: 45, sh_degree: 0, ..Shape::default() });
+    let mut random = generator(83);
+    for (index, mean) in scene.gaussians.means.iter_mut().enumerate() {
+        let far = if index % 2 == 0 { 1.0 } else { 5.0 };
+        *mean = mean.map(|value| value * far);
+        scene.gaussians.scales[index] = [0; 3].map(|_| uniform(&mut random, -8.0, 6.0) as f32);
+    }
+    let mut fixture = Fixture::new(turn, scene, false);
+    let pairs = fixture.train().counters.instance_count as usize;
+    let (splats, shape) = (fixture.splats(), *fixture.engine.shape());
+    let grid = TileGrid { size: fixture.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
+    let (keys, owners) = (fixture.sorted_pairs(pairs).0, fixture.sorted_splats(pairs));
+    let mut found = vec![Vec::new(); splats.len()];
+    keys.iter().zip(&owners).for_each(|(&key, &owner)| found[owner as usize].push(key as usize));
+    let (mut listed, mut beyond) = (0, 0);
+    for (splat, tiles) in splats.iter().zip(&found) {
+        // Roundings of the terms of the exponent are larger than the cut for such a needle; 0.001 px at a steep border besides.
+        let (width, height) = grid.size;
+        let far = [(splat.mean2d[0], width as f64), (splat.mean2d[1], height as f64)]
+            .map(|(m, size)| m.abs().max((size - m).abs()));
+        let [a, b, c] = splat.conic;
+        let terms = a * far[0] * far[0] + 2.0 * b.abs() * far[0] * far[1] + c * far[1] * far[1];
+        let rules = Rules::default();
+        let (least, most) =
+            (counted_tiles(&rules, splat, &grid), tiles_within(&rules, splat, &grid, 0.03 + 3e-6 * terms));
+        assert!(least.iter().all(|&tile| tiles.contains(&(tile as usize))), "{splat:?}: {tiles:?}, at least {least:?}");
+        assert!(tiles.iter().all(|&tile| most.contains(&(tile as u32))), "{splat:?}: {tiles:?}, at most {most:?}");
+        for row in tiles.chunk_by(|a, b| a / grid.columns() == b / grid.columns()) {
+            assert!(row.windows(2).all(|two| two[1] == two[0] + 1), "{splat:?}: {row:?}");
+        }
+        let closed =
+            (0..grid.rows()).map(|row| row_interval(&rules, splat, &grid, row)).map(|(start, end)| end - start);
+        listed += tiles.len();
+        beyond += tiles.len().abs_diff(closed.sum());
+    }
+    println!("{beyond} of {listed} tiles within rounding");
+    assert!(
+        splats.len() > 150 && listed > 2000 && beyond * 100 < listed,
+        "{} splats, {beyond} of {listed} tiles",
+        splats.len()
+    );
 }

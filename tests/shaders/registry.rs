@@ -49,7 +49,9 @@ fn lists() -> Vec<(Capacity, PassList)> {
         .into_iter()
         .chain(emulated)
         .map(|shape| KernelShape { loss_tile: 16, narrow_labels: true, ..shape }.with_sweeps_of(8));
-    for shape in own.into_iter().chain(emulated).chain(antialiased).chain(sweeping) {
+    let one_by_one: Vec<KernelShape> = own.into_iter().chain(emulated).chain(antialiased).chain(sweeping).collect();
+    let shared_out = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape });
+    for shape in one_by_one.iter().copied().chain(shared_out) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;

@@ -18,7 +18,7 @@ fn options(turn: &Turn, tile_rows: Option<u32>, dataset: &Dataset) -> TrainerOpt
     let shape = KernelShape::of(turn.capabilities());
     // Each tile counts twice where a step may have object layers.
     let times = if dataset.train[0].mask.is_some() { 2 } else { 1 };
-    let loop_rounds = tile_rows.map(|rows| times * rows * shape.tiles(dataset.train[0].camera.width, 1).0);
+    let loop_rounds = tile_rows.map(|rows| times * rows * (shape.tiles(dataset.train[0].camera.width, 1).0 + 1));
     TrainerOptions { shape: Some(KernelShape { loop_rounds, ..shape }), ..TrainerOptions::default() }
 }
 

@@ -9,7 +9,8 @@ use crate::reference::sort::{depth_sort, radix_sort};
 use crate::reference::splat::Splat;
 use crate::reference::step::splats_of;
 use crate::reference::tile::{
-    TileGrid, counted_tiles, cull, emit_instances, exponent, tile_lengths, tile_ranges, tiles_within, touched_tiles,
+    TileGrid, counted_tiles, cull, emit_instances, exponent, row_interval, tile_lengths, tile_ranges, tiles_within,
+    touched_tiles,
 };
 use crate::reference::{Model, Row, Rules, sh};
 use crate::support::compare::{Tolerance, check, close, exact};
@@ -149,6 +150,40 @@ fn tiles_of_an_ellipse_equal_brute_force() {
         assert!(touched.is_empty() || cull(&rules, splat, grid.size).touches);
     }
     assert!(only_between > 0 && only_between * 10 < touched_count, "{only_between} of {touched_count} tiles in vain");
+}
+
+/// Round ones, needles in all directions, huge ones, and centres far outside of the picture.
+#[test]
+fn tiles_of_a_row_are_an_interval_in_closed_form() {
+    let (rules, mut random) = (Rules::default(), generator(8));
+    let grid = TileGrid { size: (61, 43), tile: (8, 4) };
+    let (mut listed, mut only_between) = (0, 0);
+    for index in 0..600 {
+        let mut draw = |low: f64, high: f64| uniform(&mut random, low, high);
+        let far = if index % 3 == 0 { 1e3 } else { 20.0 };
+        let angle = if index % 5 == 0 { 0.0 } else { draw(0.0, 3.2) };
+        let turn = DMat3::from_rotation_z(angle);
+        let size = if index % 2 == 0 { 3.0 } else { 1.0 };
+        let [first, second] = [0; 2].map(|_| 10_f64.powf(draw(-size, size)));
+        let inverse = DMat3::from_diagonal(DVec3::new(first, second, 1.0));
+        let conic = turn * inverse * turn.transpose();
+        let splat = Splat {
+            mean2d: [draw(-far, 61.0 + far), draw(-far, 43.0 + far)],
+            conic: [conic.x_axis.x, conic.x_axis.y, conic.y_axis.y],
+            opacity: draw(-8.3, -0.001).exp2(),
+            ..Splat::default()
+        };
+        let row = |row: usize| row_interval(&rules, &splat, &grid, row);
+        let found: Vec<u32> =
+            (0..grid.rows()).flat_map(|y| (row(y).0..row(y).1).map(move |x| (y * grid.columns() + x) as u32)).collect();
+        let (touched, _) = touched_tiles(&rules, &splat, &grid);
+        let counted = counted_tiles(&rules, &splat, &grid);
+        assert!(found.iter().all(|tile| touched.contains(tile)), "{splat:?}: {found:?} in {touched:?}");
+        assert!(counted.iter().all(|tile| found.contains(tile)), "{splat:?}: {counted:?} in {found:?}");
+        listed += found.len();
+        only_between += found.len() - counted.len();
+    }
+    assert!(listed > 1000 && only_between * 30 < listed, "{only_between} of {listed} tiles in vain");
 }
 
 #[test]
