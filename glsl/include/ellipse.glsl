@@ -32,7 +32,7 @@ Ellipse ellipse(StepUniforms step, vec2 mean, vec2 extent, vec3 q, float log2_o)
     precise float terms = abs(q.x) * far.x * far.x + abs(q.y) * far.x * far.y + abs(q.z) * far.y * far.y;
     precise float reach = above + 0.01 + 2e-6 * terms;
     precise float lean = -0.5 * q.y / q.x, width2 = reach / -q.x;
-    // From the box: from q it would cancel for a needle.
+    // From the box without its margin: from q it would cancel for a needle.
     precise float height = (extent.y - 0.01) / 1.0001;
     precise float taper = above / (height * height) / -q.x;
     precise float tip = lean / sqrt(taper + lean * lean) * (height * sqrt(reach / above));
