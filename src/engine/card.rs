@@ -13,7 +13,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     const RANGE: u64 = u32::MAX as u64 & !0xffff;
     let limits =
         PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
-    let shape = KernelShape { loss_tile: 16, narrow_labels: true, ..KernelShape::new(32, false) };
+    let shape = KernelShape { loss_tile: 16, narrow_labels: true, group_walks: true, ..KernelShape::new(32, false) };
     (shape.with_sweeps_of(16), limits.of_card())
 }
 

@@ -49,10 +49,7 @@ impl Capabilities {
         let family = compute_family(&families);
         let memory = memory(instance, physical, has(ash::ext::memory_budget::NAME));
         let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
-        let mut limits = limits(&core.limits, &eleven, max_buffer, memory, timestamp_bits);
-        if kind(core.device_type) != DeviceKind::Cpu {
-            limits.plan = limits.plan.of_card();
-        }
+        let mut limits = limits(&core, &eleven, max_buffer, memory, timestamp_bits);
         limits.change_by_env()?;
         hidden.limits(&mut limits);
         let mut subgroup = subgroup(&eleven, &control, &features);
@@ -149,12 +146,13 @@ fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bo
 
 /// Converts the limits.
 fn limits(
-    core: &vk::PhysicalDeviceLimits,
+    properties: &vk::PhysicalDeviceProperties,
     eleven: &vk::PhysicalDeviceVulkan11Properties<'_>,
     max_buffer: u64,
     (heap, max_memory): (u64, u64),
     timestamp_bits: u32,
 ) -> Limits {
+    let core = &properties.limits;
     let plan = PlanLimits {
         max_storage_range: u64::from(core.max_storage_buffer_range),
         max_texel_elements: u64::from(core.max_texel_buffer_elements),
@@ -173,6 +171,7 @@ fn limits(
         max_memory,
         ..PlanLimits::default()
     };
+    let plan = if kind(properties.device_type) == DeviceKind::Cpu { plan } else { plan.of_card() };
     Limits {
         plan,
         max_group_size: core.max_compute_work_group_size,
