@@ -164,6 +164,10 @@ fn profile_times_every_stage() {
     // Steps as at the end of a run, and told as what they are.
     let photo = image_size(&scene);
     assert_eq!((&found["size"], &found["sh_degree"], &found["labels"]), (&photo, &3.into(), &true.into()));
+    // A processor has the photo written for each step.
+    let pixels = photo[0].as_f64().expect("px") * photo[1].as_f64().expect("px");
+    assert!((4.0 * pixels..12.0 * pixels + 8192.0).contains(&number("/bytes_to_device")), "{found}");
+    assert!((8.0..512.0).contains(&number("/bytes_from_device")), "{found}");
     assert!(found["steps"].as_array().expect("steps").iter().all(|step| step["size"] == photo));
     assert!(
         found["steps_with_layers"].as_u64() > Some(0) && table.contains(" px, degree 3, object layers in "),

@@ -10,8 +10,8 @@ use crate::cli::support::{Context, JsonFileArg, Progress, SceneArgs, open_gpu, o
 use crate::gpu::Gpu;
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians};
-use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::PlanOptions;
+use crate::scheduler::{SchedulerOptions, Traffic};
 use crate::synth::{self, SynthOptions};
 use crate::train::{StepReport, TrainConfig, Trainer, first_model};
 use crate::{Error, Result, Setting};
@@ -196,7 +196,7 @@ fn in_the_pipeline(
         step(trainer)?;
     }
     trainer.drain()?;
-    let (wall, cpu) = (Instant::now(), cpu_time());
+    let (wall, cpu, before) = (Instant::now(), cpu_time(), trainer.engine_mut().raw().traffic());
     let mut steps = Vec::new();
     for _ in 0..window.steps {
         let start = Instant::now();
@@ -205,7 +205,9 @@ fn in_the_pipeline(
     }
     trainer.drain()?;
     let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
-    Ok(Clocks { wall: wall.elapsed(), steps, cpu })
+    let (wall, after) = (wall.elapsed(), trainer.engine_mut().raw().traffic());
+    let traffic = Traffic { up: after.up - before.up, down: after.down - before.down };
+    Ok(Clocks { wall, steps, cpu, traffic })
 }
 
 /// Returns the host threads that run the passes; `None` on a graphics card.

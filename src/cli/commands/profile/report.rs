@@ -4,7 +4,7 @@ use crate::cli::commands::devices::{shape_json, shape_text};
 use crate::cli::commands::profile::timed::Timed;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Stage};
-use crate::scheduler::Profiler;
+use crate::scheduler::{Profiler, Traffic};
 use crate::train::{LabelWork, StepReport, StepTimes};
 use crate::words::counted;
 use clap::Args;
@@ -62,6 +62,8 @@ pub(crate) struct Clocks {
     pub steps: Vec<Duration>,
     /// Processor time of the process, if the system reports it.
     pub cpu: Option<Duration>,
+    /// Bytes between host and device.
+    pub traffic: Traffic,
 }
 
 /// Median, 90th percentile and mean.
@@ -131,6 +133,8 @@ pub(crate) struct Profile {
     passes_ms: Spread,
     pipeline_ms: Spread,
     processor_ms: Option<f64>,
+    bytes_to_device: f64,
+    bytes_from_device: f64,
     counters: BTreeMap<&'static str, Spread>,
     pairs_walked: f64,
     contributing_share: f64,
@@ -186,6 +190,8 @@ impl Profile {
             passes: rows(&times, |name| name),
             passes_ms: spread(times.iter().map(|times| times.items.iter().map(|item| ms(item.2)).sum())),
             pipeline_ms: Spread { mean, ..spread(clocks.steps.iter().map(|time| time.as_secs_f64() * 1e3)) },
+            bytes_to_device: clocks.traffic.up as f64 / each,
+            bytes_from_device: clocks.traffic.down as f64 / each,
             processor_ms: clocks.cpu.map(|time| time.as_secs_f64() * 1e3 / each),
             counters: COUNTERS.iter().map(|&(name, _, value)| (name, counter(value))).collect(),
             pairs_walked,
@@ -232,6 +238,8 @@ impl Profile {
         if let Some(cpu) = self.processor_ms {
             text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "processor time, all threads, ms", "", "");
         }
+        let moved = [("bytes from the host", self.bytes_to_device), ("bytes to the host", self.bytes_from_device)];
+        moved.iter().for_each(|(name, bytes)| text += &format!("{name:<34} {:>16} {:>10} {bytes:>10.0}\n", "", ""));
         COUNTERS.iter().for_each(|(key, name, _)| text += &spread_line(name, self.counters[key], 0));
         text + "\n" + &self.per_pair_text()
     }
