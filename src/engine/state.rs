@@ -124,7 +124,7 @@ impl Engine {
             match self.sched.snapshot(&shapes) {
                 Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(snapshot) }),
                 Err(error) if error.is_out_of_memory() => {
-                    tracing::debug!("{error}; the state is read at once, and the training waits");
+                    tracing::info!("{error}; the training waits until its state is read");
                 }
                 Err(error) => return Err(error),
             }

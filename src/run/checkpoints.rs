@@ -66,8 +66,8 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         // What was begun is completed, also when the run has failed.
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
+        if let Some(Ok(Err(error))) = self.thread.take().map(JoinHandle::join) {
+            tracing::warn!("the checkpoint of step {} is missing: {error}", self.step);
         }
     }
 }

@@ -11,7 +11,8 @@ use std::time::Duration;
 
 /// Copies of buffers in device memory.
 pub struct Snapshot {
-    gpu: Arc<Gpu>,
+    /// Allocated with the copies: whoever reads needs no further memory of the device. First, since its drop waits for the reads.
+    halves: Halves,
     /// Copies, in the order in which they were asked for; none for a buffer without words.
     copies: Vec<Option<Buffer>>,
     /// The submit that makes them.
@@ -32,6 +33,7 @@ impl Scheduler {
             let copy = |words: u64| Buffer::new(&self.gpu, "snapshot", words * 4, MemoryKind::Device);
             copies.push((words > 0).then(|| copy(words)).transpose()?);
         }
+        let halves = Halves::new(&self.gpu)?;
         let made = &copies;
         self.immediately(|recorder, storage, _| {
             for (&(buf, _), copy) in buffers.iter().zip(made) {
@@ -44,7 +46,7 @@ impl Scheduler {
         self.snapshots.retain(|old| old.strong_count() > 0);
         self.snapshots.push(Arc::downgrade(&alive));
         let made = (Arc::clone(&self.timeline), self.submitted);
-        Ok(Snapshot { gpu: Arc::clone(&self.gpu), copies, made, _alive: alive })
+        Ok(Snapshot { copies, made, halves, _alive: alive })
     }
 
     /// Waits until other threads have read all snapshots, so that what fits in memory does not depend on when they do. Returns
@@ -76,13 +78,12 @@ impl Scheduler {
 
 impl Snapshot {
     /// Reads the words of all copies, by the queue for copies if the device has one. For any thread.
-    pub fn read(self) -> Result<Vec<Vec<u32>>> {
-        let mut halves = Halves::new(&self.gpu)?;
+    pub fn read(mut self) -> Result<Vec<Vec<u32>>> {
         let mut all = Vec::new();
         for copy in &self.copies {
             let mut words = vec![0_u32; copy.as_ref().map_or(0, |copy| copy.bytes() as usize / 4)];
             if let Some(copy) = copy {
-                halves.read(copy, bytemuck::cast_slice_mut(&mut words), (&self.made.0, self.made.1))?;
+                self.halves.read(copy, bytemuck::cast_slice_mut(&mut words), (&self.made.0, self.made.1))?;
             }
             all.push(words);
         }
