@@ -43,8 +43,13 @@ impl Writer {
         let to = path.clone();
         let write = move || {
             // A fault can only be slow here.
-            fault::at("checkpoint");
-            pending.whole()?.write(&to)
+            let pause = || fault::at("checkpoint");
+            pause();
+            let whole = pending.whole()?;
+            pause();
+            whole.write(&to)?;
+            pause();
+            Ok(())
         };
         let thread = thread::Builder::new().name("checkpoint".to_owned()).spawn(write);
         let thread = thread.map_err(Error::write(&path))?;

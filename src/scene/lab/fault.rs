@@ -9,7 +9,7 @@
 //! | `write` | operations on a file to write: create, write, sync, rename | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
 //! | `read` | operations on a file to read: open, read, list a folder | `IO`, `SHORT`, `INTERRUPTED` |
 //! | `loader` | loading Vulkan | any |
-//! | `checkpoint` | checkpoints of a run, before they are read from the device | `SLOW` |
+//! | `checkpoint` | three of each checkpoint of a run: before it is read from the device, before and after it is written | `SLOW` |
 //! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a NaN position |
 //! | any | | `SLOW`: the event takes a minute |
 //!
