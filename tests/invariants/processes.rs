@@ -85,8 +85,7 @@ fn without_optional_features_a_training_is_the_same() {
 }
 
 /// Tests of `pass` that choose the size of subgroups themselves, which no vector width changes.
-const OTHER_SIZES: [&str; 6] =
-    ["--skip", "emulated_subgroups", "--skip", "pass::sweeps", "--skip", "pass::walks"];
+const OTHER_SIZES: [&str; 6] = ["--skip", "emulated_subgroups", "--skip", "pass::sweeps", "--skip", "pass::walks"];
 
 /// Subgroups of 16 where the processor has vectors for them (elsewhere the same size again).
 #[test]
