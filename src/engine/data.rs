@@ -3,8 +3,8 @@
 use super::{Engine, model};
 use crate::error::Result;
 use crate::pass::SHARED_PLANES;
-use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
+use crate::scheduler::{Scheduler, Traffic};
 use crate::shaders::constants::LABEL_MASK;
 
 impl Engine {
@@ -17,6 +17,11 @@ impl Engine {
     /// Bytes that it uses on the device.
     pub fn memory(&self) -> u64 {
         self.sched.memory_total()
+    }
+
+    /// Bytes between host and device so far.
+    pub(crate) fn traffic(&self) -> Traffic {
+        self.sched.traffic()
     }
 
     /// Labels of the Gaussians; only for an engine with labels.

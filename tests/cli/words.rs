@@ -49,7 +49,7 @@ fn a_message_names_a_flag_only_if_the_command_has_it() {
     for other in ["max-gaussians", "max-resolution", "label samples", "`"] {
         assert!(!plan.contains(other), "{other}: {plan}");
     }
-    let plan = said(&["plan", "--gaussians", "10", "--size", "17000x16000", "--card", "1G"], 5);
+    let plan = said(&["plan", "--gaussians", "10", "--size", "16384x16384", "--card", "1G"], 5);
     assert!(plan.contains("lower --size or use another device"), "{plan}");
 
     // A key of a file is no flag, although another command has one of that name.

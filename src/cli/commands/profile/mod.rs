@@ -196,7 +196,7 @@ fn in_the_pipeline(
         step(trainer)?;
     }
     trainer.drain()?;
-    let (wall, cpu, before) = (Instant::now(), cpu_time(), trainer.engine_mut().raw().traffic());
+    let (wall, cpu, before) = (Instant::now(), cpu_time(), trainer.engine_mut().traffic());
     let mut steps = Vec::new();
     for _ in 0..window.steps {
         let start = Instant::now();
@@ -205,7 +205,7 @@ fn in_the_pipeline(
     }
     trainer.drain()?;
     let cpu = cpu_time().zip(cpu).map(|(after, before)| after.saturating_sub(before));
-    let (wall, after) = (wall.elapsed(), trainer.engine_mut().raw().traffic());
+    let (wall, after) = (wall.elapsed(), trainer.engine_mut().traffic());
     let traffic = Traffic { up: after.up - before.up, down: after.down - before.down };
     Ok(Clocks { wall, steps, cpu, traffic })
 }
