@@ -91,7 +91,7 @@ pub(crate) struct Copied {
 
 enum Words {
     Read(Vec<Vec<u32>>),
-    OnDevice(Snapshot),
+    OnDevice(Box<Snapshot>),
 }
 
 impl Copied {
@@ -122,7 +122,7 @@ impl Engine {
             buffers.map(|(buf, count)| (buf, u64::from(count) * u64::from(words(buf)))).collect();
         if self.runs_ahead() {
             match self.sched.snapshot(&shapes) {
-                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(snapshot) }),
+                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(Box::new(snapshot)) }),
                 Err(error) if error.is_out_of_memory() => {
                     tracing::info!("{error}; the training waits until its state is read");
                 }
