@@ -127,11 +127,11 @@ impl Engine {
                 let key = train.key.filter(|_| matches!(train.photo, Cow::Borrowed(_)));
                 sched.load(Buf::TARGET, frame, key, || Cow::Borrowed(&train.photo))?;
                 train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
-                if let Some(labels) = train.disagreement {
+                let of_layers = train.layers.as_ref().map(|layers| layers.view_labels);
+                if let Some(labels) = train.disagreement.or(of_layers) {
                     sched.load(Buf::VIEW_LABELS, frame, train.key, || shape.view_labels(labels))?;
                 }
                 let Some(layers) = &train.layers else { return Ok(()) };
-                sched.load(Buf::VIEW_LABELS, frame, train.key, || shape.view_labels(layers.view_labels))?;
                 sched.upload(Buf::LAYER_FROM_LABEL, frame, 0, &layers.layer_from_label)?;
                 sched.upload(Buf::LABEL_FROM_LAYER, frame, 0, &layers.label_from_layer)?;
                 sched.upload(Buf::LAYER_WEIGHTS, frame, 0, &layers.weights)?;

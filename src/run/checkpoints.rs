@@ -38,7 +38,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// Begins to write; without a thread it is done when this returns.
+    /// Begins to write, by a thread.
     fn begin(step: u32, path: PathBuf, pending: PendingState) -> Result<Self> {
         let to = path.clone();
         let write = move || {

@@ -38,7 +38,6 @@ pub(super) struct Loads {
     timeline: Timeline,
     submitted: u64,
     kept: HashMap<(Buf, DataKey), Arc<Buffer>>,
-    kept_bytes: u64,
 }
 
 struct Frame {
@@ -71,12 +70,12 @@ impl Loads {
         let command = || CommandBuffer::new(gpu, Lane::Transfer);
         let frame = || Ok(Frame { command: command()?, next: Vec::new(), last: Vec::new() });
         let frames = (0..frames).map(|_| frame()).collect::<Result<_>>()?;
-        Ok(Self { frames, timeline: Timeline::new(gpu)?, submitted: 0, kept: HashMap::new(), kept_bytes: 0 })
+        Ok(Self { frames, timeline: Timeline::new(gpu)?, submitted: 0, kept: HashMap::new() })
     }
 
     /// Bytes of the data that are kept.
     pub(super) fn kept_bytes(&self) -> u64 {
-        self.kept_bytes
+        self.kept.values().map(|kept| kept.bytes()).sum()
     }
 
     /// Submits the copies that the next list of a frame needs, by the queue for copies if the device has one. Returns what the
@@ -123,7 +122,6 @@ impl Loads {
         for load in self.frames[frame].next.extract_if(.., |load| is_meant(load)) {
             if let Source::Kept(place) = &load.source {
                 self.kept.retain(|_, kept| !Arc::ptr_eq(kept, place));
-                self.kept_bytes -= place.bytes();
             }
         }
     }
@@ -131,8 +129,9 @@ impl Loads {
     /// Frees what is kept, after all submits. Returns whether there was something.
     fn free(&mut self) -> bool {
         self.frames.iter_mut().for_each(|frame| frame.last.clear());
+        let was_kept = !self.kept.is_empty();
         self.kept.clear();
-        std::mem::take(&mut self.kept_bytes) > 0
+        was_kept
     }
 }
 
@@ -188,16 +187,14 @@ impl Scheduler {
     fn place_for(&mut self, buf: Buf, key: DataKey, bytes: u64) -> Option<Arc<Buffer>> {
         let most = self.limits.kept_max(self.memory_total() - self.kept_bytes());
         let loads = self.loads.as_mut()?;
-        if loads.kept_bytes + bytes > most {
+        if loads.kept_bytes() + bytes > most {
             loads.kept.retain(|(_, of), _| of.round == key.round);
-            loads.kept_bytes = loads.kept.values().map(|kept| kept.bytes()).sum();
         }
-        if loads.kept_bytes + bytes > most {
+        if loads.kept_bytes() + bytes > most {
             return None;
         }
         // Without memory for it, the data come from the host again.
         let place = Arc::new(Buffer::new(&self.gpu, "kept data", bytes, MemoryKind::Device).ok()?);
-        loads.kept_bytes += bytes;
         loads.kept.insert((buf, key), Arc::clone(&place));
         Some(place)
     }

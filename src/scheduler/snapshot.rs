@@ -2,7 +2,7 @@
 
 use super::Scheduler;
 use super::recorder::Recorder;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Buffer, CommandBuffer, Gpu, Lane, MemoryKind, Timeline};
 use crate::scheduler::plan::{Buf, memory};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ impl Scheduler {
     /// thread has to read or drop the copies: growth may wait for their memory.
     pub fn snapshot(&mut self, buffers: &[(Buf, u64)]) -> Result<Snapshot> {
         let bytes = buffers.iter().map(|(_, words)| words * 4).sum::<u64>();
-        self.check_fits("snapshot", bytes)?;
+        memory::check_total(self.table, "snapshot", self.memory_total().saturating_add(bytes), &self.limits)?;
         let mut copies = Vec::new();
         for &(buf, words) in buffers {
             self.range(buf, 0, 0, words * 4)?;
@@ -58,21 +58,6 @@ impl Scheduler {
         }
         self.snapshots.clear();
         was_there
-    }
-
-    /// Fails if the bytes of a further buffer do not fit under the limit.
-    fn check_fits(&self, what: &str, bytes: u64) -> Result<()> {
-        let (needed, limit) = (self.memory_total().saturating_add(bytes), self.limits.max_memory);
-        if needed <= limit {
-            return Ok(());
-        }
-        Err(Error::OutOfMemory {
-            what: what.to_owned(),
-            needed,
-            limit_name: "the memory of this device that may be used".to_owned(),
-            limit,
-            cure: (self.table.cure)(),
-        })
     }
 }
 

@@ -12,6 +12,13 @@ const CARD: SchedulerOptions = SchedulerOptions {
     as_card: true,
 };
 
+/// A scheduler whose memory may grow by so many bytes.
+fn limited(gpu: &device::Turn, more: u64) -> Scheduler {
+    let need = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap().memory_total();
+    let options = SchedulerOptions { memory_limit: Some(need + more), ..CARD };
+    Scheduler::new(gpu.gpu(), TABLE, pixels(500), options).unwrap()
+}
+
 fn key(round: u32, item: u32) -> Option<DataKey> {
     Some(DataKey { round, item })
 }
@@ -59,9 +66,7 @@ fn what_comes_again_comes_from_the_device() {
 #[test]
 fn without_room_data_come_from_the_host_and_another_round_makes_room() {
     let Some(gpu) = device() else { return };
-    let need = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap().memory_total();
-    let options = SchedulerOptions { memory_limit: Some(need + 8_000), ..CARD };
-    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(500), options).unwrap();
+    let mut scheduler = limited(&gpu, 8_000);
     // Half of what is left has room for two of three.
     let views: Vec<_> = (0..9).map(|i| (key(0, i % 3), i % 3)).collect();
     assert_eq!(sent(&mut scheduler, &views), 5 * 2000);
@@ -90,9 +95,7 @@ fn data_of_a_list_that_does_not_run_are_not_kept() {
 #[test]
 fn a_snapshot_keeps_what_lists_change_afterwards() {
     let Some(gpu) = device() else { return };
-    let need = Scheduler::new(gpu.gpu(), TABLE, pixels(500), CARD).unwrap().memory_total();
-    let options = SchedulerOptions { memory_limit: Some(need + 500), ..CARD };
-    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(500), options).unwrap();
+    let mut scheduler = limited(&gpu, 500);
     let before: Vec<u32> = (0..100).collect();
     scheduler.upload(MODEL, 0, 0, &before).unwrap();
     let snapshot = scheduler.snapshot(&[(MODEL, 90), (PLANES, 0)]).unwrap();

@@ -120,17 +120,23 @@ impl MemoryReport {
         let total = step_pages.iter().fold(total, |sum, bytes| sum.saturating_add(*bytes));
         let step_unaliased = plans.iter().map(|plan| unaliased(plan)).max().unwrap_or(0);
         let report = Self { rows, step_pages, step_unaliased, staging: STAGING_BYTES, total };
-        if report.total > limits.max_memory {
-            return Err(Error::OutOfMemory {
-                what: "the whole engine".to_owned(),
-                needed: report.total,
-                limit_name: "the memory of this device that may be used".to_owned(),
-                limit: limits.max_memory,
-                cure: (table.cure)(),
-            });
-        }
+        check_total(table, "the whole engine", report.total, limits)?;
         Ok(report)
     }
+}
+
+/// Fails if so many bytes in total are more than the engine may use; the error suggests a cure.
+pub(crate) fn check_total(table: &Table, what: &str, needed: u64, limits: &Limits) -> Result<()> {
+    if needed <= limits.max_memory {
+        return Ok(());
+    }
+    Err(Error::OutOfMemory {
+        what: what.to_owned(),
+        needed,
+        limit_name: "the memory of this device that may be used".to_owned(),
+        limit: limits.max_memory,
+        cure: (table.cure)(),
+    })
 }
 
 fn unaliased(plan: &Plan) -> u64 {
