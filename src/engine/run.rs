@@ -142,9 +142,9 @@ impl Engine {
         self.sched.frames()
     }
 
-    /// True if the host runs ahead of the device, as on a card.
+    /// True if the host works ahead of the device, as on a card, however many lists are in flight.
     pub(crate) fn runs_ahead(&self) -> bool {
-        self.frames() > 2
+        self.sched.runs_ahead()
     }
 
     /// Submits a list without waiting. At most one list per frame may be in flight.

@@ -28,6 +28,9 @@ pub struct PlanLimits {
     pub frames: usize,
     /// The data of a step go through staging to the device's own memory.
     pub stages: bool,
+    /// The host works ahead of the device: it compiles kernels before they are needed, and reads a checkpoint from a copy on
+    /// the device. On a processor, both would take time from the steps.
+    pub runs_ahead: bool,
 }
 
 impl Default for PlanLimits {
@@ -45,6 +48,7 @@ impl Default for PlanLimits {
             max_memory: u64::MAX,
             frames: 2,
             stages: false,
+            runs_ahead: false,
         }
     }
 }
@@ -52,7 +56,7 @@ impl Default for PlanLimits {
 impl PlanLimits {
     /// Steps in flight on a card, and their data in its own memory: the host runs ahead, and each pass reads a photo from there.
     pub(crate) fn of_card(self) -> Self {
-        Self { frames: 4, stages: true, ..self }
+        Self { frames: 4, stages: true, runs_ahead: true, ..self }
     }
 
     /// Most bytes of photos and masks that stay in device memory beside an engine of so many bytes: half of what is left, so
@@ -88,8 +92,9 @@ pub struct Limits {
 
 impl Limits {
     /// Lowers limits to the values of `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` (numbers with K, M
-    /// or G), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, and
-    /// the way of their data from `LABELGS_PHOTOS`: `upload` or `resident`.
+    /// or G), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, the
+    /// way of their data from `LABELGS_PHOTOS` (`upload` or `resident`), and whether the host works ahead from `LABELGS_AHEAD`
+    /// (`no` or `yes`).
     pub(super) fn change_by_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),
@@ -109,6 +114,9 @@ impl Limits {
         }
         if let Some(text) = lab::var("LABELGS_PHOTOS") {
             self.plan.stages = text == "resident";
+        }
+        if let Some(text) = lab::var("LABELGS_AHEAD") {
+            self.plan.runs_ahead = text == "yes";
         }
         Ok(())
     }

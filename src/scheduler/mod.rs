@@ -272,6 +272,11 @@ impl Scheduler {
         self.limits.frames
     }
 
+    /// True if the host works ahead of the device.
+    pub fn runs_ahead(&self) -> bool {
+        self.limits.runs_ahead
+    }
+
     /// Bytes between host and device so far.
     pub fn traffic(&self) -> Traffic {
         self.traffic

@@ -86,7 +86,8 @@ fn kills_at_any_moment_cost_no_bit() {
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn a_kill_while_a_checkpoint_is_written_costs_no_bit() {
     let Some(_turn) = device() else { return };
-    let card = || vec![("LABELGS_PHOTOS", "resident".to_owned()), ("LABELGS_FRAMES", "4".to_owned())];
+    let card = [("LABELGS_PHOTOS", "resident"), ("LABELGS_FRAMES", "4"), ("LABELGS_AHEAD", "yes")];
+    let card = || card.map(|(name, value)| (name, value.to_owned())).to_vec();
     let mut models = Vec::new();
     // The writer waits in the second checkpoint: before it reads, before it writes, after it has written.
     for (environment, event, newest) in [(card(), 4, 4), (Vec::new(), 5, 4), (card(), 6, 8)] {
