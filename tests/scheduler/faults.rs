@@ -3,17 +3,21 @@
 use super::*;
 use labelgs::cli::support::exit_status::exit_status;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 const CHILD: &str = "LABELGS_FAULT_CHILD";
+
+/// How long the snapshot of a growth has no reader; a growth that does not wait for it takes milliseconds.
+const UNREAD: Duration = Duration::from_millis(500);
 
 /// Uses all parts of the scheduler. It is a test so that the other tests can run it in a child process.
 #[test]
 fn child() {
-    if std::env::var_os(CHILD).is_none() {
-        return;
-    }
-    match work() {
-        Ok(()) => println!("outcome: done"),
+    let Some(kind) = std::env::var_os(CHILD) else { return };
+    match if kind == "grow" { growth() } else { work().map(|()| "done") } {
+        Ok(outcome) => println!("outcome: {outcome}"),
         Err(error) => println!("outcome: {} {error}", exit_status(&error)),
     }
 }
@@ -49,11 +53,39 @@ fn work() -> labelgs::Result<()> {
     scheduler.download_all::<u32>(REPORT, 0).map(|_| ())
 }
 
+/// Grows the model while a snapshot of it has not been read. Both have the contents from before.
+fn growth() -> labelgs::Result<&'static str> {
+    let gpu = labelgs::gpu::Gpu::new(&labelgs::gpu::GpuOptions::from_env()?)?;
+    let options = SchedulerOptions { as_card: true, ..SchedulerOptions::default() };
+    let mut scheduler = Scheduler::new(gpu, TABLE, pixels(256), options)?;
+    let ramp = (0..100).collect::<Vec<u32>>();
+    scheduler.upload(MODEL, 0, 0, &ramp)?;
+    let snapshot = scheduler.snapshot(&[(MODEL, 100), (PLANES, 400)])?;
+    let is_read = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let reader = scope.spawn(|| {
+            thread::sleep(UNREAD);
+            is_read.store(true, Ordering::Relaxed);
+            snapshot.read()
+        });
+        let grown = scheduler.set_counts(counts(200, 256)).and_then(|()| scheduler.download::<u32>(MODEL, 0, 0, 100));
+        let waited = is_read.load(Ordering::Relaxed);
+        let read = reader.join().expect("the reader")?;
+        assert_eq!(grown.expect("the snapshot's memory was enough"), ramp);
+        assert_eq!(read, [ramp, vec![0; 400]]);
+        Ok(if waited { "waited" } else { "done" })
+    })
+}
+
 fn outcome(fault: &str) -> String {
+    outcome_of("work", fault)
+}
+
+fn outcome_of(kind: &str, fault: &str) -> String {
     let program = std::env::current_exe().unwrap();
     let mut command = Command::new(program);
     command.args(["--exact", "scheduler::faults::child", "--nocapture", "--test-threads=1"]);
-    command.env(CHILD, "1").env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
+    command.env(CHILD, kind).env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
     let output = command.output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{fault}: {}\n{text}", output.status);
@@ -118,5 +150,18 @@ fn a_device_may_be_lost_anywhere() {
     assert!(outcomes.iter().all(|outcome| outcome.starts_with("6 ")), "{outcomes:?}");
     let named = outcomes.iter().filter(|outcome| outcome.contains("is copy b to report of list toy")).count();
     assert!(named > 0, "some outcome names the last pass: {outcomes:?}");
+    drop(turn);
+}
+
+/// Where growth finds no memory, it waits for the reader of a snapshot and goes on with what that frees.
+#[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
+fn growth_without_memory_waits_for_snapshots() {
+    let Some(turn) = device() else { return };
+    let all = (1..200).map(|nth| outcome_of("grow", &format!("vkAllocateMemory:{nth}:DEVICE_MEMORY")));
+    let outcomes: Vec<_> = all.take_while(|outcome| outcome != "done").collect();
+    let waited = outcomes.iter().filter(|outcome| *outcome == "waited").count();
+    assert!(waited >= 2, "one for each plane of the model: {outcomes:?}");
+    assert!(outcomes.iter().all(|outcome| outcome == "waited" || outcome.starts_with("5 ")), "{outcomes:?}");
     drop(turn);
 }

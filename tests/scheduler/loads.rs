@@ -120,3 +120,23 @@ fn a_snapshot_may_outlive_its_scheduler() {
     drop(scheduler);
     assert_eq!(reader.join().unwrap()[0].len(), 100, "a snapshot outlives its scheduler");
 }
+
+/// Growth frees the planes whose copies are being read, and the reader gets what was there before. The copies are larger than
+/// the staging memory, so that the reader is at work while the planes go.
+#[test]
+fn growth_leaves_a_snapshot_alone() {
+    let Some(gpu) = device() else { return };
+    let rows = 3 << 20;
+    let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, counts(rows, 500), CARD).unwrap();
+    let before: Vec<u32> = (0..rows as u32).collect();
+    scheduler.upload(MODEL, 0, 0, &before).unwrap();
+    scheduler.fill(PLANES, 3).unwrap();
+    let snapshot = scheduler.snapshot(&[(MODEL, rows), (PLANES, 4 * rows)]).unwrap();
+    let reader = std::thread::spawn(|| snapshot.read().unwrap());
+    scheduler.set_counts(counts(rows + 1000, 500)).unwrap();
+    scheduler.fill(MODEL, 7).unwrap();
+    scheduler.fill(PLANES, 7).unwrap();
+    let read = reader.join().unwrap();
+    assert!(read[0] == before && read[1].iter().all(|&word| word == 3));
+    assert_eq!(read[1].len() as u64, 4 * rows);
+}
