@@ -87,4 +87,5 @@ const uint ARGS_SWEEP_GAUSSIANS = 21u;       // partitions of a sweep
 const uint ARGS_SWEEP_SPLATS = 24u;
 const uint ARGS_SWEEP_INSTANCES = 27u;
 const uint ARGS_SWEEP_TILES = 30u;
-const uint ARGS_WORDS = 33u;                 // of all entries
+const uint ARGS_CHUNKS = 33u;                // chunks of the backward blend (group_tile.glsl)
+const uint ARGS_WORDS = 36u;                 // of all entries

@@ -57,7 +57,7 @@ void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], floa
         difference.w = off > 0.0 ? difference.w : 0.0;
         layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
     }
-    loss = subgroup_sum(loss);
+    loss = tile_sum(loss);
     if (gl_LocalInvocationID.x == 0u) {
         layer_loss[t.layer_tile] = loss * layer_weights[t.layer];
     }

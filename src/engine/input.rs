@@ -115,6 +115,7 @@ impl Engine {
             instance_capacity: word(self.capacity.instances),
             layer_tile_capacity: word(self.capacity.layer_tiles),
             longest_list: word(self.capacity.segments.max(1) * u64::from(self.shape.segment_length)),
+            chunk_length: self.shape.group_blend.map_or(0, |blend| blend.chunk_length),
             stamp: self.stamp,
             ..*uniforms
         };

@@ -22,7 +22,7 @@ mod tile;
 pub use build::Builder;
 pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
-pub use shape::KernelShape;
+pub use shape::{GroupBlend, KernelShape};
 
 use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
