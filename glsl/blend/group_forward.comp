@@ -86,8 +86,8 @@ struct Channel {
 };
 
 #ifndef MAIN
-// Turns the light of each chunk into the light behind it, and adds it to that of the pixel's last chunk.
-void look_behind(TileJob t, uint states, uint kept, uint k, inout vec3 light) {
+// Turns the light of each chunk into the light behind it, given that of the last one and of the background.
+void look_behind(TileJob t, uint states, uint kept, uint k, vec3 light) {
     for (uint e = kept; e-- > 0u;) {
         uint at = (states + e) * TILE_PIXELS + tile_pixel(t, k);
         vec4 state = chunk_states[at];
@@ -142,7 +142,8 @@ void main() {
     uint start = fetchu(tile_starts, virtual_tile), end = fetchu(tile_ends, virtual_tile);
     vec2 corner = vec2(float(t.tile % u.tiles_x * TILE_WIDTH), float(t.tile / u.tiles_x * TILE_HEIGHT));
 
-    float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS];
+    float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS]; // colours of the chunk,
+    vec3 before[ROWS];                           // and of those before it
     uint final_[ROWS];
 #ifdef ONE_IS_MAIN
     float best[ROWS];
@@ -166,6 +167,7 @@ void main() {
 #endif
         T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats
         cr[k] = cg[k] = cb[k] = 0.0;
+        before[k] = vec3(0.0);
         final_[k] = 0u;
 #ifdef ONE_IS_MAIN
         best[k] = 0.0;
@@ -247,21 +249,22 @@ void main() {
                 }
             }
         }
-#ifndef MAIN
         uint behind = base + BATCH;
         if (behind < end && (behind - start) % CHUNK_LENGTH == 0u) {
             [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+#ifndef MAIN
                 uint at = (states + kept) * TILE_PIXELS + tile_pixel(t, k);
                 chunk_states[at] = vec4(cr[k], cg[k], cb[k], abs(T[k]));
-                cr[k] = cg[k] = cb[k] = 0.0;
+#endif
 #ifdef CHANNEL
                 chunk_channel[at] = channel.sum[k];
                 channel.sum[k] = 0.0;
 #endif
+                before[k] += vec3(cr[k], cg[k], cb[k]);
+                cr[k] = cg[k] = cb[k] = 0.0;
             }
             kept++;
         }
-#endif
     }
     if (lane == 0u && walked > 0u) {
         atomicAdd(counters.walked_first, walked);
@@ -274,16 +277,17 @@ void main() {
     vec3 background = t.layer == 0u ? u.background : vec3(0.0);
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         furthest = max(furthest, final_[k]);
-        vec3 light = vec3(cr[k], cg[k], cb[k]) + abs(T[k]) * background;
+        vec3 light = vec3(cr[k], cg[k], cb[k]);
+        before[k] += light;
+        cr[k] = before[k].x;
+        cg[k] = before[k].y;
+        cb[k] = before[k].z;
 #ifndef MAIN
-        look_behind(t, states, kept, k, light);
+        look_behind(t, states, kept, k, light + abs(T[k]) * background);
 #endif
 #ifdef CHANNEL
         look_behind(t, states, kept, k, abs(T[k]), channel);
 #endif
-        cr[k] = light.x;
-        cg[k] = light.y;
-        cb[k] = light.z;
     }
 #ifndef MAIN
     furthest = subgroup_max(furthest);
@@ -305,7 +309,8 @@ void main() {
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         if (t.x < u.width && t.y0 + k < u.height) {
             uint p = (t.y0 + k) * u.width + t.x;
-            image[p] = vec4(cr[k], cg[k], cb[k], abs(T[k]));
+            float transmittance = abs(T[k]);
+            image[p] = vec4(before[k] + transmittance * background, transmittance);
             last[p] = final_[k];
 #ifdef MAIN
             main_gaussian[p] = main_[k] == NO_SPLAT ? NO_SPLAT : fetchu(gaussian_from_splat, main_[k]);

@@ -60,8 +60,7 @@ pub struct GroupBlend {
 
 impl GroupBlend {
     /// What cards use.
-    pub const DEFAULT: Self =
-        Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, culls: true, turned: false };
+    pub const DEFAULT: Self = Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, culls: true, turned: false };
 }
 
 /// Largest id of a pixel of 16 bits, the highest of which is a flag.

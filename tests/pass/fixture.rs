@@ -8,7 +8,7 @@ use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
-use labelgs::pass::KernelShape;
+use labelgs::pass::{GroupBlend, KernelShape};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
@@ -37,6 +37,9 @@ impl DerefMut for Fixture {
     }
 }
 
+/// Both forms of the blends; chunks are short, so that lists have several.
+pub const BLENDS: [Option<GroupBlend>; 2] = [None, Some(GroupBlend { chunk_length: 16, ..GroupBlend::DEFAULT })];
+
 impl Fixture {
     /// The scene on the shared device, with or without labels, with the device's kernel shape.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
@@ -47,6 +50,13 @@ impl Fixture {
     /// As `new`, with kernels of a given shape.
     pub fn with_shape(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
         Self::with_options(turn, scene, labels, shape, readable())
+    }
+
+    /// As `new`, with blends of one form or the other.
+    pub fn blending(turn: Turn, scene: Scene, labels: bool, form: Option<GroupBlend>) -> Self {
+        let shape = KernelShape::of(turn.capabilities());
+        let shape = form.map_or(KernelShape { group_blend: None, ..shape }, |form| shape.with_group_blend_of(form));
+        Self::with_shape(turn, scene, labels, shape)
     }
 
     /// As `with_shape`, with options of the scheduler; without `readable` only some buffers can be read back.

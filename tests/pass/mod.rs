@@ -12,6 +12,7 @@ mod depth_prior;
 mod disagreement;
 mod finite;
 pub mod fixture;
+mod group_blend;
 mod label_map;
 mod labels;
 mod loss;
