@@ -28,14 +28,10 @@ READ1(16, Counters, counters);
 READ(17, uint, chunk_jobs);
 READ(18, vec4, chunk_states);
 layout(constant_id = 15) const uint GROUP_LANES = 64;
-#define EXCHANGE_LANES 256u
-#include "group_tile.glsl"
-#include "transposed_sums.glsl"
 #ifdef LABELS
 FETCHU(12, layer_tiles);
 READ(13, uvec2, layer_state);
 READ(14, float, layer_weights);
-#include "label_state.glsl"
 #endif
 #ifdef DISAGREEMENT
 FETCHC(11, target);
@@ -50,34 +46,24 @@ READ(11, float, depths);
 #define CHANNEL
 #define NO_SUM // the forward walk has it
 READ(19, float, chunk_channel);
+#endif
+#define BATCH_MOST SUBGROUP_SIZE
+#define EXCHANGE_LANES 256u
+#include "group_tile.glsl"
+#ifdef LABELS
+#include "label_state.glsl"
+#endif
+#ifdef CHANNEL
 #include "channel.glsl"
 shared uint staged_channel[BATCH];
 #endif
-const uint SUM_PITCH = SUMS + 1u; // odd: neighbouring lanes meet no bank together
+#include "group_sums.glsl"
 shared uint staged_instance[BATCH];
-shared float sums_of[GROUP_LANES * SUM_PITCH]; // by subgroup, and by the splats that it walks at once
 shared uvec2 hits_in[SUBGROUPS];
 shared uint deepest;
 
-// Writes the subgroup's sums of a splat, each from the lane where it ended.
-void put_sums(uint row, vec3 sums) {
-    uint lane = subgroup_lane(), at = row * SUM_PITCH;
-    uint v = ((lane & SUBGROUP_SIZE >> 1u) != 0u ? 1u : 0u) + ((lane & SUBGROUP_SIZE >> 2u) != 0u ? 2u : 0u)
-        + ((lane & SUBGROUP_SIZE >> 3u) != 0u ? 4u : 0u) + ((lane & SUBGROUP_SIZE >> 4u) != 0u ? 8u : 0u);
-    bool is_first = SUBGROUP_SIZE < 32u || (lane & (SUBGROUP_SIZE / 16u - 1u)) == 0u; // of those that have the same sum
-    if (is_first && v < SUMS) {
-        sums_of[at + v] = sums.x;
-    }
-    if (SUBGROUP_SIZE < 8u) {
-        sums_of[at + 4u + v] = sums.y;
-    }
-    if (SUBGROUP_SIZE < 16u && v < 2u) {
-        sums_of[at + 8u + v] = sums.z;
-    }
-}
-
-// Sums a splat over the subgroups that it touches, and writes its record. `lane` is its place among those of the walk.
-void finish(uint lane, uint at, uint stamp) {
+// Sums the staged splat of a lane over the subgroups that it touches, and writes its record.
+void finish(uint lane, uint stamp) {
     float o[SUMS] = float[SUMS](0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     bool is_hit = false;
     for (uint s = 0u; s < SUBGROUPS; s++) {
@@ -93,9 +79,9 @@ void finish(uint lane, uint at, uint stamp) {
         return;
     }
     // Convert moments about the tile's centre to gradients of the splat.
-    vec4 r0 = staged_0[at];
+    vec4 r0 = staged_0[lane];
     vec2 d = r0.xy - vec2(float(TILE_WIDTH), float(TILE_HEIGHT)) * 0.5;
-    vec3 conic = conic_from_exponent(vec3(r0.zw, staged_1[at].x));
+    vec3 conic = conic_from_exponent(vec3(r0.zw, staged_1[lane].x));
     float Sx = d.x * o[0] - o[1], Sy = d.y * o[0] - o[2];
     float Sxx = d.x * (d.x * o[0] - 2.0 * o[1]) + o[3];
     float Sxy = d.x * (d.y * o[0] - o[2]) - d.y * o[1] + o[4];
@@ -104,7 +90,7 @@ void finish(uint lane, uint at, uint stamp) {
 #ifdef CHANNEL
     v_log_opacity += o[9]; // not in the moments above: shapes and places follow the photo
 #endif
-    uint instance = staged_instance[at];
+    uint instance = staged_instance[lane];
     v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
     v_instances_b[instance] = vec4(-0.5 * Syy, v_log_opacity, o[6], o[7]);
     v_instances_c[instance] = vec4(o[8], uintBitsToFloat(stamp), 0.0, 0.0);
@@ -112,10 +98,7 @@ void finish(uint lane, uint at, uint stamp) {
 
 void main() {
     StepUniforms u = step;
-    uint jobs = u.tile_count, lane = gl_LocalInvocationID.x;
-#ifdef LABELS
-    jobs += counters.layer_tile_count;
-#endif
+    uint jobs = job_count(u), lane = gl_LocalInvocationID.x;
     uint slots = counters.instance_count / CHUNK_LENGTH + jobs, slot = linear_group_id();
     if (slot >= slots) {
         return;
@@ -126,22 +109,15 @@ void main() {
         return;
     }
     bool is_last = (work & LAST_CHUNK) != 0u;
-    uint virtual_tile = job, layer_tile = 0u;
-#ifdef LABELS
-    if (job >= u.tile_count) {
-        layer_tile = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_tile);
-    }
-#endif
-    TileJob t = locate(virtual_tile, layer_tile, u);
+    uint virtual_tile;
+    TileJob t = locate_job(job, u, virtual_tile);
     uint start = fetchu(tile_starts, virtual_tile), state = start / CHUNK_LENGTH, chunk = slot - state - job;
-    vec2 corner = vec2(float(t.tile % u.tiles_x * TILE_WIDTH), float(t.tile / u.tiles_x * TILE_HEIGHT));
     state = (state + chunk) * TILE_PIXELS;
 
     float T[ROWS], behind[ROWS], g0[ROWS], g1[ROWS], g2[ROWS];
     uint final_[ROWS];
 #ifdef CHANNEL
-    uint own[ROWS];                  // what the pixel has
+    uint has[ROWS];                  // what the pixel has
     float weight[ROWS], wrong[ROWS]; // weight of the pixel; disagreement behind, times that weight
 #endif
     uint furthest = 0u;
@@ -168,7 +144,7 @@ void main() {
             behind[k] = dot(u.background, g);
         }
 #ifdef CHANNEL
-        own[k] = channel_of_pixel(p, inside, u, weight[k], wrong[k]);
+        has[k] = channel_of_pixel(p, inside, u, weight[k], wrong[k]);
 #endif
         if (!is_last) {
             vec4 at_end = chunk_states[state + tile_pixel(t, k)];
@@ -203,68 +179,66 @@ void main() {
         if (lane < count) {
             uint instance = fetchu(instance_from_sorted, start + base + lane), index = fetchu(splat_from_instance, instance);
             staged_instance[lane] = instance;
-            stage(lane, index, corner);
+            stage(lane, index, corner(t, u));
 #ifdef CHANNEL
             staged_channel[lane] = channel_of_splat(index, staged_2[lane].y);
 #endif
         }
         barrier();
-        for (uint walks = (count + SUBGROUP_SIZE - 1u) / SUBGROUP_SIZE; walks-- > 0u;) {
-            uint c = walks * SUBGROUP_SIZE, mine = min(c + subgroup_lane(), count - 1u), some_of = min(count - c, SUBGROUP_SIZE);
-            uvec2 hits = hits_of(base + mine < furthest && touches(mine), some_of);
-            if (subgroup_lane() == 0u) {
-                hits_in[subgroup_id()] = hits;
-            }
-            while (some(hits)) {
-                uint splat = take_last(hits), j = c + splat, position = base + j + 1u;
-                vec4 r0 = staged_0[j], r1 = staged_1[j];
-                float blue = staged_2[j].x;
-                float dx = r0.x - t.px;
-                float ax = r1.y + r0.z * dx * dx, bx = r0.w * dx;
-                float dy0 = r0.y - t.row0;
-                float m0 = 0.0, m1 = 0.0, m2 = 0.0, vr = 0.0, vg = 0.0, vb = 0.0;
-#ifdef CHANNEL
-                float ml = 0.0;
-#endif
-                [[unroll]] for (uint k = 0u; k < ROWS; k++) {
-                    float dy = dy0 - float(k);
-                    precise float e = ax + dy * (bx + r1.x * dy);
-                    float raw = exp2(max(e, -20.0));
-                    float alpha = min(ALPHA_MAX, raw);
-                    alpha = e < LOG2_ALPHA_MIN || position > final_[k] ? 0.0 : alpha;
-                    float light = r1.z * g0[k] + r1.w * g1[k] + blue * g2[k];
-                    T[k] = T[k] / (1.0 - alpha);
-                    float w = alpha * T[k];
-                    float difference = light - behind[k];
-                    float p = raw >= ALPHA_MAX ? 0.0 : w * difference;
-                    behind[k] += alpha * difference;
-                    float y = float(k) - middle;
-                    m0 += p;
-                    m1 += p * y;
-                    m2 += p * (y * y);
-                    vr += w * g0[k];
-                    vg += w * g1[k];
-                    vb += w * g2[k];
-#ifdef CHANNEL
-                    float more = differs(own[k], staged_channel[j], weight[k]) - wrong[k];
-                    ml += raw >= ALPHA_MAX ? 0.0 : w * more;
-                    wrong[k] += alpha * more;
-#endif
-                }
-                float my = m1 + qy0 * m0, myy = m2 + qy0 * (2.0 * m1 + qy0 * m0);
-                // Values 0 to 9: six moments, the colour, the channel.
-#ifndef CHANNEL
-                float ml = vb;
-#endif
-                vec3 sums = transposed(vec3(m0, my, my * qx), vec3(m0 * qx, m0 * qx * qx, myy), vec2(vr, vb), vec2(vg, ml),
-                    subgroup_lane());
-                put_sums(subgroup_id() * SUBGROUP_SIZE + splat, sums);
-            }
-            barrier();
-            if (lane < some_of) {
-                finish(lane, c + lane, u.stamp);
-            }
-            barrier();
+        uint own = min(subgroup_lane(), count - 1u);
+        uvec2 hits = hits_of(base + own < furthest && touches(own), count);
+        if (subgroup_lane() == 0u) {
+            hits_in[subgroup_id()] = hits;
         }
+        while (some(hits)) {
+            uint j = take_last(hits), position = base + j + 1u;
+            vec4 r0 = staged_0[j], r1 = staged_1[j];
+            float blue = staged_2[j].x;
+            float dx = r0.x - t.px;
+            float ax = r1.y + r0.z * dx * dx, bx = r0.w * dx;
+            float dy0 = r0.y - t.row0;
+            float m0 = 0.0, m1 = 0.0, m2 = 0.0, vr = 0.0, vg = 0.0, vb = 0.0;
+#ifdef CHANNEL
+            float ml = 0.0;
+#endif
+            [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+                float dy = dy0 - float(k);
+                precise float e = ax + dy * (bx + r1.x * dy);
+                float raw = exp2(max(e, -20.0));
+                float alpha = min(ALPHA_MAX, raw);
+                alpha = e < LOG2_ALPHA_MIN || position > final_[k] ? 0.0 : alpha;
+                float light = r1.z * g0[k] + r1.w * g1[k] + blue * g2[k];
+                T[k] = T[k] / (1.0 - alpha);
+                float w = alpha * T[k];
+                float difference = light - behind[k];
+                float p = raw >= ALPHA_MAX ? 0.0 : w * difference;
+                behind[k] += alpha * difference;
+                float y = float(k) - middle;
+                m0 += p;
+                m1 += p * y;
+                m2 += p * (y * y);
+                vr += w * g0[k];
+                vg += w * g1[k];
+                vb += w * g2[k];
+#ifdef CHANNEL
+                float more = differs(has[k], staged_channel[j], weight[k]) - wrong[k];
+                ml += raw >= ALPHA_MAX ? 0.0 : w * more;
+                wrong[k] += alpha * more;
+#endif
+            }
+            float my = m1 + qy0 * m0, myy = m2 + qy0 * (2.0 * m1 + qy0 * m0);
+            // Values 0 to 9: six moments, the colour, the channel.
+#ifndef CHANNEL
+            float ml = vb;
+#endif
+            vec3 sums = transposed(vec3(m0, my, my * qx), vec3(m0 * qx, m0 * qx * qx, myy), vec2(vr, vb), vec2(vg, ml),
+                subgroup_lane());
+            put_sums(subgroup_id() * SUBGROUP_SIZE + j, sums);
+        }
+        barrier();
+        if (lane < count) {
+            finish(lane, u.stamp);
+        }
+        barrier();
     }
 }

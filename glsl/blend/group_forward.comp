@@ -27,8 +27,6 @@ WRITE(6, vec4, image);
 WRITE(7, uint, last);
 layout(constant_id = 15) const uint GROUP_LANES = 128;
 layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
-#define EXCHANGE_LANES 256u
-#include "group_tile.glsl"
 #ifdef MAIN
 WRITE(8, uint, main_gaussian);
 WRITE(9, vec2, main_weight_depth);
@@ -50,8 +48,6 @@ WRITE(15, float, layer_loss);
 INOUT(16, uint, label_keys);
 FETCHU(17, layer_from_label);
 READ(18, float, layer_weights);
-#include "label_state.glsl"
-#include "label_rules.glsl"
 #endif
 #ifdef DISAGREEMENT
 FETCHC(8, target);
@@ -66,84 +62,35 @@ READ(8, float, depths);
 #if defined(DISAGREEMENT) || defined(DEPTH)
 #define CHANNEL
 INOUT(22, float, chunk_channel);
-#include "channel.glsl"
-shared uint staged_channel[BATCH];
 #endif
 #if defined(MAIN) || defined(LABELS)
 #define ONE_IS_MAIN
+#endif
+#define BATCH_MOST GROUP_LANES
+#define EXCHANGE_LANES 256u
+#include "group_tile.glsl"
+#ifdef LABELS
+#include "label_state.glsl"
+#include "label_rules.glsl"
+#endif
+#include "chunks.glsl"
 shared uint staged_index[BATCH];
-#endif
 shared uint live_subgroups, deepest;
-
-// The channel as far as the walk is, and what it ends with where nothing is behind.
-struct Channel {
-#ifdef CHANNEL
-    uint own[ROWS];
-    float weight[ROWS], sum[ROWS], behind[ROWS];
-#else
-    uint none;
-#endif
-};
-
-#ifndef MAIN
-// Turns the light of each chunk into the light behind it, given that of the last one and of the background.
-void look_behind(TileJob t, uint states, uint kept, uint k, vec3 light) {
-    for (uint e = kept; e-- > 0u;) {
-        uint at = (states + e) * TILE_PIXELS + tile_pixel(t, k);
-        vec4 state = chunk_states[at];
-        chunk_states[at] = vec4(light / state.w, state.w);
-        light += state.xyz;
-    }
-}
-
-// Says which chunks of the list the backward walk has work in.
-void list_chunks(uint job, uint start, uint end) {
-    uint first = start / CHUNK_LENGTH + job, next = end / CHUNK_LENGTH + job + 1u;
-    uint walked = (deepest + CHUNK_LENGTH - 1u) / CHUNK_LENGTH;
-    for (uint slot = first + gl_LocalInvocationID.x; slot < next; slot += GROUP_LANES) {
-        uint chunk = slot - first;
-        chunk_jobs[slot] = chunk >= walked ? NO_CHUNK : job | (chunk + 1u == walked ? LAST_CHUNK : 0u);
-    }
-}
-#endif
-
-#ifdef CHANNEL
-void look_behind(TileJob t, uint states, uint kept, uint k, float transmittance, inout Channel channel) {
-    float sum = channel.sum[k] + transmittance * channel.behind[k];
-    for (uint e = kept; e-- > 0u;) {
-        uint at = (states + e) * TILE_PIXELS + tile_pixel(t, k);
-        float of_chunk = chunk_channel[at];
-        chunk_channel[at] = sum / chunk_states[at].w;
-        sum += of_chunk;
-    }
-    channel.sum[k] = sum;
-}
-#endif
 
 void main() {
     StepUniforms u = step;
-    uint jobs = u.tile_count;
-#ifdef LABELS
-    jobs += counters.layer_tile_count;
-#endif
+    uint jobs = job_count(u);
     uint group = linear_group_id(), lane = gl_LocalInvocationID.x;
     if (group >= jobs) {
         return;
     }
     uint job = TURNED != 0u ? jobs - 1u - group : group;
-    uint virtual_tile = job, layer_tile = 0u;
-#ifdef LABELS
-    if (job >= u.tile_count) {
-        layer_tile = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_tile);
-    }
-#endif
-    TileJob t = locate(virtual_tile, layer_tile, u);
+    uint virtual_tile;
+    TileJob t = locate_job(job, u, virtual_tile);
     uint start = fetchu(tile_starts, virtual_tile), end = fetchu(tile_ends, virtual_tile);
-    vec2 corner = vec2(float(t.tile % u.tiles_x * TILE_WIDTH), float(t.tile / u.tiles_x * TILE_HEIGHT));
 
-    float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS]; // colours of the chunk,
-    vec3 before[ROWS];                           // and of those before it
+    float T[ROWS];
+    vec3 light[ROWS], before[ROWS]; // of the chunk, and of those before it
     uint final_[ROWS];
 #ifdef ONE_IS_MAIN
     float best[ROWS];
@@ -155,10 +102,7 @@ void main() {
     Channel channel;
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         bool inside = t.x < u.width && t.y0 + k < u.height;
-#ifdef CHANNEL
-        channel.own[k] = channel_of_pixel(inside ? (t.y0 + k) * u.width + t.x : 0u, inside, u, channel.weight[k], channel.behind[k]);
-        channel.sum[k] = 0.0;
-#endif
+        begin_channel(inside ? (t.y0 + k) * u.width + t.x : 0u, inside, u, k, channel);
 #ifdef LABELS
         if (t.layer != 0u && inside) {
             uint p = (t.y0 + k) * u.width + t.x;
@@ -166,8 +110,7 @@ void main() {
         }
 #endif
         T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats
-        cr[k] = cg[k] = cb[k] = 0.0;
-        before[k] = vec3(0.0);
+        light[k] = before[k] = vec3(0.0);
         final_[k] = 0u;
 #ifdef ONE_IS_MAIN
         best[k] = 0.0;
@@ -203,10 +146,8 @@ void main() {
         walked += count;
         if (lane < count) {
             uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, base + lane));
-            stage(lane, index, corner);
-#ifdef ONE_IS_MAIN
+            stage(lane, index, corner(t, u));
             staged_index[lane] = index;
-#endif
 #ifdef CHANNEL
             staged_channel[lane] = channel_of_splat(index, staged_2[lane].y);
 #endif
@@ -229,9 +170,7 @@ void main() {
                     precise float next = T[k] * (1.0 - alpha);
                     bool takes = next >= TRANSMITTANCE_MIN;
                     float w = takes ? alpha * T[k] : 0.0;
-                    cr[k] += r1.z * w;
-                    cg[k] += r1.w * w;
-                    cb[k] += r2.x * w;
+                    light[k] += vec3(r1.zw, r2.x) * w;
                     T[k] = takes ? next : -abs(T[k]);
                     final_[k] = w > 0.0 ? position : final_[k];
                     contributing += COUNTS != 0u && w > 0.0 ? 1u : 0u;
@@ -252,16 +191,8 @@ void main() {
         uint behind = base + BATCH;
         if (behind < end && (behind - start) % CHUNK_LENGTH == 0u) {
             [[unroll]] for (uint k = 0u; k < ROWS; k++) {
-#ifndef MAIN
-                uint at = (states + kept) * TILE_PIXELS + tile_pixel(t, k);
-                chunk_states[at] = vec4(cr[k], cg[k], cb[k], abs(T[k]));
-#endif
-#ifdef CHANNEL
-                chunk_channel[at] = channel.sum[k];
-                channel.sum[k] = 0.0;
-#endif
-                before[k] += vec3(cr[k], cg[k], cb[k]);
-                cr[k] = cg[k] = cb[k] = 0.0;
+                before[k] += light[k];
+                keep((states + kept) * TILE_PIXELS + tile_pixel(t, k), k, light[k], abs(T[k]), channel);
             }
             kept++;
         }
@@ -277,17 +208,8 @@ void main() {
     vec3 background = t.layer == 0u ? u.background : vec3(0.0);
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         furthest = max(furthest, final_[k]);
-        vec3 light = vec3(cr[k], cg[k], cb[k]);
-        before[k] += light;
-        cr[k] = before[k].x;
-        cg[k] = before[k].y;
-        cb[k] = before[k].z;
-#ifndef MAIN
-        look_behind(t, states, kept, k, light + abs(T[k]) * background);
-#endif
-#ifdef CHANNEL
-        look_behind(t, states, kept, k, abs(T[k]), channel);
-#endif
+        before[k] += light[k];
+        look_behind(t, states, kept, k, light[k] + abs(T[k]) * background, abs(T[k]), channel);
     }
 #ifndef MAIN
     furthest = subgroup_max(furthest);
@@ -295,11 +217,11 @@ void main() {
         atomicMax(deepest, furthest);
     }
     barrier();
-    list_chunks(job, start, end);
+    list_chunks(job, start, end, deepest);
 #endif
 #ifdef LABELS
     if (t.layer != 0u) {
-        finish_layer(t, T, cr, cg, cb, final_, u);
+        finish_layer(t, T, before, final_, u);
         return;
     }
 #endif

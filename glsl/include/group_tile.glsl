@@ -18,12 +18,13 @@ layout(local_size_x_id = 15) in; // GROUP_LANES, which each pass declares
 const uint TILE_PIXELS = TILE_WIDTH * TILE_HEIGHT;
 const uint ROWS = TILE_PIXELS / GROUP_LANES;
 const uint SUBGROUPS = GROUP_LANES / SUBGROUP_SIZE;
-const uint BATCH = GROUP_LANES < CHUNK_LENGTH ? GROUP_LANES : CHUNK_LENGTH; // splats in shared memory
 
 // A block is about as wide as high.
 const uint BLOCK_PIXELS = SUBGROUP_SIZE * ROWS;
 const uint BLOCK_WIDTH = BLOCK_PIXELS <= 32u ? 4u : BLOCK_PIXELS <= 128u ? 8u : 16u;
 const uint BLOCK_HEIGHT = BLOCK_PIXELS / BLOCK_WIDTH;
+
+const uint BATCH = BATCH_MOST < CHUNK_LENGTH ? BATCH_MOST : CHUNK_LENGTH; // splats in shared memory
 
 const uint NO_CHUNK = 0xffffffffu;   // slot without work
 const uint LAST_CHUNK = 0x80000000u; // bit of a slot's job: nothing behind it was walked
@@ -51,6 +52,32 @@ TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
     t.px = float(own.x) + 0.5;
     t.row0 = float(own.y) + 0.5;
     return t;
+}
+
+// Number of jobs: the scene's tiles, then (variant labels) the occupied tiles of object layers.
+uint job_count(StepUniforms u) {
+#ifdef LABELS
+    return u.tile_count + counters.layer_tile_count;
+#else
+    return u.tile_count;
+#endif
+}
+
+TileJob locate_job(uint job, StepUniforms u, out uint virtual_tile) {
+    uint layer_tile = 0u;
+    virtual_tile = job;
+#ifdef LABELS
+    if (job >= u.tile_count) {
+        layer_tile = job - u.tile_count;
+        virtual_tile = fetchu(layer_tiles, layer_tile);
+    }
+#endif
+    return locate(virtual_tile, layer_tile, u);
+}
+
+// Top left corner of the tile, px.
+vec2 corner(TileJob t, StepUniforms u) {
+    return vec2(float(t.tile % u.tiles_x * TILE_WIDTH), float(t.tile / u.tiles_x * TILE_HEIGHT));
 }
 
 uint tile_pixel(TileJob t, uint k) {

@@ -3,8 +3,8 @@
 use super::{Engine, EngineSize, capacity};
 use crate::error::Result;
 use crate::gpu::limits::PlanLimits;
-use crate::pass::KernelShape;
 use crate::pass::buffers::TABLE;
+use crate::pass::{GroupBlend, KernelShape};
 use crate::scheduler::plan::{MemoryReport, PlanOptions};
 
 /// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
@@ -14,7 +14,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     let limits =
         PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
     let shape = KernelShape { loss_tile: 16, narrow_labels: true, group_walks: true, ..KernelShape::new(32, false) };
-    (shape.with_sweeps_of(16), limits.of_card())
+    (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.of_card())
 }
 
 /// Predicts the memory of an engine of this size on a device with these kernels and limits.

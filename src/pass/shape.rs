@@ -73,7 +73,7 @@ const LOOP_ROUNDS: u32 = 65_000;
 /// and one more per load of a subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
 
-/// Most shared memory of a blend by workgroups, bytes: the 128 splats and indices of the forward walk are 6,668.
+/// Most shared memory of a blend by workgroups, bytes: the forward walk keeps 128 splats, of 52 each.
 const GROUP_BLEND_SHARED: u32 = 8192;
 
 /// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would bound the model before memory does.

@@ -43,11 +43,12 @@ fn drivers() -> Vec<Driver> {
 
 #[test]
 fn the_selftest_passes_on_other_drivers() {
-    for (i, driver) in drivers().into_iter().enumerate() {
-        // The loss and the walks of a card on one of them.
-        let loss = ("LABELGS_LOSS", ["shared", "columns"][i % 2].to_owned());
-        let walk = ("LABELGS_WALK", ["group", "lane"][i % 2].to_owned());
-        let place = Place::on([&driver[..], &[loss, walk]].concat());
+    // The loss, the walks and the blends of a card on the one that is not Mesa's.
+    let of_card = [("LABELGS_LOSS", "shared"), ("LABELGS_WALK", "group"), ("LABELGS_BLEND", "group")]
+        .map(|(variable, form)| (variable, form.to_owned()));
+    let swiftshader = swiftshader().map(|driver| [&driver[..], &of_card].concat());
+    for driver in swiftshader.into_iter().chain(narrow_lavapipe()) {
+        let place = Place::on(driver.clone());
         let said = String::from_utf8_lossy(&succeeded_output(&place.labelgs(&["selftest", "--json"]))).into_owned();
         let found: serde_json::Value = serde_json::from_str(&said).expect("JSON");
         assert_eq!(found["kernels"]["emulated"], true, "{driver:?}: {found}");

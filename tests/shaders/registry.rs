@@ -3,7 +3,7 @@
 use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::pass::buffers::{Capacity, TABLE};
-use labelgs::pass::{KernelShape, Supervision, Variant};
+use labelgs::pass::{GroupBlend, KernelShape, Supervision, Variant};
 use labelgs::run::StrategyKind;
 use labelgs::scheduler::plan::{Buf, Grid, Limits, PassList, Plan, PlanOptions, Work};
 use labelgs::train::shared::exposure::Exposure;
@@ -45,10 +45,11 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping = own
-        .into_iter()
-        .chain(emulated)
-        .map(|shape| KernelShape { loss_tile: 16, narrow_labels: true, ..shape }.with_sweeps_of(8));
+    let sweeping = own.into_iter().chain(emulated).map(|shape| {
+        KernelShape { loss_tile: 16, narrow_labels: true, ..shape }
+            .with_sweeps_of(8)
+            .with_group_blend_of(GroupBlend::DEFAULT)
+    });
     let one_by_one: Vec<KernelShape> = own.into_iter().chain(emulated).chain(antialiased).chain(sweeping).collect();
     let shared_out = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape });
     for shape in one_by_one.iter().copied().chain(shared_out) {
