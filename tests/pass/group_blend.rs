@@ -1,13 +1,10 @@
-//! Blends by workgroups: what may not change a bit, and how long lists are cut.
+//! Blends by workgroups: what may not change a bit.
 
-use super::blend::opaque_scene;
-use super::fixture::Fixture;
+use super::fixture::{BLENDS, Fixture};
 use crate::support::device;
+use crate::support::scenes::{Shape, scene};
 use labelgs::pass::{GroupBlend, KernelShape};
 use labelgs::scheduler::plan::Buf;
-
-/// Chunks of 8 splats: lists of the scene have some twenty.
-const SHORT: GroupBlend = GroupBlend { chunk_length: 8, ..GroupBlend::DEFAULT };
 
 /// What a step leaves, as bits.
 #[derive(Debug, PartialEq)]
@@ -18,12 +15,14 @@ struct Step {
     losses: [u32; 3],
 }
 
-fn step(form: GroupBlend, labels: bool) -> Option<Step> {
+/// A step with object layers.
+fn step(form: GroupBlend) -> Option<Step> {
     let turn = device()?;
     let shape = KernelShape::of(turn.capabilities()).with_group_blend_of(form);
-    let mut fixture = Fixture::with_shape(turn, opaque_scene(56), labels, shape);
+    let crowded = Shape { gaussians: 200, width: 29, height: 19, opacities: (-4.0, 9.0), ..Shape::default() };
+    let mut fixture = Fixture::with_shape(turn, scene(56, &crowded), true, shape);
     let counters = fixture.train().counters;
-    assert!(counters.longest_list > 5 * SHORT.chunk_length, "lists have {} splats at most", counters.longest_list);
+    assert!(counters.longest_list > 64, "lists have {} splats at most", counters.longest_list);
     let (pixels, splats) = (fixture.pixels(), counters.visible_count as usize);
     Some(Step {
         picture: fixture.get(Buf::IMAGE, 4 * pixels),
@@ -35,18 +34,12 @@ fn step(form: GroupBlend, labels: bool) -> Option<Step> {
 
 #[test]
 fn neither_skipping_nor_the_order_of_workgroups_changes_a_bit() {
-    for labels in [false, true] {
-        let Some(of) = step(SHORT, labels) else { return };
-        assert!(of == step(GroupBlend { culls: false, ..SHORT }, labels).expect("a device"), "skipping changes bits");
-        assert!(of == step(GroupBlend { turned: true, ..SHORT }, labels).expect("a device"), "order changes bits");
-    }
-}
-
-/// Sums over chunks round otherwise: lengths differ in bits, so that the mirrors' tests see the length that they ask for.
-#[test]
-fn the_length_of_a_chunk_is_what_the_shape_says() {
-    let Some(short) = step(SHORT, false) else { return };
-    let whole = step(GroupBlend { chunk_length: 1024, ..SHORT }, false).expect("a device");
-    assert!(short.last == whole.last, "what counts depends on chunks");
-    assert!(short.gradients != whole.gradients, "there are no chunks");
+    let [_, Some(short)] = BLENDS else { panic!("a form by workgroups") };
+    let Some(of) = step(short) else { return };
+    assert!(of == step(GroupBlend { culls: false, ..short }).expect("a device"), "skipping changes bits");
+    assert!(of == step(GroupBlend { turned: true, ..short }).expect("a device"), "order changes bits");
+    // Sums over chunks round otherwise, so there are several.
+    let whole = step(GroupBlend { chunk_length: 1024, ..short }).expect("a device");
+    assert!(of.last == whole.last, "what counts depends on chunks");
+    assert!(of.gradients != whole.gradients, "there are no chunks");
 }
