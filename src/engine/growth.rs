@@ -39,7 +39,8 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
     // Lists bind the model's buffers even if the model is empty.
     let gaussians = size.gaussians.max(1);
-    let instances = (gaussians * 6).max(tiles * 16);
+    // About what trained scenes have: larger tiles share fewer Gaussians.
+    let instances = if shape.tile_pixels() >= 256 { gaussians * 5 / 2 } else { gaussians * 6 }.max(tiles * 16);
     let mut capacity = Capacity {
         gaussians,
         trained: if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 },
