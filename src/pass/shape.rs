@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
 use crate::shaders::constants::{LABEL_BORDER, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
+use crate::shaders::{BindingKind, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -30,6 +31,8 @@ pub struct KernelShape {
     /// The tiles of splats, and the records of those with many, are shared out among the invocations of a workgroup; else one
     /// invocation walks those of a splat.
     pub group_walks: bool,
+    /// How a step updates the parameters.
+    pub update: Update,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -39,6 +42,17 @@ pub struct KernelShape {
     /// Blur takes opacity from splats, as the model on the device needs it
     /// ([`Gaussians::antialiased`](crate::scene::Gaussians::antialiased)).
     pub antialiased: bool,
+}
+
+/// How a step updates the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// A pass sums gradients, one carries them back to the parameters, and one for each attribute updates all Gaussians.
+    Split,
+    /// One pass does that for those that the view touched, after one that updates all others.
+    Fused,
+    /// One pass, for those that the view touched; the others are late until something touches or changes them.
+    Lazy,
 }
 
 /// Largest id of a pixel of 16 bits, the highest of which is a flag.
@@ -65,7 +79,8 @@ impl KernelShape {
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
         let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
-        let shape = Self { narrow_labels, group_walks, ..shape };
+        let update = update_of(device, shape.texel);
+        let shape = Self { narrow_labels, group_walks, update, ..shape };
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -142,6 +157,7 @@ impl KernelShape {
             loss_tile: 0,
             narrow_labels: false,
             group_walks: false,
+            update: Update::Split,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
@@ -210,6 +226,23 @@ impl KernelShape {
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }
+    }
+}
+
+/// Returns how a device updates the parameters: in one kernel if that can have its buffers.
+fn update_of(device: &Capabilities, texel: bool) -> Update {
+    let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == texel);
+    let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
+    let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
+    if bindings.max().unwrap_or(0) > device.limits.plan.max_storage_buffers as usize {
+        return Update::Split;
+    }
+    match lab::var("LABELGS_UPDATE").as_deref() {
+        Some("split") => Update::Split,
+        Some("fused") => Update::Fused,
+        Some("lazy") => Update::Lazy,
+        _ if device.is_cpu() => Update::Split,
+        _ => Update::Lazy,
     }
 }
 

@@ -8,13 +8,13 @@ use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
-use labelgs::pass::KernelShape;
+use labelgs::pass::{KernelShape, Update};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
@@ -38,9 +38,10 @@ impl DerefMut for Fixture {
 }
 
 impl Fixture {
-    /// The scene on the shared device, with or without labels, with the device's kernel shape.
+    /// The scene on the shared device, with or without labels, with the device's kernel shape, but for a pass for each part of an
+    /// update, so that gradients can be read.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
-        let shape = KernelShape::of(turn.capabilities());
+        let shape = KernelShape { update: Update::Split, ..KernelShape::of(turn.capabilities()) };
         Self::with_shape(turn, scene, labels, shape)
     }
 

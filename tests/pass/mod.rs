@@ -22,5 +22,6 @@ mod relocate;
 mod step;
 mod sweeps;
 mod tile;
+mod update;
 mod votes;
 mod walks;

@@ -125,6 +125,10 @@ domains! {
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,
         "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
+    LATE_GAUSSIANS late_gaussians: "late gaussians", cures::model,
+        "Trained Gaussians that may miss updates: all of them, or none where each step updates all.", optional;
+    MISSED_ROWS missed_rows: "missed rows", cures::none,
+        "Rows of the table of what they missed.", optional;
     SHARED_ROWS shared_rows: "shared rows", cures::none,
         "Rows of four shared parameters, or 0 without any.", optional;
     .. sort_lanes: "Lanes of the sort.";
