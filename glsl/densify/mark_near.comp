@@ -28,6 +28,7 @@ FETCH4(8, u_scales);
 FETCHU(9, touched_at);
 READ(10, uvec4, missed);
 #endif
+#define plane4(name, e) fetch4(name, e)
 #include "caught_up.glsl"
 #ifdef LAZY
 CAUGHT_UP(means, late_means)

@@ -1,5 +1,6 @@
 // Parameters of a Gaussian with the updates that it has missed: those of the steps since its last one, in which its gradient
-// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP; LAZY: else nothing is missed.
+// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP; plane4 is an
+// element of one of them. LAZY: else nothing is missed.
 //
 // Without a gradient the moments shrink by beta1 and beta2, so that the k-th missed update moves a parameter by
 // r^k m / sqrt(v) times w, with r = beta1 / sqrt(beta2) and w the rate of that update with its corrections. The sums of r^k w
@@ -11,9 +12,6 @@
 
 #ifdef LAZY
 
-#ifndef plane4
-#define plane4(name, e) fetch4(name, e)
-#endif
 #ifndef touched
 #define touched(i) fetchu(touched_at, i)
 #endif
@@ -70,5 +68,5 @@ vec4 late_direction(vec4 m, vec4 v) {
 #define value4(name, e) name##_now(e)
 
 #else
-#define value4(name, e) fetch4(name, e)
+#define value4(name, e) plane4(name, e)
 #endif

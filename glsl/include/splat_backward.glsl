@@ -1,19 +1,6 @@
-// Gradients of a splat carried back to the parameters of its Gaussian. The includer includes projection.glsl, sh.glsl and what
-// reads the coefficients. Math: see project_backward.comp.
-
-struct Backward {
-    vec4 mean;         // xyz world, w opacity logit
-    vec3 log_scale;
-    vec4 quat;
-    vec3 colour;
-    float basis[15];   // the gradient of a coefficient is that of the colour times its basis value
-    bool is_sane;
-};
-
-// Gradients a: mean2d, conic xy; b: conic z, ln opacity, colour rg; blue.
-Backward splat_backward(StepUniforms u, uint i, vec4 mean, vec3 log_scale, vec4 quat, vec4 a, vec4 b, float blue) {
-    Projection p = project_gaussian(u, mean.xyz, log_scale, quat);
-    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
+// The body of a function: gradients of a splat carried back to the parameters of its Gaussian i. Given are the uniforms u; mean and
+// quat; the projection p; gradients a: mean2d, conic xy, b: conic z, ln opacity, colour rg, and blue; and sane, which is false if
+// these are not finite. The includer includes what reads the coefficients.
 
     vec3 offset = mean.xyz - u.camera_centre;
     float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
@@ -66,5 +53,3 @@ Backward splat_backward(StepUniforms u, uint i, vec4 mean, vec3 log_scale, vec4 
     float v_logit = b.y * (1.0 - opacity);
     float size = dot(abs(v_mean) + abs(v_log_scale) + abs(v_colour), vec3(1.0)) + dot(abs(v_quat), vec4(1.0)) + abs(v_logit);
     sane = sane && finite(size) && size < GRADIENT_MAX;
-    return Backward(vec4(v_mean, v_logit), v_log_scale, v_quat, v_colour, basis, sane);
-}

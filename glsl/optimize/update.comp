@@ -20,6 +20,7 @@
 // Mirror:  src/reference/project.rs::project_backward, densify.rs::accumulate, adam.rs::adam, lazy.rs::caught_up
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(constant_id = 18) const uint CHANGES = 1; // 0: the statistic alone
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
@@ -68,7 +69,6 @@ FETCHU(34, layer_from_label);
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 #include "sh_backward.glsl"
-#include "splat_backward.glsl"
 #include "records.glsl"
 #include "late_adam.glsl"
 
@@ -112,22 +112,29 @@ Sums sum_all(Records r, uint s) {
 // Updates all but colours, and keeps what their update needs.
 void update_geometry(StepUniforms u, uint i, Sums sums) {
     look_up(missed_updates(i));
-    Backward v = splat_backward(u, i, means_now(i), scales_now(i).xyz, quats_now(i), sums.a, sums.b, sums.c.x);
-    if (!v.is_sane) {
+    vec4 mean = means_now(i), quat = quats_now(i);
+    Projection p = project_gaussian(u, mean.xyz, scales_now(i).xyz, quat);
+    vec4 a = sums.a, b = sums.b;
+    float blue = sums.c.x;
+    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
+#include "splat_backward.glsl"
+    if (!sane) {
         atomicAdd(counters.nonfinite_count, 1u);
         atomicMin(counters.nonfinite_first, i);
+    }
+    if (!sane || CHANGES == 0u) {
         return;
     }
-    means_step(u, i, v.mean, u.rate_means);
-    scales_step(u, i, vec4(v.log_scale, 0.0), vec4(u.rate_scales));
-    quats_step(u, i, v.quat, vec4(u.rate_quats));
+    means_step(u, i, vec4(v_mean, v_logit), u.rate_means);
+    scales_step(u, i, vec4(v_log_scale, 0.0), vec4(u.rate_scales));
+    quats_step(u, i, v_quat, vec4(u.rate_quats));
     touched_at[i] = missed[0].x + 1u;
     uint slot = atomicAdd(touched_count, 1u); // in any order: each is updated for itself
     touched_row[slot] = i;
     touched_late[slot] = is_late ? vec4(late_rest.zw, late_shrink) : vec4(0.0);
-    touched_colour[slot] = v.colour;
+    touched_colour[slot] = v_colour;
     for (uint k = 0u; k < 15u; k++) {
-        touched_basis[15u * slot + k] = v.basis[k];
+        touched_basis[15u * slot + k] = basis[k];
     }
 }
 

@@ -28,6 +28,7 @@ FETCH4(9, u_scales);
 FETCHU(10, touched_at);
 READ(11, uvec4, missed);
 #endif
+#define plane4(name, e) fetch4(name, e)
 #include "caught_up.glsl"
 #ifdef LAZY
 CAUGHT_UP(means, late_means)

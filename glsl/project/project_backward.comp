@@ -42,7 +42,6 @@ INOUT1(18, Counters, counters);
 #include "sh_colour.glsl"
 #include "sh_backward.glsl"
 #include "sh_store.glsl"
-#include "splat_backward.glsl"
 
 void main() {
     StepUniforms u = step;
@@ -51,15 +50,18 @@ void main() {
         return;
     }
     uint i = fetchu(gaussian_from_splat, s);
+    vec4 mean = fetch4(means, i), quat = fetch4(quats, i);
+    Projection p = project_gaussian(u, mean.xyz, fetch4(scales, i).xyz, quat);
     vec4 a = fetch4(v_splats, 3u * s), b = fetch4(v_splats, 3u * s + 1u);
     float blue = fetch4(v_splats, 3u * s + 2u).x;
-    Backward v = splat_backward(u, i, fetch4(means, i), fetch4(scales, i).xyz, fetch4(quats, i), a, b, blue);
-    if (!v.is_sane) {
+    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
+#include "splat_backward.glsl"
+    if (!sane) {
         atomicAdd(counters.nonfinite_count, 1u);
         atomicMin(counters.nonfinite_first, i);
     }
-    v_means[s] = v.is_sane ? v.mean : vec4(0.0);
-    v_scales[s] = v.is_sane ? vec4(v.log_scale, 0.0) : vec4(0.0);
-    v_quats[s] = v.is_sane ? v.quat : vec4(0.0);
-    store_sh_gradient(s, v.basis, v.is_sane ? v.colour : vec3(0.0));
+    v_means[s] = sane ? vec4(v_mean, v_logit) : vec4(0.0);
+    v_scales[s] = sane ? vec4(v_log_scale, 0.0) : vec4(0.0);
+    v_quats[s] = sane ? v_quat : vec4(0.0);
+    store_sh_gradient(s, basis, sane ? v_colour : vec3(0.0));
 }

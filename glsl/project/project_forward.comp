@@ -56,6 +56,7 @@ FETCH4(28, u_sh3);
 FETCHU(29, touched_at);
 READ(30, uvec4, missed);
 #endif
+#define plane4(name, e) fetch4(name, e)
 #include "caught_up.glsl"
 #ifdef LAZY
 #include "caught_up_planes.glsl"

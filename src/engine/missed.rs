@@ -135,13 +135,11 @@ impl Engine {
         self.capacity.missed_rows > 0
     }
 
-    /// The variant of a training step with an update in one kernel, or without; `None` for other lists.
+    /// The variant of a training step, and whether one kernel makes its update; `None` for other lists.
     fn step_of(&self, key: ListKey) -> Option<(Variant, bool)> {
         match key {
-            ListKey::Train(variant) => Some((variant, is_fused(&self.shape, variant, (&(), 0)))),
-            ListKey::Extended(variant, passes) => {
-                Some((variant, is_fused(&self.shape, variant, (&*self.extension, passes))))
-            }
+            ListKey::Train(variant) => Some((variant, is_fused(&self.shape, (&(), 0)))),
+            ListKey::Extended(variant, passes) => Some((variant, is_fused(&self.shape, (&*self.extension, passes)))),
             _ => None,
         }
     }

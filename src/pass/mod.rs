@@ -159,7 +159,7 @@ pub fn extended_step(
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.sh_degree);
     (b.supervision, b.counts) = (variant.supervision, variant.counts);
-    b.late = is_fused(shape, variant, (extension, passes));
+    b.late = is_fused(shape, (extension, passes));
     if variant.catch_up {
         update::catch_up(&mut b);
     }
@@ -176,7 +176,7 @@ pub fn extended_step(
         loss::reduce(&mut b);
     }
     if b.late {
-        update::update(&mut b);
+        update::update(&mut b, variant.update);
     } else {
         gather::gather(&mut b);
         project::project_backward(&mut b);

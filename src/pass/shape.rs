@@ -79,8 +79,20 @@ impl KernelShape {
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
         let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
-        let update = update_of(device, shape.texel);
-        let shape = Self { narrow_labels, group_walks, update, ..shape };
+        let shape = Self { narrow_labels, group_walks, ..shape };
+        let update = match lab::var("LABELGS_UPDATE").as_deref() {
+            Some("split") => Update::Split,
+            Some("fused") => Update::Fused,
+            Some("lazy") => Update::Lazy,
+            _ => {
+                if is_card {
+                    Update::Lazy
+                } else {
+                    Update::Split
+                }
+            }
+        };
+        let shape = shape.with_lazy_updates(device).map_or(shape, |shape| Self { update, ..shape });
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -96,6 +108,15 @@ impl KernelShape {
                 && 4 * (2 * outer * (outer + 1) + 4 * outer * (middle + 1) + 1) <= limits.max_shared
         };
         [16, 8].into_iter().find(fits).map(|loss_tile| Self { loss_tile, ..self })
+    }
+
+    /// Returns this shape with an update in one kernel; `None` if that cannot have its buffers.
+    pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
+        let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
+        let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
+        let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
+        let fits = bindings.max().unwrap_or(0) <= device.limits.plan.max_storage_buffers as usize;
+        fits.then_some(Self { update: Update::Lazy, ..self })
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -226,23 +247,6 @@ impl KernelShape {
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }
-    }
-}
-
-/// Returns how a device updates the parameters: in one kernel if that can have its buffers.
-fn update_of(device: &Capabilities, texel: bool) -> Update {
-    let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == texel);
-    let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
-    let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
-    if bindings.max().unwrap_or(0) > device.limits.plan.max_storage_buffers as usize {
-        return Update::Split;
-    }
-    match lab::var("LABELGS_UPDATE").as_deref() {
-        Some("split") => Update::Split,
-        Some("fused") => Update::Fused,
-        Some("lazy") => Update::Lazy,
-        _ if device.is_cpu() => Update::Split,
-        _ => Update::Lazy,
     }
 }
 

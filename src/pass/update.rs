@@ -3,21 +3,17 @@
 
 use super::build::{Builder, over_gaussians};
 use super::shape::Update;
-use super::{Extension, KernelShape, Variant};
+use super::{Extension, KernelShape};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Returns true if one kernel updates the parameters in this step: it has an update of all Gaussians, in which no extension
-/// takes part.
-pub(crate) fn is_fused(shape: &KernelShape, variant: Variant, (extension, passes): (&dyn Extension, u32)) -> bool {
-    shape.update != Update::Split
-        && variant.update
-        && !extension.splits_update(passes)
-        && extension.updates_unseen(passes)
+/// Returns true if one kernel makes the update of a step, or its statistic alone: no extension takes part in it.
+pub(crate) fn is_fused(shape: &KernelShape, (extension, passes): (&dyn Extension, u32)) -> bool {
+    shape.update != Update::Split && !extension.splits_update(passes) && extension.updates_unseen(passes)
 }
 
-/// Sums the gradient records of the trained Gaussians that the view shows, and updates those with a gradient.
-pub(super) fn update(b: &mut Builder) {
+/// Sums the gradient records of the trained Gaussians that the view shows, and with `changes` updates those with a gradient.
+pub(super) fn update(b: &mut Builder, changes: bool) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::OPTIMISE;
     pass!(b, update(labels: b.supervision.has_layers()) {
@@ -29,7 +25,7 @@ pub(super) fn update(b: &mut Builder) {
         m_quats: Buf::M_QUATS, m_sh0: Buf::M_SH0, m_sh1: Buf::M_SH1, m_sh2: Buf::M_SH2, m_sh3: Buf::M_SH3,
         u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
         u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-    } [sh_degree: sh_degree], over_gaussians());
+    } [sh_degree: sh_degree, changes: u32::from(changes)], over_gaussians());
 }
 
 /// Gives all Gaussians the updates that they have missed.

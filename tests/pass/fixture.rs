@@ -8,7 +8,7 @@ use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
-use labelgs::pass::{KernelShape, Update};
+use labelgs::pass::KernelShape;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
@@ -38,10 +38,9 @@ impl DerefMut for Fixture {
 }
 
 impl Fixture {
-    /// The scene on the shared device, with or without labels, with the device's kernel shape, but for a pass for each part of an
-    /// update, so that gradients can be read.
+    /// The scene on the shared device, with or without labels, with the device's kernel shape.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
-        let shape = KernelShape { update: Update::Split, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape::of(turn.capabilities());
         Self::with_shape(turn, scene, labels, shape)
     }
 
@@ -54,6 +53,12 @@ impl Fixture {
     pub fn with_options(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, options: SchedulerOptions) -> Self {
         let inner = fixture::Fixture::new(turn.gpu(), scene, labels, shape, options).expect("the engine starts");
         Self { inner, _turn: turn }
+    }
+
+    /// As `with_shape`, with updates of the shape.
+    pub fn with_update(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
+        let inner = fixture::Fixture::with_rows(turn.gpu(), scene, labels, (shape, readable()), 0);
+        Self { inner: inner.expect("the engine starts"), _turn: turn }
     }
 
     /// The device's sorted pairs: keys, and places before the sort.

@@ -1,11 +1,14 @@
 //! The update of a step in one kernel against the passes that it replaces, and Gaussians that are late.
 
-use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS};
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove, readable};
 use crate::reference::Row;
 use crate::support::device;
+use crate::support::device::Turn;
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::pass::{KernelShape, Update};
 use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::fixture;
+use labelgs::verify::selftest::update::{late, partly_frozen, step};
 
 const COUNT: usize = 90;
 const FROZEN: usize = 10;
@@ -21,12 +24,13 @@ struct After {
 }
 
 /// Steps whose camera looks at either half of the scene in turn; `late`: nobody catches up before the last step.
-fn steps(update: Update, labels: bool, count: u32) -> Option<Vec<After>> {
+fn steps(update: Update, (labels, antialiased): (bool, bool), count: u32) -> Option<Vec<After>> {
     let turn = device()?;
     let shape = Shape { gaussians: COUNT, ..Shape::default() };
-    let scene = Scene { frozen: FROZEN as u32, ..scene(103, &shape) };
+    let mut scene = Scene { frozen: FROZEN as u32, ..scene(103, &shape) };
+    scene.gaussians.antialiased = antialiased;
     let kernels = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
-    let mut fixture = Fixture::with_shape(turn, scene, labels, kernels);
+    let mut fixture = Fixture::with_update(turn, scene, labels, kernels);
     fixture.input.update = true;
     let cx = fixture.scene.camera.cx;
     let mut all = Vec::new();
@@ -67,14 +71,37 @@ fn differences(a: &After, b: &After) -> [f64; 3] {
     [most(0, &|_| 1.0), most(1, &largest), most(2, &largest)]
 }
 
+fn lazy(turn: Turn, seed: u64) -> Fixture {
+    let shape = KernelShape::of(turn.capabilities()).with_lazy_updates(turn.capabilities()).expect("few buffers");
+    Fixture::with_update(turn, partly_frozen(seed), true, shape)
+}
+
+#[test]
+fn an_update_in_one_kernel_equals_its_mirror() {
+    let Some(turn) = device() else { return };
+    let gpu = turn.gpu();
+    let shape = KernelShape::of(turn.capabilities());
+    let mut fused = lazy(turn, 104);
+    let mut split = fixture::Fixture::new(gpu, partly_frozen(104), true, shape, readable()).expect("it starts");
+    let judge = step(&mut fused, &mut split).expect("it runs");
+    prove("update", &["adam_beta1", "adam_beta2"], judge);
+}
+
+#[test]
+fn late_gaussians_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let judge = late(&mut lazy(turn, 105)).expect("it runs");
+    prove("late Gaussians", &["adam_beta1", "adam_beta2"], judge);
+}
+
 #[test]
 fn one_kernel_updates_as_the_passes_do() {
-    for labels in [false, true] {
-        let Some(split) = steps(Update::Split, labels, 7) else { return };
-        let fused = steps(Update::Fused, labels, 7).expect("a device");
+    for what in [(false, false), (true, false), (false, true)] {
+        let Some(split) = steps(Update::Split, what, 7) else { return };
+        let fused = steps(Update::Fused, what, 7).expect("a device");
         for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
             let found = differences(a, b);
-            println!("labels {labels}, step {}: {found:?}, {} of {COUNT} unseen", step + 1, a.unseen);
+            println!("(labels, antialiased) {what:?}, step {}: {found:?}, {} of {COUNT} unseen", step + 1, a.unseen);
         }
         for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
             assert_eq!((a.visible, a.nonfinite, a.unseen), (b.visible, b.nonfinite, b.unseen), "step {step}");
@@ -90,8 +117,8 @@ fn one_kernel_updates_as_the_passes_do() {
 
 #[test]
 fn late_gaussians_catch_up_to_those_of_every_step() {
-    let Some(lazy) = steps(Update::Lazy, true, 12) else { return };
-    let fused = steps(Update::Fused, true, 12).expect("a device");
+    let Some(lazy) = steps(Update::Lazy, (true, false), 12) else { return };
+    let fused = steps(Update::Fused, (true, false), 12).expect("a device");
     let (mut late, mut last) = (0, [0.0; 3]);
     for (a, b) in lazy.iter().zip(&fused) {
         last = differences(a, b);
