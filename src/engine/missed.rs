@@ -251,7 +251,7 @@ mod tests {
     fn updates_that_were_not_made_are_taken_back() {
         let (mut missed, mut other) = (Missed::default(), Missed::default());
         for update in 0..300 {
-            [&mut missed, &mut other].map(|of| of.advance([update as f32; 8]));
+            [&mut missed, &mut other].into_iter().for_each(|of| of.advance([update as f32; 8]));
         }
         let before = missed.mark;
         (0..4).for_each(|_| missed.advance([1e9; 8]));

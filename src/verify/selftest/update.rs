@@ -48,8 +48,8 @@ pub fn late(fixture: &mut Fixture) -> Result<Judge> {
     fixture.input.update = true;
     fixture.scene.camera.cx += 1e5;
     // Second moments of a few times the squares of the first ones.
-    let moment =
-        |row: usize, at: usize| (1.0 + (row * 7 + at * 3) as f64 % 5.0) * if at % 2 == 0 { 1e-3 } else { -2e-4 };
+    let sign = |at: usize| if at.is_multiple_of(2) { 1e-3 } else { -2e-4 };
+    let moment = |row: usize, at: usize| (1.0 + (row * 7 + at * 3) as f64 % 5.0) * sign(at);
     let count = COUNT - fixture.scene.frozen as usize;
     let rows = |of: &dyn Fn(f64) -> f64| -> Vec<Row> {
         let values = |row| std::array::from_fn(|at| f64::from(of(moment(row, at)) as f32));
