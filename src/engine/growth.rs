@@ -4,10 +4,10 @@ use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::buffers::Capacity;
-use crate::pass::{self, KernelShape, Supervision, Variant, loss};
+use crate::pass::{self, KernelShape, Supervision, Update, Variant, loss};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, MemoryReport, PassList};
-use crate::shaders::constants::LABEL_ROUNDS;
+use crate::shaders::constants::{LABEL_ROUNDS, MISSED_ROWS};
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -58,12 +58,20 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape, width, height)),
+        late_gaussians: late(shape, size, gaussians),
+        missed_rows: if late(shape, size, gaussians) > 0 { u64::from(MISSED_ROWS) } else { 0 },
         segments: 1,
         shared_rows: u64::from(size.shared_rows),
         ..Capacity::default()
     };
     derive(shape, &mut capacity, instances, size.trained);
     capacity
+}
+
+/// Returns how many Gaussians may miss updates.
+fn late(shape: &KernelShape, size: &EngineSize, gaussians: u64) -> u64 {
+    let is_lazy = size.trained && shape.update != Update::Split;
+    if is_lazy { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 }
 }
 
 /// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
 use crate::shaders::constants::{LABEL_BORDER, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
+use crate::shaders::{BindingKind, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -32,6 +33,8 @@ pub struct KernelShape {
     pub group_walks: bool,
     /// The blends of a card; `None` with a subgroup for each tile.
     pub group_blend: Option<GroupBlend>,
+    /// How a step updates the parameters.
+    pub update: Update,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -61,6 +64,17 @@ pub struct GroupBlend {
 impl GroupBlend {
     /// What cards use.
     pub const DEFAULT: Self = Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, culls: true, turned: false };
+}
+
+/// How a step updates the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// A pass sums gradients, one carries them back to the parameters, and one for each attribute updates all Gaussians.
+    Split,
+    /// One pass does that for those that the view touched, after one that updates all others.
+    Fused,
+    /// One pass, for those that the view touched; the others are late until something touches or changes them.
+    Lazy,
 }
 
 /// Largest id of a pixel of 16 bits, the highest of which is a flag.
@@ -93,6 +107,19 @@ impl KernelShape {
         let shape = Self { narrow_labels, group_walks, ..shape };
         let has_groups = chosen("LABELGS_BLEND", ["lane", "group"]).unwrap_or(is_card && !shape.emulated);
         let shape = if has_groups { shape.with_group_blend(device).unwrap_or(shape) } else { shape };
+        let update = match lab::var("LABELGS_UPDATE").as_deref() {
+            Some("split") => Update::Split,
+            Some("fused") => Update::Fused,
+            Some("lazy") => Update::Lazy,
+            _ => {
+                if is_card {
+                    Update::Lazy
+                } else {
+                    Update::Split
+                }
+            }
+        };
+        let shape = shape.with_lazy_updates(device).map_or(shape, |shape| Self { update, ..shape });
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -133,6 +160,15 @@ impl KernelShape {
     /// Chunks of so many pairs in the lists of so many tiles; 0 if the backward blend walks tiles.
     pub fn chunks(&self, instances: u64, jobs: u64) -> u64 {
         self.group_blend.map_or(0, |blend| instances / u64::from(blend.chunk_length) + jobs)
+    }
+
+    /// Returns this shape with an update in one kernel; `None` if that cannot have its buffers.
+    pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
+        let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
+        let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
+        let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
+        let fits = bindings.max().unwrap_or(0) <= device.limits.plan.max_storage_buffers as usize;
+        fits.then_some(Self { update: Update::Lazy, ..self })
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -195,6 +231,7 @@ impl KernelShape {
             narrow_labels: false,
             group_walks: false,
             group_blend: None,
+            update: Update::Split,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),

@@ -14,7 +14,7 @@ use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
@@ -63,6 +63,12 @@ impl Fixture {
     pub fn with_options(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, options: SchedulerOptions) -> Self {
         let inner = fixture::Fixture::new(turn.gpu(), scene, labels, shape, options).expect("the engine starts");
         Self { inner, _turn: turn }
+    }
+
+    /// As `with_shape`, with updates of the shape.
+    pub fn with_update(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
+        let inner = fixture::Fixture::with_rows(turn.gpu(), scene, labels, (shape, readable()), 0);
+        Self { inner: inner.expect("the engine starts"), _turn: turn }
     }
 
     /// The device's sorted pairs: keys, and places before the sort.

@@ -23,5 +23,6 @@ mod relocate;
 mod step;
 mod sweeps;
 mod tile;
+mod update;
 mod votes;
 mod walks;

@@ -20,6 +20,7 @@ crate::buffers! { cures::whole;
     VOTE_WEIGHTS "vote_weights": 4, Domain::VOTE_COLUMNS, Class::PerFrame, None, "Weight of the votes for each label in this view.";
     STEP_ROWS "step_rows": 4, Domain::SHARED_ROWS, Class::PerFrame, WORD, "Shared rows of the step: the scene's, then the photo's, then NO_ROW.";
     STEP_RATES "step_rates": 16, Domain::SHARED_ROWS, Class::PerFrame, None, "Learning rates of these rows; rows with rates of 0 stay unchanged.";
+    MISSED "missed": 48, Domain::MISSED_ROWS, Class::PerFrame, None, "What Gaussians moved without gradients, by the number of updates (glsl/include/caught_up.glsl).";
     REPORT "report": size_of::<Counters>() as u32, Domain::ONE, Class::Report, None, "Counters of the step, for the host.";
     REPORT_FAILURE "report_failure": 4, Domain::ONE, Class::Report, None, "Failure word of the step, for the host.";
 
@@ -50,6 +51,7 @@ crate::buffers! { cures::whole;
     U_SHARED "u_shared": 16, Domain::SHARED_ROWS, Class::Model, VEC4, "Second moments of shared_parameters.";
     W_SHARED "w_shared": 8, Domain::SHARED_ROWS, Class::Model, None, "Bias correction of both moments of each row, `[S]`: 1 - beta^t after its t-th update.";
     DENSIFY_STATS "densify_stats": 8, Domain::TRAINED, Class::Model, None, "Sum of screen gradients and number of views since the last densification, or the weights of a pruning by weight, `[N]`.";
+    TOUCHED_AT "touched_at": 4, Domain::LATE_GAUSSIANS, Class::Model, WORD, "Number of the last update of each Gaussian, `[N]`.";
     LABEL_KEYS "label_keys": 4, Domain::LABELLED, Class::Persistent, None, "Highest vote of the step, `[N]`: weight in the high half, label in the low half; 0 without votes.";
     LABEL_MAP "label_map": 4, Domain::LABELLED_PIXELS, Class::Persistent, None, "Label of each pixel, `[P]`: the one with the largest sum of weights.";
     LABEL_WEIGHTS "label_weights": 4, Domain::LABELLED_PIXELS, Class::Step, None, "Sum of the weights of that label, `[P]`.";

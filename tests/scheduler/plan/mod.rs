@@ -121,6 +121,8 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sweep_cells: 0,
         loss_partials: 1024,
         sort_lanes: 64,
+        late_gaussians: 0,
+        missed_rows: 0,
         shared_rows: 70,
         segments: 2,
     };
