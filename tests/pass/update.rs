@@ -1,6 +1,7 @@
 //! The update of a step in one kernel against the passes that it replaces, and Gaussians that are late.
 
 use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove, readable};
+use super::walks::{WALKERS, tall_scene};
 use crate::reference::Row;
 use crate::support::device;
 use crate::support::device::Turn;
@@ -128,4 +129,31 @@ fn late_gaussians_catch_up_to_those_of_every_step() {
     }
     assert!(late > 3, "Gaussians were late in {late} steps");
     assert!(last[0] < 2e-6 && last[1] < 1e-5 && last[2] < 1e-5, "{last:?}");
+}
+
+/// A splat with more records than a workgroup has invocations is summed by all of them, in the order of `gather`: the same bits of
+/// the statistic.
+#[test]
+fn large_splats_are_summed_by_a_workgroup() {
+    let run = |update| {
+        let turn = device()?;
+        let shape = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
+        let scene = tall_scene();
+        let count = scene.gaussians.len();
+        let mut fixture = Fixture::with_update(turn, scene, true, shape);
+        fixture.config.sh_degree = 0;
+        fixture.input.update = true;
+        let visible = fixture.train().counters.visible_count as usize;
+        let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, visible);
+        let large = touched.iter().filter(|&&records| records > WALKERS).count();
+        assert!(large > 3 && large + 3 < visible, "{large} of {visible} are large");
+        Some((fixture.get::<[u32; 2]>(Buf::DENSIFY_STATS, count), fixture.rows(MOMENTS_1, count)))
+    };
+    let Some((stats, moments)) = run(Update::Split) else { return };
+    let (found, found_moments) = run(Update::Lazy).expect("a device");
+    assert!(stats.iter().filter(|stat| stat[1] != 0).count() > 10 && found == stats);
+    for (a, b) in found_moments.iter().zip(&moments) {
+        let scale = b.floats().iter().fold(1e-30, |most: f64, of| most.max(of.abs()));
+        assert!(a.floats().iter().zip(b.floats()).all(|(a, b)| (a - b).abs() < 1e-5 * scale), "{a:?} {b:?}");
+    }
 }
