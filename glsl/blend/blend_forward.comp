@@ -217,7 +217,11 @@ void main() {
 
 #ifdef LABELS
     if (t.layer != 0u) {
-        finish_layer(t, T, cr, cg, cb, final_, u);
+        vec3 colour[ROWS];
+        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+            colour[k] = vec3(cr[k], cg[k], cb[k]);
+        }
+        finish_layer(t, T, colour, final_, u);
         return;
     }
 #endif

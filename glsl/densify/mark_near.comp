@@ -7,7 +7,7 @@
 // mark_near — mark the Gaussians that fog the camera of the step or one on the way to another camera: before its near
 //             plane, or so large that they engulf the camera of the step. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step, failure; means, scales [N]
+// Reads:   step, failure; means, scales [N]; variant lazy: moments of both, touched_at [N], missed
 // Writes:  densify_stats [N]: (0, STAT_NEAR) for a marked Gaussian
 // Math:    0 <= z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
 //          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
@@ -20,6 +20,20 @@ FETCH4(1, means);
 FETCH4(2, scales);
 INOUT(3, vec2, densify_stats);
 READ1(4, uint, failure);
+#ifdef LAZY
+FETCH4(5, m_means);
+FETCH4(6, m_scales);
+FETCH4(7, u_means);
+FETCH4(8, u_scales);
+FETCHU(9, touched_at);
+READ(10, uvec4, missed);
+#endif
+#define plane4(name, e) fetch4(name, e)
+#include "caught_up.glsl"
+#ifdef LAZY
+CAUGHT_UP(means, late_means)
+CAUGHT_UP(scales, late_rest.x)
+#endif
 
 // The six conditions, each true if not negative.
 float[6] conditions(StepUniforms u, vec3 p, float near) {
@@ -45,7 +59,10 @@ void main() {
     if (i >= u.trained_count || failure != 0u) {
         return;
     }
-    vec3 mean = fetch4(means, i).xyz, s = fetch4(scales, i).xyz, d = mean - u.free_centre;
+#ifdef LAZY
+    look_up_after(i);
+#endif
+    vec3 mean = value4(means, i).xyz, s = value4(scales, i).xyz, d = mean - u.free_centre;
     vec3 from = to_view(u, mean), to = vec3(dot(u.view_row0, d), dot(u.view_row1, d), dot(u.view_row2, d));
     bool engulfs = exp(max(s.x, max(s.y, s.z))) > FREE_SIZE * length(from);
     if (engulfs || fogs(u, from, from, u.near) || (u.free_near > 0.0 && fogs(u, from, to, u.free_near))) {

@@ -35,4 +35,5 @@ void main() {
     put(ARGS_SWEEP_INSTANCES, uvec3(0u, 1u, 1u));
     put(ARGS_SWEEP_TILES, folded_groups(partitions(step.tile_count * (step.layer_count + 1u))));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
+    put(ARGS_CHUNKS, uvec3(0u, 1u, 1u));
 }

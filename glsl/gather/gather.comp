@@ -31,91 +31,14 @@ FETCHU(11, labels);
 FETCHU(12, layer_from_label);
 #endif
 
-#ifdef GROUP
-const uint WALKERS = 64u; // invocations of a workgroup
-shared uint large_count;  // splats with more records than that,
-shared uint large[WALKERS];
-shared vec4 shared_a[WALKERS / 2u], shared_b[WALKERS / 2u]; // and sums of one of them
-shared vec3 shared_c[WALKERS / 2u];
-#endif
-
-// Records of a splat; those of the scene layer are first.
-struct Records {
-    uint first, total, scene, gaussian;
-};
-
-struct Sums {
-    vec4 a, b;
-    vec3 c; // blue; v_mean2d of the scene layer for the statistic
-};
-
-Records records(uint s) {
-    Records r;
-    r.total = fetchu(tiles_touched, s);
-    r.first = fetchu(instance_offsets, s);
-    r.scene = r.total;
-    r.gaussian = fetchu(gaussian_from_splat, s);
-#ifdef LABELS
-    r.scene = fetchu(layer_from_label, fetchu(labels, r.gaussian)) != 0u ? r.total / 2u : r.total;
-#endif
-    return r;
-}
-
-// Adds up every stride-th record.
-Sums sum_records(Records r, uint from, uint stride) {
-    uint stamp = step.stamp;
-    Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
-    for (uint k = from; k < r.total; k += stride) {
-        uint at = r.first + k;
-        vec4 ra = fetch4(v_instances_a, at), rb = fetch4(v_instances_b, at), rc = fetch4(v_instances_c, at);
-        bool current = floatBitsToUint(rc.y) == stamp;
-        sums.a += current ? ra : vec4(0.0);
-        sums.b += current ? rb : vec4(0.0);
-        sums.c.x += current ? rc.x : 0.0;
-        vec2 tile_mean = step.sum_absolute != 0u ? abs(ra.xy) : ra.xy;
-        sums.c.yz += current && k < r.scene ? tile_mean : vec2(0.0);
-    }
-    return sums;
-}
+#include "records.glsl"
 
 void finish(uint s, Records r, Sums sums) {
     v_splats[3u * s] = sums.a;
     v_splats[3u * s + 1u] = sums.b;
     v_splats[3u * s + 2u] = vec4(sums.c.x, 0.0, 0.0, 0.0);
-    if (r.total > 0u && r.gaussian < step.trained_count) {
-        float size = length(sums.c.yz * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
-        // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
-        if (finite(size) && size < GRADIENT_MAX) {
-            densify_stats[r.gaussian] += vec2(size, 1.0);
-        }
-    }
+    note_gradient(r, sums);
 }
-
-#ifdef GROUP
-// A splat by all invocations: each adds up every 64th record, and a tree their sums.
-void gather_together(uint s) {
-    uint lane = gl_LocalInvocationID.x;
-    Records r = records(s);
-    Sums sums = sum_records(r, lane, WALKERS);
-    for (uint width = WALKERS / 2u; width > 0u; width /= 2u) {
-        if (lane >= width && lane < 2u * width) {
-            shared_a[lane - width] = sums.a;
-            shared_b[lane - width] = sums.b;
-            shared_c[lane - width] = sums.c;
-        }
-        barrier();
-        if (lane < width) {
-            sums.a += shared_a[lane];
-            sums.b += shared_b[lane];
-            sums.c += shared_c[lane];
-        }
-        barrier();
-    }
-    if (lane == 0u) {
-        finish(s, r, sums);
-    }
-}
-#endif
 
 void main() {
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
@@ -126,7 +49,7 @@ void main() {
     barrier();
 #endif
     if (s < counters.visible_count && failure == 0u) {
-        Records r = records(s);
+        Records r = records(s, fetchu(gaussian_from_splat, s));
 #ifdef GROUP
         if (r.total > WALKERS) {
             large[atomicAdd(large_count, 1u)] = s; // in any order: each splat is summed for itself
@@ -139,7 +62,11 @@ void main() {
 #ifdef GROUP
     barrier();
     for (uint k = 0u; k < large_count; k++) {
-        gather_together(large[k]);
+        Records r = records(large[k], fetchu(gaussian_from_splat, large[k]));
+        Sums sums = sum_together(r);
+        if (gl_LocalInvocationID.x == 0u) {
+            finish(large[k], r, sums);
+        }
     }
 #endif
 }

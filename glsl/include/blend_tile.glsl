@@ -14,25 +14,7 @@ layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
 
 const uint ROWS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP_SIZE;
 
-struct TileJob {
-    uint layer;      // 0: the scene
-    uint tile;       // within the layer
-    uint layer_tile; // index among the occupied layer tiles
-    uint x, y0;      // the lane's column and first row, px
-    float px;        // centre of the lane's column relative to the tile's left edge
-    float row0;      // first row of the lane relative to the tile's top edge
-};
-
-// Some devices split a dispatch in two halves; they split it here.
-bool in_first_half(uint i, uint n) {
-    return i < (n + 1u) / 2u;
-}
-
-// Neighbouring tiles cost about the same. The even ones form the first half of the groups and the odd ones the second,
-// so devices that split a dispatch into fixed halves get two halves of equal cost.
-uint interleave(uint i, uint n) {
-    return in_first_half(i, n) ? 2u * i : 2u * (i - (n + 1u) / 2u) + 1u;
-}
+#include "tile_job.glsl"
 
 TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
     TileJob t;
@@ -47,6 +29,14 @@ TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
     t.row0 = float(band * ROWS) + 0.5;
     return t;
 }
+
+// Where memory keeps a pixel of the lane, within its tile.
+uint tile_pixel(TileJob t, uint k) {
+    return k * SUBGROUP_SIZE + gl_LocalInvocationID.x;
+}
+
+// The sum over a tile's pixels.
+#define tile_sum(v) subgroup_sum(v)
 
 // Exponent form of one splat relative to the tile's corner, as loaded by one lane.
 struct TileSplat {

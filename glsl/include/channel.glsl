@@ -20,16 +20,18 @@ float differs(uint pixel, uint splat, float weight) {
     return splat == pixel ? 0.0 : weight;
 }
 
+#ifndef NO_SUM
 void write_sum(uint tile, float wrong[ROWS]) {
     float sum = 0.0;
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         sum += wrong[k];
     }
-    sum = subgroup_sum(sum);
+    sum = tile_sum(sum);
     if (gl_LocalInvocationID.x == 0u) {
         disagreement[tile] = sum;
     }
 }
+#endif
 #else
 // Depths: 1 / known depth of the pixel, 0 for unknown, against the splat's; behind all splats nothing is right.
 uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {

@@ -37,8 +37,7 @@ void lift(uint p, uint splat, float weight, StepUniforms u) {
 }
 
 // Output of blend_forward for a layer's tile: its loss, and the state at the start of the backward pass.
-void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], float cb[ROWS], uint final_[ROWS],
-                  StepUniforms u) {
+void finish_layer(TileJob t, float T[ROWS], vec3 colour[ROWS], uint final_[ROWS], StepUniforms u) {
     float loss = 0.0;
     uint label = label_from_layer[t.layer];
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -48,7 +47,7 @@ void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], floa
         vec4 photo = fetchc(target, p);
         vec4 wanted = here == label ? vec4(photo.xyz, 1.0) : vec4(0.0);
         bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
-        vec4 difference = counts ? vec4(cr[k], cg[k], cb[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
+        vec4 difference = counts ? vec4(colour[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
         vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
         // Opacity costs what it is off beyond the slack, but not where another object may be before this one. Without any
         // opacity that is 1 - slack inside the mask, 0 outside.
@@ -57,7 +56,7 @@ void finish_layer(TileJob t, float T[ROWS], float cr[ROWS], float cg[ROWS], floa
         difference.w = off > 0.0 ? difference.w : 0.0;
         layer_state[layer_pixel(t, k)] = uvec2(floatBitsToUint(abs(T[k])), final_[k] | pack_signs(difference));
     }
-    loss = subgroup_sum(loss);
+    loss = tile_sum(loss);
     if (gl_LocalInvocationID.x == 0u) {
         layer_loss[t.layer_tile] = loss * layer_weights[t.layer];
     }

@@ -1,7 +1,7 @@
 // State of a layer's pixel for the backward pass: transmittance, position of the last splat, signs of the L1 gradients.
 
 uint layer_pixel(TileJob t, uint k) { // index into layer_state
-    return t.layer_tile * (TILE_WIDTH * TILE_HEIGHT) + k * SUBGROUP_SIZE + gl_LocalInvocationID.x;
+    return t.layer_tile * (TILE_WIDTH * TILE_HEIGHT) + tile_pixel(t, k);
 }
 
 const uint LAST_MASK = 0x00ffffffu; // 24 bits of position, then four signs (0: 0, 1: +, 2: -): alpha, rgb

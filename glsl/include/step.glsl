@@ -43,6 +43,7 @@ struct StepUniforms {
     uint instance_capacity; // (splat, tile) pairs,
     uint layer_tile_capacity; // tiles of object layers,
     uint longest_list;      // and splats of a tile that fit
+    uint chunk_length;      // splats of a workgroup of the backward blend; 0 for tiles (group_tile.glsl)
     float finest;           // least deviation of a Gaussian at depth 1 of this view (smooth)
 };
 

@@ -15,7 +15,11 @@ void put_blend(uint layers) {
     uint failed = (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
         | (counters.longest_list > step.longest_list ? FAILED_SEGMENTS : 0u);
     failure |= failed;
-    put_groups(ARGS_BLEND, failed != 0u ? 0u : step.tile_count + layers);
+    uint jobs = step.tile_count + layers;
+    put_groups(ARGS_BLEND, failed != 0u ? 0u : jobs);
+    if (step.chunk_length > 0u) {
+        put_groups(ARGS_CHUNKS, failed != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+    }
 }
 
 void put_total(uint total) {

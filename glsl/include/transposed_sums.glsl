@@ -22,9 +22,8 @@ HALVING(float)
 HALVING(vec2)
 HALVING(vec3)
 
-// Adds the lanes' values of splat j to `sums` of the lane where each one ends. Leave the last out by giving the one before twice.
-void add_transposed(vec3 even, vec3 odd, vec2 last_even, vec2 last_odd, uint j, inout float sums[SUMS]) {
-    uint place = gl_LocalInvocationID.x ^ j;
+// Sums that end in the lane of this place. Leave the last value out by giving the one before twice.
+vec3 transposed(vec3 even, vec3 odd, vec2 last_even, vec2 last_odd, uint place) {
     vec3 a = halved(even, odd, place, SUBGROUP_SIZE >> 1u);
     vec2 b = halved(last_even, last_odd, place, SUBGROUP_SIZE >> 1u);
     vec3 c = halved(vec3(a.x, a.z, b.y), vec3(a.y, b.x, b.y), place, SUBGROUP_SIZE >> 2u);
@@ -41,6 +40,13 @@ void add_transposed(vec3 even, vec3 odd, vec2 last_even, vec2 last_odd, uint j, 
     if (SUBGROUP_SIZE >= 64u) {
         c = vec3(c.x + subgroup_shuffle_xor(c.x, SUBGROUP_SIZE >> 6u));
     }
+    return c;
+}
+
+// Adds the lanes' values of splat j to `sums` of the lane where each one ends.
+void add_transposed(vec3 even, vec3 odd, vec2 last_even, vec2 last_odd, uint j, inout float sums[SUMS]) {
+    uint place = gl_LocalInvocationID.x ^ j;
+    vec3 c = transposed(even, odd, last_even, last_odd, place);
     [[unroll]] for (uint v = 0u; v < SUMS; v++) {
         sums[v] = place == lane_of_sum(v) ? c[v / 4u] : sums[v];
     }

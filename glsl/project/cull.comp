@@ -6,7 +6,7 @@
 #include "gaussian.glsl"
 // cull — drop Gaussians that count at no pixel: behind the near plane, too transparent, or certainly outside the image.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln)
+// Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant lazy: moments of both, touched_at [N], missed
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT; counters.broken_* (integer
 //          atomics): nonfinite positions, scales and opacities
 // Math:    |cov2d| <= |J|^2 max(s)^2 + blur; radius where alpha falls to ALPHA_MIN. Conservative: never drops a splat
@@ -20,6 +20,20 @@ FETCH4(2, scales);
 WRITE(3, uint, depth_keys);
 WRITE(4, uint, splat_from_gaussian);
 INOUT1(5, Counters, counters);
+#ifdef LAZY
+FETCH4(6, m_means);
+FETCH4(7, m_scales);
+FETCH4(8, u_means);
+FETCH4(9, u_scales);
+FETCHU(10, touched_at);
+READ(11, uvec4, missed);
+#endif
+#define plane4(name, e) fetch4(name, e)
+#include "caught_up.glsl"
+#ifdef LAZY
+CAUGHT_UP(means, late_means)
+CAUGHT_UP(scales, late_rest.x)
+#endif
 
 void main() {
     StepUniforms u = step;
@@ -27,10 +41,13 @@ void main() {
     if (i >= u.gaussian_count) {
         return;
     }
-    vec4 mean = fetch4(means, i);
+#ifdef LAZY
+    look_up(i < u.trained_count ? missed_updates(i) : 0u);
+#endif
+    vec4 mean = value4(means, i);
     vec3 view = to_view(u, mean.xyz);
     float log2_o = log2_opacity(mean.w);
-    vec3 s = fetch4(scales, i).xyz;
+    vec3 s = value4(scales, i).xyz;
     float sigma = exp(max(s.x, max(s.y, s.z)));
     float inv_z = 1.0 / view.z;
     vec2 limit = max(abs(vec2(u.clamp_x_min, u.clamp_y_min)), abs(vec2(u.clamp_x_max, u.clamp_y_max)));

@@ -11,7 +11,7 @@
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
 // Work:    64 splats per workgroup, splats in depth order; variant group: the rows of their tiles are shared out.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
-//          variant labels: labels [N], layer_from_label
+//          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
@@ -38,6 +38,29 @@ FETCHU(13, labels);
 FETCHU(14, layer_from_label);
 #endif
 
+#ifdef LAZY
+FETCH4(15, m_means);
+FETCH4(16, m_scales);
+FETCH4(17, m_quats);
+FETCH4(18, m_sh0);
+FETCH4(19, m_sh1);
+FETCH4(20, m_sh2);
+FETCH4(21, m_sh3);
+FETCH4(22, u_means);
+FETCH4(23, u_scales);
+FETCH4(24, u_quats);
+FETCH4(25, u_sh0);
+FETCH4(26, u_sh1);
+FETCH4(27, u_sh2);
+FETCH4(28, u_sh3);
+FETCHU(29, touched_at);
+READ(30, uvec4, missed);
+#endif
+#define plane4(name, e) fetch4(name, e)
+#include "caught_up.glsl"
+#ifdef LAZY
+#include "caught_up_planes.glsl"
+#endif
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 #ifdef GROUP
@@ -47,8 +70,11 @@ shared uint tiles[WALKERS];
 
 // Writes the record of a splat. Returns where its tiles are.
 Ellipse project(StepUniforms u, uint s, uint i) {
-    vec4 mean = fetch4(means, i);
-    Projection p = project_gaussian(u, mean.xyz, fetch4(scales, i).xyz, fetch4(quats, i));
+#ifdef LAZY
+    look_up(i < u.trained_count ? missed_updates(i) : 0u);
+#endif
+    vec4 mean = value4(means, i);
+    Projection p = project_gaussian(u, mean.xyz, value4(scales, i).xyz, value4(quats, i));
     vec3 q = exponent_from_conic(p.conic);
     float log2_o = log2_opacity(mean.w);
 #ifdef ANTIALIASED

@@ -3,8 +3,8 @@
 use super::{Engine, EngineSize, capacity};
 use crate::error::Result;
 use crate::gpu::limits::PlanLimits;
-use crate::pass::KernelShape;
 use crate::pass::buffers::TABLE;
+use crate::pass::{GroupBlend, KernelShape, Update};
 use crate::scheduler::plan::{MemoryReport, PlanOptions};
 
 /// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
@@ -13,8 +13,11 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     const RANGE: u64 = u32::MAX as u64 & !0xffff;
     let limits =
         PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
-    let shape = KernelShape { loss_tile: 16, narrow_labels: true, group_walks: true, ..KernelShape::new(32, false) };
-    (shape.with_sweeps_of(16), limits.of_card())
+    // Cards bind far more buffers than is usual elsewhere.
+    let limits = PlanLimits { max_storage_buffers: 1 << 20, ..limits };
+    let own = KernelShape::new(32, false);
+    let shape = KernelShape { loss_tile: 16, narrow_labels: true, group_walks: true, update: Update::Lazy, ..own };
+    (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.of_card())
 }
 
 /// Predicts the memory of an engine of this size on a device with these kernels and limits.

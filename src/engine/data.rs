@@ -1,6 +1,6 @@
 //! Typed access to the buffers on the device. No list may be in flight.
 
-use super::{Engine, model};
+use super::{Engine, late, model};
 use crate::error::Result;
 use crate::pass::SHARED_PLANES;
 use crate::scheduler::plan::Buf;
@@ -10,8 +10,9 @@ use crate::shaders::constants::LABEL_MASK;
 impl Engine {
     /// Positions of the Gaussians, relative to [`Engine::origin`].
     pub(crate) fn means(&mut self) -> Result<Vec<[f32; 3]>> {
-        let rows = self.sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, self.gaussian_count as usize)?;
-        Ok(rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
+        let (late, floats) = (self.late()?, 4 * self.gaussian_count as usize);
+        let rows = late::read(&mut self.sched, late.as_ref(), Buf::MEANS, floats)?;
+        Ok(rows.as_chunks::<4>().0.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
     }
 
     /// Bytes that it uses on the device.

@@ -4,10 +4,10 @@ use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::pass::buffers::Capacity;
-use crate::pass::{self, KernelShape, Supervision, Variant, loss};
+use crate::pass::{self, KernelShape, Supervision, Update, Variant, loss};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, MemoryReport, PassList};
-use crate::shaders::constants::LABEL_ROUNDS;
+use crate::shaders::constants::{LABEL_ROUNDS, MISSED_ROWS};
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +39,8 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
     // Lists bind the model's buffers even if the model is empty.
     let gaussians = size.gaussians.max(1);
-    let instances = (gaussians * 6).max(tiles * 16);
+    // About what trained scenes have: larger tiles share fewer Gaussians.
+    let instances = if shape.tile_pixels() >= 256 { gaussians * 5 / 2 } else { gaussians * 6 }.max(tiles * 16);
     let mut capacity = Capacity {
         gaussians,
         trained: if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 },
@@ -57,12 +58,20 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape, width, height)),
+        late_gaussians: late(shape, size, gaussians),
+        missed_rows: if late(shape, size, gaussians) > 0 { u64::from(MISSED_ROWS) } else { 0 },
         segments: 1,
         shared_rows: u64::from(size.shared_rows),
         ..Capacity::default()
     };
     derive(shape, &mut capacity, instances, size.trained);
     capacity
+}
+
+/// Returns how many Gaussians may miss updates.
+fn late(shape: &KernelShape, size: &EngineSize, gaussians: u64) -> u64 {
+    let is_lazy = size.trained && shape.update != Update::Split;
+    if is_lazy { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 }
 }
 
 /// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].
@@ -78,6 +87,10 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
     let jobs = capacity.virtual_tiles / capacity.layers.max(1) + capacity.layer_tiles;
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
+    let trained = |chunks: u64| if trained { chunks } else { 0 };
+    capacity.chunks = trained(shape.chunks(instances, jobs));
+    capacity.chunk_pixels = trained(shape.chunks(instances, 1) * u64::from(shape.tile_pixels()));
+    capacity.chunk_channels = if capacity.labelled + capacity.known_depths > 0 { capacity.chunk_pixels } else { 0 };
     capacity.sweep_cells = shape.sweep_cells(instances.max(capacity.gaussians).max(capacity.virtual_tiles));
     if shape.sweeps() {
         return;

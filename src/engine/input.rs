@@ -73,6 +73,17 @@ pub(crate) struct VoteInput<'a> {
     pub weights: &'a [f32],
 }
 
+impl<'a> Input<'a> {
+    /// The uniforms.
+    pub(super) fn uniforms(self) -> &'a StepUniforms {
+        match self {
+            Self::Uniforms(uniforms) => uniforms,
+            Self::Train(train) => &train.uniforms,
+            Self::Vote(vote) => &vote.uniforms,
+        }
+    }
+}
+
 impl<'a> From<&'a StepUniforms> for Input<'a> {
     fn from(uniforms: &'a StepUniforms) -> Self {
         Self::Uniforms(uniforms)
@@ -94,11 +105,7 @@ impl<'a> From<&'a VoteInput<'a>> for Input<'a> {
 impl Engine {
     /// Writes the input of a list into a frame. Checks the image size, because every camera passes through here.
     pub(crate) fn write(&mut self, frame: usize, input: Input) -> Result<()> {
-        let uniforms = match input {
-            Input::Uniforms(uniforms) => uniforms,
-            Input::Train(train) => &train.uniforms,
-            Input::Vote(vote) => &vote.uniforms,
-        };
+        let uniforms = input.uniforms();
         self.size.check_image(uniforms.width, uniforms.height)?;
         // A record of a (splat, tile) pair is valid only if it carries the stamp of its submit.
         self.stamp = self.stamp.wrapping_add(1).max(1);
@@ -115,11 +122,13 @@ impl Engine {
             instance_capacity: word(self.capacity.instances),
             layer_tile_capacity: word(self.capacity.layer_tiles),
             longest_list: word(self.capacity.segments.max(1) * u64::from(self.shape.segment_length)),
+            chunk_length: self.shape.group_blend.map_or(0, |blend| blend.chunk_length),
             stamp: self.stamp,
             ..*uniforms
         };
+        self.sched.upload(Buf::STEP, frame, 0, &[counts])?;
+        self.write_missed(frame, input)?;
         let (sched, shape) = (&mut self.sched, &self.shape);
-        sched.upload(Buf::STEP, frame, 0, &[counts])?;
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {

@@ -11,6 +11,8 @@ mod data;
 pub mod growth;
 mod input;
 mod label_ids;
+mod late;
+mod missed;
 pub(crate) mod model;
 pub mod run;
 mod size;
@@ -35,6 +37,7 @@ use crate::shaders::structs::StepUniforms;
 use ahead::Ahead;
 use glam::DVec3;
 use label_ids::LabelIds;
+use missed::Missed;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -61,6 +64,8 @@ pub struct Engine {
     last_frame: usize,
     /// Frames with an unread report.
     in_flight: Vec<bool>,
+    /// What Gaussians have missed.
+    missed: Missed,
     /// Compiles kernels of later lists.
     ahead: Option<Ahead>,
     /// Every run is checked for writes outside of its buffers.
@@ -109,6 +114,7 @@ impl Engine {
             label_rounds: 1,
             stamp: 0,
             last_frame: 0,
+            missed: Missed::default(),
             ahead: None,
             has_guards: options.plan.guards,
         })
@@ -192,13 +198,15 @@ impl Engine {
         self.gaussian_count = gaussians.len() as u32;
         (self.sh_degree, self.origin) = (gaussians.sh_degree, gaussians.origin);
         self.set_antialiased(gaussians.antialiased);
-        Ok(())
+        self.start_updates()
     }
 
     /// Reads the model back.
     pub fn download_model(&mut self) -> Result<Gaussians> {
         self.sched.wait_all()?;
-        let model = model::download(&mut self.sched, self.gaussian_count as usize, self.sh_degree)?;
+        let late = self.late()?;
+        let count = self.gaussian_count as usize;
+        let model = model::download(&mut self.sched, late.as_ref(), count, self.sh_degree)?;
         let labels = if self.size.labels.is_some() { Some(self.labels()?) } else { None };
         Ok(Gaussians { labels, origin: self.origin, antialiased: self.shape.antialiased, ..model })
     }

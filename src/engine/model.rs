@@ -2,6 +2,7 @@
 
 use super::EngineSize;
 use super::label_ids::LabelIds;
+use super::late::{self, Late};
 use crate::error::{Error, Result};
 use crate::pass::ATTRIBUTES;
 use crate::scene::{Gaussians, LABEL_MAX, UNLABELLED};
@@ -57,23 +58,24 @@ pub(super) fn upload_labels(sched: &mut Scheduler, labels: &[u32], size: &Engine
     Ok(ids)
 }
 
-/// Reads the planes of `count` Gaussians; without labels.
-pub(super) fn download(sched: &mut Scheduler, count: usize, sh_degree: u32) -> Result<Gaussians> {
+/// Reads the planes of `count` Gaussians; without labels. `late`: with the updates that they have missed.
+pub(super) fn download(sched: &mut Scheduler, late: Option<&Late>, count: usize, sh_degree: u32) -> Result<Gaussians> {
     let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
-    let means = sched.download::<[f32; 4]>(Buf::MEANS, 0, 0, count)?;
+    let mut rows = |plane: Buf| late::read(sched, late, plane, 4 * count).map(|all| all.as_chunks::<4>().0.to_vec());
+    let means = rows(Buf::MEANS)?;
     let mut model = Gaussians {
         means: xyz(&means),
         opacities: means.iter().map(|row| row[3]).collect(),
-        scales: xyz(&sched.download::<[f32; 4]>(Buf::SCALES, 0, 0, count)?),
-        quats: sched.download::<[f32; 4]>(Buf::QUATS, 0, 0, count)?,
-        sh0: xyz(&sched.download::<[f32; 4]>(Buf::SH0, 0, 0, count)?),
+        scales: xyz(&rows(Buf::SCALES)?),
+        quats: rows(Buf::QUATS)?,
+        sh0: xyz(&rows(Buf::SH0)?),
         sh_degree,
         ..Gaussians::default()
     };
     let rest = model.rest_per_gaussian();
     model.sh_rest = vec![[0.0; 3]; count * rest];
     for (plane, stride, first, coefficients) in BANDS.into_iter().filter(|band| band.2 < rest) {
-        let words = sched.download::<f32>(plane, 0, 0, count * stride * 4)?;
+        let words = late::read(sched, late, plane, count * stride * 4)?;
         for (row, words) in words.chunks_exact(stride * 4).enumerate() {
             let to = row * rest + first;
             model.sh_rest[to..to + coefficients].as_flattened_mut().copy_from_slice(&words[..coefficients * 3]);

@@ -1,6 +1,7 @@
 //! Lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
 
 use super::ahead::Ahead;
+use super::missed::Mark;
 use super::{Engine, Input};
 use crate::error::{Error, Result};
 use crate::pass::{self, Stage, Variant};
@@ -30,6 +31,8 @@ pub enum ListKey {
     Vote(u32, bool),
     /// Adds up blending weights of one view.
     Weigh,
+    /// All Gaussians get the updates that they have missed.
+    CatchUp,
     /// Counts the result of a densification.
     DensifyCount,
     /// Densification.
@@ -59,6 +62,8 @@ pub(crate) struct InFlight {
     /// Recording that runs.
     pub recording: Recording,
     ticket: Ticket,
+    /// Updates before it.
+    before: Mark,
 }
 
 /// A recording of a list for a frame. After buffers have grown, the list is recorded anew.
@@ -66,6 +71,18 @@ pub(crate) struct InFlight {
 pub(crate) struct Recording {
     list: ListId,
     frame: usize,
+}
+
+impl ListKey {
+    /// Returns true if the list changes planes of the state, or looks for what they show, other than by a step.
+    fn needs_all_updates(self) -> bool {
+        match self {
+            Self::Train(_) | Self::Extended(..) | Self::CatchUp => false,
+            Self::Render { .. } | Self::LabelMap(_) | Self::Vote(..) | Self::Weigh | Self::Nonfinite(_) => false,
+            Self::DensifyCount | Self::DensifyApply | Self::RelocateCount | Self::RelocateApply => true,
+            Self::OpacityReset => true,
+        }
+    }
 }
 
 impl Engine {
@@ -98,6 +115,7 @@ impl Engine {
             ListKey::LabelMap(rounds) => pass::label_view(shape, capacity, rounds),
             ListKey::Vote(rounds, alone) => pass::vote_view(shape, capacity, rounds, alone),
             ListKey::Weigh => pass::weigh_view(shape, capacity),
+            ListKey::CatchUp => pass::catch_up(shape, capacity, self.sh_degree),
             ListKey::DensifyCount => pass::densify_count(shape, capacity),
             ListKey::DensifyApply => pass::densify_apply(shape, capacity, self.size.labels.is_some()),
             ListKey::RelocateCount => pass::relocate_count(shape, capacity),
@@ -111,11 +129,19 @@ impl Engine {
     pub(crate) fn run<'a>(&mut self, key: ListKey, input: impl Into<Input<'a>>) -> Result<Report> {
         let input = input.into();
         self.check_idle()?;
+        if key.needs_all_updates() {
+            self.catch_up()?;
+        }
         loop {
+            let key = self.caught_up(key);
             let list = self.list(key)?;
             self.write(0, input)?;
             self.sched.run(list, 0)?;
+            let before = self.note_update(key, input.uniforms());
             let report = self.report(0)?;
+            if report.failure != 0 {
+                self.take_back(before);
+            }
             if self.has_guards {
                 self.sched.check_guards()?;
             }
@@ -154,11 +180,13 @@ impl Engine {
         if self.in_flight[frame] {
             return Err(Error::Bug(format!("{frames} lists are in flight; retire the oldest first")));
         }
+        let (key, input) = (self.caught_up(key), input.into());
         let list = self.list(key)?;
-        self.write(frame, input.into())?;
+        self.write(frame, input)?;
         let ticket = self.sched.submit(list, frame)?;
+        let before = self.note_update(key, input.uniforms());
         (self.last_frame, self.in_flight[frame]) = (frame, true);
-        Ok(InFlight { recording: Recording { list, frame }, ticket })
+        Ok(InFlight { recording: Recording { list, frame }, ticket, before })
     }
 
     /// Waits for a list in flight. If the report has a failure, call [`Engine::recover`], then submit this list and all
@@ -166,7 +194,11 @@ impl Engine {
     pub(crate) fn retire(&mut self, flight: &InFlight) -> Result<Report> {
         self.sched.wait(flight.ticket)?;
         self.in_flight[flight.recording.frame] = false;
-        self.report(flight.recording.frame)
+        let report = self.report(flight.recording.frame)?;
+        if report.failure != 0 {
+            self.take_back(flight.before);
+        }
+        Ok(report)
     }
 
     /// Waits for all lists in flight and discards their reports.

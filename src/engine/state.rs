@@ -1,7 +1,8 @@
 //! Device state that a training needs to continue: the buffers of kind Model, unchanged. All other buffers start at
 //! zero, both in a new and in a continued training.
 
-use super::{Engine, ListKey};
+use super::missed::Missed;
+use super::{Engine, ListKey, late};
 use crate::error::Result;
 use crate::pass::buffers::TABLE;
 use crate::pass::{ATTRIBUTES, SHARED_PLANES};
@@ -80,6 +81,7 @@ pub(crate) fn check(
             ));
         }
     }
+    late::check(|name| given.remove(name), counts.of(Buf::DENSIFY_STATS))?;
     given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
 }
 
@@ -87,6 +89,8 @@ pub(crate) fn check(
 pub(crate) struct Copied {
     shapes: Vec<(Buf, u64)>,
     words: Words,
+    /// What Gaussians have missed.
+    missed: Option<Plane>,
 }
 
 enum Words {
@@ -106,7 +110,7 @@ impl Copied {
             words: words(buf),
             data,
         };
-        Ok(self.shapes.into_iter().zip(all).map(plane).collect())
+        Ok(self.shapes.into_iter().zip(all).map(plane).chain(self.missed).collect())
     }
 }
 
@@ -118,11 +122,13 @@ impl Engine {
         let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
         let counts = Counts { gaussians, frozen, shared: self.size.shared_rows };
         let buffers = buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter();
+        let late = self.missed.is_late().then(|| (Buf::TOUCHED_AT, counts.of(Buf::DENSIFY_STATS)));
+        let missed = late.map(|_| self.missed.plane());
         let shapes: Vec<(Buf, u64)> =
-            buffers.map(|(buf, count)| (buf, u64::from(count) * u64::from(words(buf)))).collect();
+            buffers.chain(late).map(|(buf, count)| (buf, u64::from(count) * u64::from(words(buf)))).collect();
         if self.runs_ahead() {
             match self.sched.snapshot(&shapes) {
-                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(Box::new(snapshot)) }),
+                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(Box::new(snapshot)), missed }),
                 Err(error) if error.is_out_of_memory() => {
                     tracing::info!("{error}; the training waits until its state is read");
                 }
@@ -131,7 +137,7 @@ impl Engine {
         }
         let read = shapes.iter().map(|&(buf, words)| self.sched.download(buf, 0, 0, words as usize));
         let words = Words::Read(read.collect::<Result<_>>()?);
-        Ok(Copied { shapes, words })
+        Ok(Copied { shapes, words, missed })
     }
 
     /// Planes of floats of the state.
@@ -153,12 +159,16 @@ impl Engine {
     /// Uploads a state that has passed [`check`] to a new engine.
     pub(crate) fn upload_state(&mut self, count: u32, origin: DVec3, planes: &[Plane]) -> Result<()> {
         self.make_room_for_gaussians(u64::from(count))?;
+        let settled = if self.may_be_late() { None } else { late::settled(planes) };
+        let planes = settled.as_deref().unwrap_or(planes);
+        self.start_updates()?;
         for plane in planes {
             if let Some(buf) = named(&plane.name) {
                 self.sched.upload(buf, 0, 0, &plane.data)?;
             }
         }
         (self.gaussian_count, self.origin) = (count, origin);
+        self.missed = Missed::find(planes).unwrap_or_default();
         Ok(())
     }
 }

@@ -219,7 +219,11 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     let least = |what, needed: u32, found: u32, reason| {
         need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
-    let bindings = shaders::ALL.iter().map(|shader| storage_bindings(shader)).max().unwrap_or(0);
+    // Where the update does not have its buffers, other passes make it (`KernelShape::update`).
+    let is_needed = |shader: &&&ShaderDesc| {
+        !shader.stem.starts_with("update") && shader.stem != "catch_up" && !shader.macros.contains(&"LAZY")
+    };
+    let bindings = shaders::ALL.iter().filter(is_needed).map(|shader| storage_bindings(shader)).max().unwrap_or(0);
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),

@@ -21,6 +21,22 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
     let (segments, counts) = (b.segments(), b.counts);
     let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
     b.list.stage = Stage::BLEND_FORWARD;
+    if let Some(blend) = b.shape.group_blend {
+        let (disagreement, depth) = channels(b.supervision);
+        pass!(b, group_forward(labels: labels, main: main, disagreement: disagreement, depth: depth) {
+            step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
+            main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
+            view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
+            label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
+            label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
+            labels: Buf::LABELS, disagreement: Buf::DISAGREEMENT, depths: Buf::DEPTHS,
+            chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES, chunk_channel: Buf::CHUNK_CHANNEL,
+        } [lift: lift.into(), counts: counts.into(), group_lanes: b.shape.tile_pixels() / blend.forward_rows],
+            args(constants::ARGS_BLEND));
+        return;
+    }
     for segment in 0..segments {
         pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
@@ -38,9 +54,21 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
 /// Walks all tiles back to front and writes one gradient record per (splat, tile) pair.
 pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let (segments, supervision) = (b.segments(), b.supervision);
-    let (labels, disagreement) = (supervision.has_layers(), supervision == Supervision::Disagreement);
-    let depth = supervision == Supervision::Depth;
+    let labels = supervision.has_layers();
+    let (disagreement, depth) = channels(supervision);
     b.list.stage = Stage::BLEND_BACKWARD;
+    if let Some(blend) = b.shape.group_blend {
+        pass!(b, group_backward(labels: labels, disagreement: disagreement, depth: depth) {
+            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
+            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
+            counters: Buf::COUNTERS, chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES,
+            layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE, layer_weights: Buf::LAYER_WEIGHTS,
+            target: Buf::TARGET, view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS,
+            gaussian_from_splat: GAUSSIAN_FROM_SPLAT, depths: Buf::DEPTHS, chunk_channel: Buf::CHUNK_CHANNEL,
+        } [group_lanes: b.shape.tile_pixels() / blend.backward_rows], args(constants::ARGS_CHUNKS));
+        return;
+    }
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
@@ -53,4 +81,9 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
             depths: Buf::DEPTHS,
         } [segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }
+}
+
+/// Whether the scene's own walk has labels, or known depths, as a channel.
+fn channels(supervision: Supervision) -> (bool, bool) {
+    (supervision == Supervision::Disagreement, supervision == Supervision::Depth)
 }

@@ -21,6 +21,8 @@ pub struct Builder<'a> {
     pub exposure: Option<u32>,
     /// Partial sums that the photo loss writes.
     pub loss_partials: u32,
+    /// Gaussians may have missed updates, which what reads them adds.
+    pub late: bool,
     /// Passes of sorts, and scans, so far in this list that look back.
     pub sweeps: Sweeps,
     /// The list so far.
@@ -73,6 +75,7 @@ impl<'a> Builder<'a> {
             counts: false,
             exposure: None,
             loss_partials: 0,
+            late: false,
             sweeps: Sweeps::default(),
             list,
         }

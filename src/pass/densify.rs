@@ -9,8 +9,11 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, mark_near { step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, failure: Buf::FAILURE } [],
-        over_gaussians());
+    pass!(b, mark_near(lazy: b.late) {
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, failure: Buf::FAILURE,
+        m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
+        touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
+    } [], over_gaussians());
 }
 
 /// Decides the fate of each Gaussian and counts the result.

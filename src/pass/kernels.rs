@@ -1,6 +1,6 @@
 //! What a device's compiler makes of every kernel.
 
-use super::KernelShape;
+use super::{GroupBlend, KernelShape};
 use crate::error::Result;
 use crate::gpu::{Gpu, Statistic};
 use crate::shaders::{self, ShaderDesc};
@@ -54,6 +54,8 @@ pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
         let shape = sweeping.unwrap_or(shape);
         let of_shape = |shader: &&&'static ShaderDesc| shader.macros.contains(&"EMULATED") == shape.emulated;
         for shader in shaders::ALL.iter().filter(of_shape) {
+            let by_groups = shader.spec.iter().any(|constant| constant.name == "GROUP_LANES");
+            let shape = if by_groups { shape.with_group_blend_of(GroupBlend::DEFAULT) } else { shape };
             let spec = shader.spec.iter().map(|constant| shape.constant(constant.name).unwrap_or(constant.default));
             let spec: Vec<u32> = spec.collect();
             let statistics = gpu.statistics(shader, &spec, shape.subgroup)?;

@@ -18,11 +18,13 @@ pub mod sort;
 pub mod stage;
 mod state;
 mod tile;
+mod update;
 
 pub use build::Builder;
 pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
 pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
-pub use shape::KernelShape;
+pub use shape::{GroupBlend, KernelShape, Update};
+pub(crate) use update::is_fused;
 
 use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
@@ -71,12 +73,14 @@ pub struct Variant {
     pub update: bool,
     /// The step counts (pixel, splat) pairs with a weight, which costs time.
     pub counts: bool,
+    /// Before the step, all Gaussians get the updates that they have missed. The engine decides it.
+    pub catch_up: bool,
 }
 
 impl Variant {
     /// A step of the scene alone with an update, of full degree.
     pub const fn plain(size: (u32, u32)) -> Self {
-        Self { supervision: Supervision::Photo, sh_degree: 3, size, update: true, counts: false }
+        Self { supervision: Supervision::Photo, sh_degree: 3, size, update: true, counts: false, catch_up: false }
     }
 }
 
@@ -107,13 +111,25 @@ pub trait Extension: std::fmt::Debug + Send + Sync {
     fn updates_unseen(&self, _passes: u32) -> bool {
         true
     }
+
+    /// Returns true if its passes read or change parameters, moments or gradients of Gaussians. A step then has a pass for each
+    /// part of its update, and all Gaussians are up to date. Otherwise one kernel may make the update, without
+    /// [`Hook::Gradients`], and Gaussians outside of the view may be late.
+    fn splits_update(&self, _passes: u32) -> bool {
+        true
+    }
 }
 
 /// Changes nothing.
-impl Extension for () {}
+impl Extension for () {
+    fn splits_update(&self, _passes: u32) -> bool {
+        false
+    }
+}
 
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degree: u32) -> Builder<'a> {
-    let mut b = Builder { sh_degree, ..Builder::new(name, shape, capacity) };
+    let late = capacity.late_gaussians > 0;
+    let mut b = Builder { sh_degree, late, ..Builder::new(name, shape, capacity) };
     if shape.sweeps() {
         b.list.fill(Buf::SWEEP, 0);
     }
@@ -143,6 +159,10 @@ pub fn extended_step(
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.sh_degree);
     (b.supervision, b.counts) = (variant.supervision, variant.counts);
+    b.late = is_fused(shape, (extension, passes));
+    if variant.catch_up {
+        update::catch_up(&mut b);
+    }
     extension.extend(passes, Hook::Camera, &mut b);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
@@ -155,11 +175,17 @@ pub fn extended_step(
     if variant.supervision == Supervision::Disagreement {
         loss::reduce(&mut b);
     }
-    gather::gather(&mut b);
-    project::project_backward(&mut b);
-    extension.extend(passes, Hook::Gradients, &mut b);
+    if b.late {
+        update::update(&mut b, variant.update);
+    } else {
+        gather::gather(&mut b);
+        project::project_backward(&mut b);
+        extension.extend(passes, Hook::Gradients, &mut b);
+    }
     if variant.update {
-        optimize::adam(&mut b, extension.updates_unseen(passes));
+        if !b.late {
+            optimize::adam(&mut b, extension.updates_unseen(passes));
+        }
         optimize::adam_shared(&mut b);
         extension.extend(passes, Hook::Updated, &mut b);
     }
@@ -209,6 +235,14 @@ pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
     b.list.fill(Buf::V_IMAGE, 1.0_f32.to_bits());
     blend::blend_backward(&mut b, pairs);
     gather::weigh(&mut b);
+    end(b)
+}
+
+/// Gives all Gaussians the updates that they have missed.
+pub fn catch_up(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
+    let mut b = begin("catch up", shape, capacity, sh_degree);
+    b.list.stage = Stage::OPTIMISE;
+    update::catch_up(&mut b);
     end(b)
 }
 

@@ -15,9 +15,11 @@ const DEPTH_BITS: u32 = 32;
 /// Lists the visible Gaussians in depth order and projects them.
 pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::PROJECT;
-    pass!(b, cull {
+    pass!(b, cull(lazy: b.late) {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, m_means: Buf::M_MEANS,
+        m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, touched_at: Buf::TOUCHED_AT,
+        missed: Buf::MISSED,
     } [], over_gaussians());
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
@@ -40,11 +42,14 @@ pub(super) fn visible_splats(b: &mut Builder) {
 
 fn project_forward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks) {
+    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks, lazy: b.late) {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES,
+        m_quats: Buf::M_QUATS, m_sh0: Buf::M_SH0, m_sh1: Buf::M_SH1, m_sh2: Buf::M_SH2, m_sh3: Buf::M_SH3,
+        u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
+        u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
     } [sh_degree: sh_degree], over_splats());
 }
 

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
 use crate::shaders::constants::{LABEL_BORDER, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
+use crate::shaders::{BindingKind, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -30,6 +31,10 @@ pub struct KernelShape {
     /// The tiles of splats, and the records of those with many, are shared out among the invocations of a workgroup; else one
     /// invocation walks those of a splat.
     pub group_walks: bool,
+    /// The blends of a card; `None` with a subgroup for each tile.
+    pub group_blend: Option<GroupBlend>,
+    /// How a step updates the parameters.
+    pub update: Update,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
@@ -41,6 +46,37 @@ pub struct KernelShape {
     pub antialiased: bool,
 }
 
+/// Blends with a workgroup for each tile, and backward for each chunk of its list (glsl/include/group_tile.glsl).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GroupBlend {
+    /// Pixels of an invocation of the forward walk.
+    pub forward_rows: u32,
+    /// Pixels of an invocation of the backward walk.
+    pub backward_rows: u32,
+    /// Splats of a chunk, a power of 2.
+    pub chunk_length: u32,
+    /// A subgroup skips splats that its pixels do not see; `false` for tests.
+    pub culls: bool,
+    /// Workgroups take their work in the opposite order, for tests.
+    pub turned: bool,
+}
+
+impl GroupBlend {
+    /// What cards use.
+    pub const DEFAULT: Self = Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, culls: true, turned: false };
+}
+
+/// How a step updates the parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// A pass sums gradients, one carries them back to the parameters, and one for each attribute updates all Gaussians.
+    Split,
+    /// One pass does that for those that the view touched, after one that updates all others.
+    Fused,
+    /// One pass, for those that the view touched; the others are late until something touches or changes them.
+    Lazy,
+}
+
 /// Largest id of a pixel of 16 bits, the highest of which is a flag.
 const NARROW_MAX: u32 = 0x7fff;
 
@@ -50,6 +86,9 @@ const LOOP_ROUNDS: u32 = 65_000;
 /// Longest segment, for [`LOOP_ROUNDS`] on all devices. A walk over n splats takes n rounds
 /// and one more per load of a subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
+
+/// Most shared memory of a blend by workgroups, bytes: the forward walk keeps 128 splats, of 52 each.
+const GROUP_BLEND_SHARED: u32 = 8192;
 
 /// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would bound the model before memory does.
 const TEXELS_MIN: u64 = 1 << 26;
@@ -66,6 +105,21 @@ impl KernelShape {
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
         let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
         let shape = Self { narrow_labels, group_walks, ..shape };
+        let has_groups = chosen("LABELGS_BLEND", ["lane", "group"]).unwrap_or(is_card && !shape.emulated);
+        let shape = if has_groups { shape.with_group_blend(device).unwrap_or(shape) } else { shape };
+        let update = match lab::var("LABELGS_UPDATE").as_deref() {
+            Some("split") => Update::Split,
+            Some("fused") => Update::Fused,
+            Some("lazy") => Update::Lazy,
+            _ => {
+                if is_card {
+                    Update::Lazy
+                } else {
+                    Update::Split
+                }
+            }
+        };
+        let shape = shape.with_lazy_updates(device).map_or(shape, |shape| Self { update, ..shape });
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -81,6 +135,40 @@ impl KernelShape {
                 && 4 * (2 * outer * (outer + 1) + 4 * outer * (middle + 1) + 1) <= limits.max_shared
         };
         [16, 8].into_iter().find(fits).map(|loss_tile| Self { loss_tile, ..self })
+    }
+
+    /// Returns this shape with blends by workgroups; `None` if the device cannot run them.
+    pub fn with_group_blend(self, device: &Capabilities) -> Option<Self> {
+        let (limits, subgroup) = (&device.limits, &device.subgroup);
+        let shape = self.with_group_blend_of(GroupBlend::DEFAULT);
+        let lanes = shape.tile_pixels() / GroupBlend::DEFAULT.forward_rows;
+        let fits = lanes <= limits.max_invocations.min(limits.max_group_size[0])
+            && lanes / self.subgroup <= subgroup.max_per_group
+            && GROUP_BLEND_SHARED <= limits.max_shared
+            && (self.emulated || subgroup.has_ballots());
+        fits.then_some(shape)
+    }
+
+    /// Returns this shape with such blends by workgroups.
+    pub fn with_group_blend_of(self, blend: GroupBlend) -> Self {
+        // No tile is waited for, and fewer tiles are fewer pairs to sort.
+        let (tile_width, tile_height) =
+            if self.subgroup >= 32 { (16, 16) } else { (self.tile_width, self.tile_height) };
+        Self { group_blend: Some(blend), tile_width, tile_height, ..self }
+    }
+
+    /// Chunks of so many pairs in the lists of so many tiles; 0 if the backward blend walks tiles.
+    pub fn chunks(&self, instances: u64, jobs: u64) -> u64 {
+        self.group_blend.map_or(0, |blend| instances / u64::from(blend.chunk_length) + jobs)
+    }
+
+    /// Returns this shape with an update in one kernel; `None` if that cannot have its buffers.
+    pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
+        let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
+        let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
+        let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
+        let fits = bindings.max().unwrap_or(0) <= device.limits.plan.max_storage_buffers as usize;
+        fits.then_some(Self { update: Update::Lazy, ..self })
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -142,6 +230,8 @@ impl KernelShape {
             loss_tile: 0,
             narrow_labels: false,
             group_walks: false,
+            group_blend: None,
+            update: Update::Split,
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
@@ -207,6 +297,9 @@ impl KernelShape {
             "SWEEP_ITEMS" => Some(self.sweep_items.max(1)),
             "LABELS_PER_WORD" => Some(if self.narrow_labels { 2 } else { 1 }),
             "LOSS_TILE" => (self.loss_tile > 0).then_some(self.loss_tile),
+            "CHUNK_LENGTH" => self.group_blend.map(|blend| blend.chunk_length),
+            "CULLS" => self.group_blend.map(|blend| blend.culls.into()),
+            "TURNED" => self.group_blend.map(|blend| blend.turned.into()),
             "SEGMENT_LENGTH" => Some(self.segment_length),
             _ => None,
         }

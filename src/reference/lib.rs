@@ -10,6 +10,7 @@ pub mod densify;
 pub mod disagreement;
 pub mod exposure;
 pub mod finite;
+pub mod lazy;
 pub mod lift;
 pub mod loss;
 pub mod model;

@@ -125,6 +125,7 @@ impl Context {
             size: self.views.largest_at(input.step, self.image),
             update: input.update,
             counts: self.counts_pairs,
+            catch_up: false,
         };
         match self.strategy.passes(self.at(input.step)) + self.always_passes {
             0 => ListKey::Train(variant),
@@ -151,8 +152,9 @@ impl Context {
             }
         }
         let growth = [ListKey::DensifyCount, ListKey::DensifyApply, ListKey::OpacityReset];
+        let catch_up = self.engine.may_be_late().then_some(ListKey::CatchUp);
         let first = 1.min(keys.len());
-        keys.splice(first..first, growth);
+        keys.splice(first..first, growth.into_iter().chain(catch_up));
         keys
     }
 

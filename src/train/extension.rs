@@ -27,4 +27,8 @@ impl Extension for Joined {
     fn updates_unseen(&self, passes: u32) -> bool {
         passes <= 1 || self.strategy.updates_unseen(passes - 1)
     }
+
+    fn splits_update(&self, passes: u32) -> bool {
+        (passes > 1 && self.strategy.splits_update(passes - 1)) || self.always.iter().any(|of| of.splits_update(1))
+    }
 }

@@ -125,6 +125,10 @@ impl Extension for WithoutPhotoLoss {
             b.list.fill(Buf::V_IMAGE, 0);
         }
     }
+
+    fn splits_update(&self, _passes: u32) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

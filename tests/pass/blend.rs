@@ -1,6 +1,6 @@
 //! Blending forward and backward, of the scene and of the object layers.
 
-use super::fixture::{Fixture, prove};
+use super::fixture::{BLENDS, Fixture, prove};
 use crate::reference::blend::{self, Upstream, blend_backward, blend_forward, blend_layers_forward};
 use crate::reference::loss::label_loss;
 use crate::reference::splat::Splat;
@@ -8,6 +8,7 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{Band, GradientBounds, Tolerance, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::pass::GroupBlend;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::judge;
 
@@ -43,8 +44,12 @@ fn last_splats(fixture: &mut Fixture) -> Vec<usize> {
 
 #[test]
 fn blend_forward_of_the_scene_equals_its_mirror() {
+    BLENDS.into_iter().for_each(blend_forward_of_the_scene_equals_its_mirror_of);
+}
+
+fn blend_forward_of_the_scene_equals_its_mirror_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, opaque_scene(51), false);
+    let mut fixture = Fixture::blending(turn, opaque_scene(51), false, form);
     fixture.train();
     let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
     let image = fixture.get::<[f32; 4]>(Buf::IMAGE, size.0 * size.1);
@@ -69,8 +74,12 @@ fn blend_forward_of_the_scene_equals_its_mirror() {
 
 #[test]
 fn main_gaussians_of_a_render_equal_the_mirror() {
+    BLENDS.into_iter().for_each(main_gaussians_of_a_render_equal_the_mirror_of);
+}
+
+fn main_gaussians_of_a_render_equal_the_mirror_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, opaque_scene(52), false);
+    let mut fixture = Fixture::blending(turn, opaque_scene(52), false, form);
     fixture.render();
     let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
     let pixels = size.0 * size.1;
@@ -106,8 +115,12 @@ const BOUNDS: GradientBounds = GradientBounds {
 
 #[test]
 fn blend_backward_and_gather_equal_their_mirrors() {
+    BLENDS.into_iter().for_each(blend_backward_and_gather_equal_their_mirrors_of);
+}
+
+fn blend_backward_and_gather_equal_their_mirrors_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, opaque_scene(53), false);
+    let mut fixture = Fixture::blending(turn, opaque_scene(53), false, form);
     fixture.train();
     let (splats, size, background) = (fixture.splats(), fixture.size(), fixture.scene.target.background);
     let v_image = v_image(&mut fixture);
@@ -144,8 +157,12 @@ fn v_layers(rules: &Rules, fixture: &Fixture, splats: &[Splat], v_scene: &Upstre
 /// method.md check 10: one walk over all layers, and its gradient, equal the separate renders of the filtered models.
 #[test]
 fn object_layers_equal_filtered_renders() {
+    BLENDS.into_iter().for_each(object_layers_equal_filtered_renders_of);
+}
+
+fn object_layers_equal_filtered_renders_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, opaque_scene(54), true);
+    let mut fixture = Fixture::blending(turn, opaque_scene(54), true, form);
     let report = fixture.train();
     assert!(report.counters.layer_tile_count > 10);
     let splats = fixture.splats();

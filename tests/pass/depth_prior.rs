@@ -1,11 +1,12 @@
 //! Known depths in a step: the gradient against the mirror.
 
 use super::disagreement::BOUNDS;
-use super::fixture::{Fixture, prove};
+use super::fixture::{BLENDS, Fixture, prove};
 use crate::reference::disagreement::depth_error;
 use crate::support::compare::{check, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
+use labelgs::pass::GroupBlend;
 use labelgs::scheduler::plan::Buf;
 
 /// Weight of the depths, far above that of the photo.
@@ -13,9 +14,13 @@ const WEIGHT: f64 = 1e5;
 
 #[test]
 fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else() {
+    BLENDS.into_iter().for_each(known_depths_move_opacities_as_their_mirror_says_and_nothing_else_of);
+}
+
+fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
     let shape = Shape { gaussians: 150, width: 61, height: 45, opacities: (-4.0, 7.0), ..Shape::default() };
-    let mut fixture = Fixture::new(turn, scene(64, &shape), false);
+    let mut fixture = Fixture::blending(turn, scene(64, &shape), false, form);
     // Constant over the first step of many.
     (fixture.config.iterations, fixture.config.label_from) = (1_000_000_000, None);
     fixture.config.depth_weight = Some(WEIGHT);

@@ -1,10 +1,11 @@
 //! The disagreement of labels in a step: value and gradient against the mirror.
 
-use super::fixture::{Fixture, prove};
+use super::fixture::{BLENDS, Fixture, prove};
 use crate::reference::disagreement::disagreement;
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
+use labelgs::pass::GroupBlend;
 use labelgs::run::LabelRule;
 use labelgs::scheduler::plan::Buf;
 
@@ -22,9 +23,13 @@ const LABEL_WEIGHT: f32 = 1e5;
 
 #[test]
 fn disagreement_of_a_step_equals_its_mirror_and_moves_opacities_only() {
+    BLENDS.into_iter().for_each(disagreement_of_a_step_equals_its_mirror_and_moves_opacities_only_of);
+}
+
+fn disagreement_of_a_step_equals_its_mirror_and_moves_opacities_only_of(form: Option<GroupBlend>) {
     let Some(turn) = device() else { return };
     let shape = Shape { gaussians: 150, width: 61, height: 45, opacities: (-4.0, 7.0), ..Shape::default() };
-    let mut fixture = Fixture::new(turn, scene(64, &shape), true);
+    let mut fixture = Fixture::blending(turn, scene(64, &shape), true, form);
     fixture.config.label_rule = LabelRule::Votes;
     fixture.config.label_weight = LABEL_WEIGHT;
     fixture.input.layers.clear();

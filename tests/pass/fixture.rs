@@ -8,13 +8,13 @@ use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
 use labelgs::engine::run::{ListKey, Report};
-use labelgs::pass::KernelShape;
+use labelgs::pass::{GroupBlend, KernelShape};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
@@ -37,6 +37,9 @@ impl DerefMut for Fixture {
     }
 }
 
+/// Both forms of the blends; chunks are short, so that lists have several.
+pub const BLENDS: [Option<GroupBlend>; 2] = [None, Some(GroupBlend { chunk_length: 16, ..GroupBlend::DEFAULT })];
+
 impl Fixture {
     /// The scene on the shared device, with or without labels, with the device's kernel shape.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
@@ -49,10 +52,23 @@ impl Fixture {
         Self::with_options(turn, scene, labels, shape, readable())
     }
 
+    /// As `new`, with blends of one form or the other.
+    pub fn blending(turn: Turn, scene: Scene, labels: bool, form: Option<GroupBlend>) -> Self {
+        let shape = KernelShape::of(turn.capabilities());
+        let shape = form.map_or(KernelShape { group_blend: None, ..shape }, |form| shape.with_group_blend_of(form));
+        Self::with_shape(turn, scene, labels, shape)
+    }
+
     /// As `with_shape`, with options of the scheduler; without `readable` only some buffers can be read back.
     pub fn with_options(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, options: SchedulerOptions) -> Self {
         let inner = fixture::Fixture::new(turn.gpu(), scene, labels, shape, options).expect("the engine starts");
         Self { inner, _turn: turn }
+    }
+
+    /// As `with_shape`, with updates of the shape.
+    pub fn with_update(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
+        let inner = fixture::Fixture::with_rows(turn.gpu(), scene, labels, (shape, readable()), 0);
+        Self { inner: inner.expect("the engine starts"), _turn: turn }
     }
 
     /// The device's sorted pairs: keys, and places before the sort.

@@ -1,12 +1,13 @@
 //! A whole step: losses and the gradient of every parameter against the mirror, from the model to the gradient.
 
-use super::fixture::{Fixture, prove};
+use super::fixture::{BLENDS, Fixture, prove};
 use crate::reference::step::step;
 use crate::reference::{Row, Rules};
 use crate::support::compare::{GradientBounds, Tolerance, Verdict, close};
 use crate::support::device;
 use crate::support::mutants::{Family, mutants};
 use crate::support::scenes::{Shape, scene};
+use labelgs::pass::GroupBlend;
 use labelgs::verify::selftest::judge;
 
 /// Errors of all passes add up; 0.89 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
@@ -22,8 +23,14 @@ const BOUNDS: GradientBounds = GradientBounds {
 const MARGIN: f64 = 2e-5;
 
 fn case(name: &str, seed: u64, shape: &Shape, labels: bool, bearing: &[&str]) {
+    for form in BLENDS {
+        case_of(form, name, (seed, shape, labels), bearing);
+    }
+}
+
+fn case_of(form: Option<GroupBlend>, name: &str, (seed, shape, labels): (u64, &Shape, bool), bearing: &[&str]) {
     let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, scene(seed, shape), labels);
+    let mut fixture = Fixture::blending(turn, scene(seed, shape), labels, form);
     let report = fixture.train();
     let actual = fixture.gradient_rows();
     let (model, camera, mut target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());

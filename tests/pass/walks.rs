@@ -11,10 +11,10 @@ use labelgs::scheduler::plan::Buf;
 use labelgs::shaders::structs::StepUniforms;
 
 /// Invocations of a workgroup, and the most records that one of them sums.
-const WALKERS: u32 = 64;
+pub(super) const WALKERS: u32 = 64;
 
 /// Small and large splats in a picture of more rows of tiles than a workgroup has invocations, if tiles are 8 px high.
-fn tall_scene() -> Scene {
+pub(super) fn tall_scene() -> Scene {
     let shape = Shape { gaussians: 24, width: 36, height: 530, scales: (0.1, 30.0), sh_degree: 0, ..Shape::default() };
     let mut scene = scene(77, &shape);
     scene.gaussians.scales.iter_mut().step_by(2).for_each(|scale| *scale = [-2.5; 3]);

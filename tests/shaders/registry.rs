@@ -3,7 +3,7 @@
 use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::pass::buffers::{Capacity, TABLE};
-use labelgs::pass::{KernelShape, Supervision, Variant};
+use labelgs::pass::{GroupBlend, KernelShape, Supervision, Update, Variant};
 use labelgs::run::StrategyKind;
 use labelgs::scheduler::plan::{Buf, Grid, Limits, PassList, Plan, PlanOptions, Work};
 use labelgs::train::shared::exposure::Exposure;
@@ -45,13 +45,16 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping = own
-        .into_iter()
-        .chain(emulated)
-        .map(|shape| KernelShape { loss_tile: 16, narrow_labels: true, ..shape }.with_sweeps_of(8));
+    let sweeping = own.into_iter().chain(emulated).map(|shape| {
+        KernelShape { loss_tile: 16, narrow_labels: true, ..shape }
+            .with_sweeps_of(8)
+            .with_group_blend_of(GroupBlend::DEFAULT)
+    });
     let one_by_one: Vec<KernelShape> = own.into_iter().chain(emulated).chain(antialiased).chain(sweeping).collect();
     let shared_out = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape });
-    for shape in one_by_one.iter().copied().chain(shared_out) {
+    let split: Vec<KernelShape> = one_by_one.iter().copied().chain(shared_out).collect();
+    let late = split.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
+    for shape in split.iter().copied().chain(late) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;
@@ -82,6 +85,11 @@ fn lists() -> Vec<(Capacity, PassList)> {
                 for supervision in [Supervision::Photo, Supervision::Layers { lift: false }] {
                     add(pass::extended_step(&shape, &capacity, Variant { supervision, ..variant }, (&*shared, 1)));
                 }
+            }
+            if shape.update != Update::Split {
+                let fog = (&*extension, strategy::passes::FREE_SPACE);
+                add(pass::extended_step(&shape, &capacity, Variant { catch_up: true, ..variant }, fog));
+                add(pass::catch_up(&shape, &capacity, 3));
             }
             add(pass::weigh_view(&shape, &capacity));
             add(pass::densify_count(&shape, &capacity));
@@ -179,7 +187,8 @@ fn subgroups_without_kernels_have_no_shape() {
 #[test]
 fn every_list_can_be_planned_and_printed() {
     for (capacity, list) in lists() {
-        let plan = Plan::new(TABLE, &capacity.counts(), &list, &Limits::default(), PlanOptions::default());
+        let limits = Limits { max_storage_buffers: 64, ..Limits::default() };
+        let plan = Plan::new(TABLE, &capacity.counts(), &list, &limits, PlanOptions::default());
         let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", list.name));
         let text = plan.report();
         assert_eq!(plan.items.len(), list.work.len());

@@ -8,6 +8,7 @@ pub mod exposure; // exposures of photos are trained, found and resumed
 mod first_model; // how many Gaussians a training starts with, and where
 mod free_space; // rules against fog spare things that are near
 mod known_depths; // depths of points and maps in the loss, resumed trainings
+mod late; // Gaussians that miss updates are where every step moves them
 mod overflow; // a buffer that is too small costs a step and no bit
 mod photo_memory; // photos and masks within a budget of memory give the same bits
 mod poses; // poses of photos are refined, found and resumed

@@ -157,6 +157,8 @@ fn unseen_gaussians_move_or_rest() {
         let mut trainer = Trainer::new(turn.gpu(), settings(), &small(), &model, options).expect("a trainer");
         trainer.step().expect("a step");
         trainer.drain().expect("its report");
+        // What it missed comes before other moments.
+        trainer.engine_mut().catch_up().expect("it catches up");
         let before = trainer.model().expect("a model").means[7];
         trainer.engine_mut().raw_mut().upload(Buf::M_MEANS, 0, 7, &[[1.0_f32, 0.0, 0.0, 0.0]]).expect("upload");
         trainer.engine_mut().raw_mut().upload(Buf::U_MEANS, 0, 7, &[[1.0_f32; 4]]).expect("upload");

@@ -125,6 +125,16 @@ domains! {
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,
         "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
+    CHUNKS chunks: "chunks", cures::pairs,
+        "Chunks of lists that the backward blend walks, or 0 where it walks tiles.", optional;
+    CHUNK_PIXELS chunk_pixels: "chunk pixels", cures::pairs,
+        "Pixels between two chunks of a list, or 0 where it walks tiles.", optional;
+    CHUNK_CHANNELS chunk_channels: "chunk channels", cures::pairs,
+        "As chunk pixels, or 0 in a training without labels and known depths.", optional;
+    LATE_GAUSSIANS late_gaussians: "late gaussians", cures::model,
+        "Trained Gaussians that may miss updates: all of them, or none where each step updates all.", optional;
+    MISSED_ROWS missed_rows: "missed rows", cures::none,
+        "Rows of the table of what they missed.", optional;
     SHARED_ROWS shared_rows: "shared rows", cures::none,
         "Rows of four shared parameters, or 0 without any.", optional;
     .. sort_lanes: "Lanes of the sort.";

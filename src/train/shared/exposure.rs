@@ -153,6 +153,10 @@ impl Extension for Passes {
             Hook::Camera | Hook::Gradients | Hook::Updated => {}
         }
     }
+
+    fn splits_update(&self, _passes: u32) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

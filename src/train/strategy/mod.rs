@@ -5,7 +5,7 @@ pub mod adc;
 pub(crate) mod budget;
 pub(crate) mod exchange;
 pub(crate) mod mcmc;
-pub(crate) mod passes;
+pub mod passes;
 pub mod population;
 pub mod weights;
 

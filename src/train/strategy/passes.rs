@@ -5,7 +5,7 @@ use crate::pass::{Builder, Extension, Hook, densify, optimize};
 use crate::shaders::structs::StepUniforms;
 
 /// Marks Gaussians that fog the camera of the step.
-pub(crate) const FREE_SPACE: u32 = 1;
+pub const FREE_SPACE: u32 = 1;
 /// Adds the gradients of mean opacity and size.
 pub(crate) const REGULARISE: u32 = 2;
 /// Moves faint Gaussians at random.
@@ -32,6 +32,10 @@ impl Extension for Passes {
         if hook == Hook::Updated && has(FREE_SPACE) {
             densify::mark_near(b);
         }
+    }
+
+    fn splits_update(&self, passes: u32) -> bool {
+        passes & !FREE_SPACE != 0
     }
 }
 

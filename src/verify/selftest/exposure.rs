@@ -7,6 +7,7 @@ use super::scenes::{Shape, scene};
 use super::{Judge, LEEWAY, Rig, judge};
 use crate::engine::SharedRow;
 use crate::error::Result;
+use crate::pass::{KernelShape, Update};
 use crate::reference::Rules;
 use crate::reference::exposure::{ExposureRows, backward, exposed};
 use crate::reference::loss::photo_loss;
@@ -38,7 +39,7 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let mut scene = scene(91, &shape);
     scene.target.photo.colours.iter_mut().step_by(5).for_each(|colour| *colour = [1.0; 3]);
-    let options = (rig.kernels, readable());
+    let options = (KernelShape { update: Update::Split, ..rig.kernels }, readable());
     let mut fixture = Fixture::with_rows(Arc::clone(rig.gpu), scene, false, options, ROWS.len() as u32)?;
     let pixels = fixture.pixels();
     // The picture of a step without exposure.

@@ -4,7 +4,7 @@ use super::scenes::Scene;
 use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, SharedRow, TrainInput};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::pass::{KernelShape, Variant};
+use crate::pass::{KernelShape, Update, Variant};
 use crate::reference::loss::ObjectPixel;
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::splat::{Splat, SplatGradient};
@@ -128,8 +128,8 @@ impl OwnView {
 }
 
 impl Fixture {
-    /// Uploads the scene to a device, with or without labels, with kernels of a given shape. Without [`readable`], only
-    /// some buffers can be read back.
+    /// Uploads the scene to a device, with or without labels, with kernels of a given shape, but with a pass for each part of an
+    /// update, so that gradients can be read. Without [`readable`], only some buffers can be read back.
     pub fn new(
         gpu: Arc<Gpu>,
         scene: Scene,
@@ -137,11 +137,12 @@ impl Fixture {
         shape: KernelShape,
         options: SchedulerOptions,
     ) -> Result<Self> {
+        let shape = KernelShape { update: Update::Split, ..shape };
         Self::with_rows(gpu, scene, labels, (shape, options), 0)
     }
 
-    /// Same as [`Fixture::new`], with a number of shared rows.
-    pub(crate) fn with_rows(
+    /// Same as [`Fixture::new`], with updates of the shape, and with a number of shared rows.
+    pub fn with_rows(
         gpu: Arc<Gpu>,
         scene: Scene,
         labels: bool,

@@ -11,13 +11,14 @@ mod pose;
 pub mod relocation;
 pub mod scenes;
 mod training;
+pub mod update;
 
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
 use crate::reference::Rules;
 use checks::FinishedStep;
-use compare::{Tolerance, Verdict};
+use compare::{Summary, Tolerance, Verdict};
 use fixture::{Fixture, readable};
 use scenes::{Scene, population, scene_of};
 use std::sync::Arc;
@@ -134,6 +135,12 @@ impl Rig<'_> {
     fn fixture(&self, scene: Scene) -> Result<Fixture> {
         Fixture::new(Arc::clone(self.gpu), scene, true, self.kernels, readable())
     }
+
+    /// With the update in one kernel, if the device can run it.
+    fn lazy(&self, scene: Scene) -> Result<Option<Fixture>> {
+        let Some(kernels) = self.kernels.with_lazy_updates(self.gpu.capabilities()) else { return Ok(None) };
+        Fixture::with_rows(Arc::clone(self.gpu), scene, true, (kernels, readable()), 0).map(Some)
+    }
 }
 
 /// Runs the checks of passes that change the model.
@@ -145,7 +152,15 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
         model::densification(&mut rig.fixture(scene_of(&before))?, before, (600, splits_long), tolerance)
     }
     type Change = fn(&Rig) -> Result<Judge>;
-    let changes: [(&str, Change); 11] = [
+    let changes: [(&str, Change); 13] = [
+        ("update in one kernel", |rig| match rig.lazy(update::partly_frozen(104))? {
+            Some(mut fused) => update::step(&mut fused, &mut rig.fixture(update::partly_frozen(104))?),
+            None => Ok(Box::new(|_| Ok(Summary::default()))),
+        }),
+        ("late Gaussians", |rig| match rig.lazy(update::partly_frozen(105))? {
+            Some(mut fixture) => update::late(&mut fixture),
+            None => Ok(Box::new(|_| Ok(Summary::default()))),
+        }),
         ("densification", |rig| densified(rig, false)),
         ("densification along the longest axis", |rig| densified(rig, true)),
         ("marks of fog", |rig| model::fog(&mut rig.fixture(model::large(63))?)),

@@ -41,10 +41,7 @@ pub fn adam(fixture: &mut Fixture, steps: u32) -> Result<Judge> {
         (fixture.input.step, fixture.input.updates) = (step, step);
         let before = states(fixture)?;
         fixture.train()?;
-        let u = fixture.uniforms();
-        let ([means, opacity], rest) = ([u.rate_means[0], u.rate_means[3]], u.rate_sh_rest);
-        let rates = Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from));
-        done.push((step, rates, before, fixture.gradient_rows()?, states(fixture)?));
+        done.push((step, rates_of(fixture), before, fixture.gradient_rows()?, states(fixture)?));
     }
     fixture.input.update = false;
     Ok(Box::new(move |rules: &Rules| {
@@ -56,8 +53,15 @@ pub fn adam(fixture: &mut Fixture, steps: u32) -> Result<Judge> {
     }))
 }
 
+/// Learning rates of the fixture's step.
+pub(super) fn rates_of(fixture: &Fixture) -> Rates {
+    let u = fixture.uniforms();
+    let ([means, opacity], rest) = ([u.rate_means[0], u.rate_means[3]], u.rate_sh_rest);
+    Rates([means, u.rate_quats, u.rate_scales, opacity, u.rate_sh0, rest, rest, rest].map(f64::from))
+}
+
 /// Parameters and moments of the trained Gaussians.
-fn states(fixture: &mut Fixture) -> Result<Vec<Optimised>> {
+pub(super) fn states(fixture: &mut Fixture) -> Result<Vec<Optimised>> {
     let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
     let [rows, m, u] = fixture.planes(count, count)?;
     Ok((0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect())

@@ -6,6 +6,7 @@ use super::scenes::{Shape, scene};
 use super::{Judge, LEEWAY, Rig, judge};
 use crate::engine::SharedRow;
 use crate::error::Result;
+use crate::pass::{KernelShape, Update};
 use crate::reference::pose::{PoseRows, backward, corrected};
 use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
@@ -33,7 +34,7 @@ fn rows() -> Vec<[f32; 4]> {
 pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let (scene, rows) = (scene(92, &shape), rows());
-    let options = (rig.kernels, readable());
+    let options = (KernelShape { update: Update::Split, ..rig.kernels }, readable());
     let mut fixture = Fixture::with_rows(Arc::clone(rig.gpu), scene, false, options, rows.len() as u32)?;
     let place = Place { all: SharedLayout { scene: 0, photo: FIRST as u32 }, ..Place::default() };
     fixture.engine.set_extension(Poses::default().extension(place), 1);

@@ -101,6 +101,9 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         virtual_tiles: 4096,
         layer_tiles: 1024,
         segment_pixels: 1,
+        chunks: 0,
+        chunk_pixels: 0,
+        chunk_channels: 0,
         layer_pixels: 65_536,
         pixels: 65_536,
         labelled_pixels: 65_536,
@@ -118,6 +121,8 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sweep_cells: 0,
         loss_partials: 1024,
         sort_lanes: 64,
+        late_gaussians: 0,
+        missed_rows: 0,
         shared_rows: 70,
         segments: 2,
     };

@@ -1,0 +1,72 @@
+// Parameters of a Gaussian with the updates that it has missed: those of the steps since its last one, in which its gradient
+// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP; plane4 is an
+// element of one of them. LAZY: else nothing is missed.
+//
+// Without a gradient the moments shrink by beta1 and beta2, so that the k-th missed update moves a parameter by
+// r^k m / sqrt(v) times w, with r = beta1 / sqrt(beta2) and w the rate of that update with its corrections. The sums of r^k w
+// are the same for all Gaussians that missed as many updates: the host adds them up in f64.
+//
+// missed: rows of MISSED_VECTORS. Row 0: the number of updates before this step, and the last one that no Gaussian missed; the
+// w of this step's update. Row 1 + age: after so many missed updates, the sums for means and opacities; those for scales,
+// rotations, colours of degree 0 and of higher ones; beta1^age, beta2^age, r^age.
+
+#ifdef LAZY
+
+#ifndef touched
+#define touched(i) fetchu(touched_at, i)
+#endif
+
+bool is_late = false;      // the Gaussian has missed updates; then
+vec4 late_means, late_rest; // the sums,
+vec2 late_shrink;          // and the factors of its moments
+
+vec4 missed_row(uint row, uint column) {
+    return uintBitsToFloat(missed[MISSED_VECTORS * row + column]);
+}
+
+// Number of updates before this step that a trained Gaussian has missed.
+uint missed_updates(uint i) {
+    uvec4 now = missed[0];
+    return min(now.x - max(touched(i), now.y), MISSED_MOST);
+}
+
+void look_up(uint age) {
+    is_late = age > 0u;
+    late_means = missed_row(1u + age, 0u);
+    late_rest = missed_row(1u + age, 1u);
+    late_shrink = missed_row(1u + age, 2u).xy;
+}
+
+// The same after this step's update, which the Gaussian may have missed too.
+void look_up_after(uint i) {
+    uvec4 now = missed[0];
+    uint last = max(touched(i), now.y);
+    if (last <= now.x) {
+        uint age = min(now.x - last, MISSED_MOST);
+        look_up(age);
+        is_late = true;
+        float power = missed_row(2u, 2u).z * missed_row(1u + age, 2u).z;
+        late_means += power * missed_row(0u, 1u);
+        late_rest += power * missed_row(0u, 2u);
+    }
+}
+
+// What a sum is multiplied by. Where v is 0, so is m.
+vec4 late_direction(vec4 m, vec4 v) {
+    return m / (sqrt(v) + ADAM_EPSILON);
+}
+
+// Declares value4 of a plane: an element with the updates that look_up has found missing.
+#define CAUGHT_UP(name, sums) \
+    vec4 name##_now(uint e) { \
+        vec4 value = plane4(name, e); \
+        if (is_late) { \
+            value -= (sums) * late_direction(plane4(m_##name, e), plane4(u_##name, e)); \
+        } \
+        return value; \
+    }
+#define value4(name, e) name##_now(e)
+
+#else
+#define value4(name, e) plane4(name, e)
+#endif

@@ -1,0 +1,83 @@
+// Sums of the gradient records of a splat. The includer declares their planes, what finds them, densify_stats and step. GROUP:
+// also of a splat with many records, by all invocations of a workgroup.
+
+#ifdef GROUP
+const uint WALKERS = 64u; // invocations of a workgroup
+shared uint large_count;  // splats with more records than that,
+shared uint large[WALKERS];
+shared vec4 shared_a[WALKERS / 2u], shared_b[WALKERS / 2u]; // and sums of one of them
+shared vec3 shared_c[WALKERS / 2u];
+#endif
+
+// Records of a splat; those of the scene layer are first.
+struct Records {
+    uint first, total, scene, gaussian;
+};
+
+struct Sums {
+    vec4 a, b;
+    vec3 c; // blue; v_mean2d of the scene layer for the statistic
+};
+
+Records records(uint s, uint gaussian) {
+    Records r;
+    r.total = fetchu(tiles_touched, s);
+    r.first = fetchu(instance_offsets, s);
+    r.scene = r.total;
+    r.gaussian = gaussian;
+#ifdef LABELS
+    r.scene = fetchu(layer_from_label, fetchu(labels, r.gaussian)) != 0u ? r.total / 2u : r.total;
+#endif
+    return r;
+}
+
+// Adds up every stride-th record.
+Sums sum_records(Records r, uint from, uint stride) {
+    uint stamp = step.stamp;
+    Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
+    for (uint k = from; k < r.total; k += stride) {
+        uint at = r.first + k;
+        vec4 ra = fetch4(v_instances_a, at), rb = fetch4(v_instances_b, at), rc = fetch4(v_instances_c, at);
+        bool current = floatBitsToUint(rc.y) == stamp;
+        sums.a += current ? ra : vec4(0.0);
+        sums.b += current ? rb : vec4(0.0);
+        sums.c.x += current ? rc.x : 0.0;
+        vec2 tile_mean = step.sum_absolute != 0u ? abs(ra.xy) : ra.xy;
+        sums.c.yz += current && k < r.scene ? tile_mean : vec2(0.0);
+    }
+    return sums;
+}
+
+// Adds the scene's gradient to the statistic of a trained Gaussian.
+void note_gradient(Records r, Sums sums) {
+    if (r.total > 0u && r.gaussian < step.trained_count) {
+        float size = length(sums.c.yz * vec2(0.5 * float(step.width), 0.5 * float(step.height)));
+        // As in project_backward, which drops the gradients of such a splat: an infinity would stay in the sum.
+        if (finite(size) && size < GRADIENT_MAX) {
+            densify_stats[r.gaussian] += vec2(size, 1.0);
+        }
+    }
+}
+
+#ifdef GROUP
+// The sums of a splat by all invocations: each adds up every 64th record, and a tree their sums, for the first invocation.
+Sums sum_together(Records r) {
+    uint lane = gl_LocalInvocationID.x;
+    Sums sums = sum_records(r, lane, WALKERS);
+    for (uint width = WALKERS / 2u; width > 0u; width /= 2u) {
+        if (lane >= width && lane < 2u * width) {
+            shared_a[lane - width] = sums.a;
+            shared_b[lane - width] = sums.b;
+            shared_c[lane - width] = sums.c;
+        }
+        barrier();
+        if (lane < width) {
+            sums.a += shared_a[lane];
+            sums.b += shared_b[lane];
+            sums.c += shared_c[lane];
+        }
+        barrier();
+    }
+    return sums;
+}
+#endif

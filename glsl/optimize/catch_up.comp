@@ -1,0 +1,88 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+// catch_up — give all Gaussians the updates of Adam that they have missed.
+// Work:    64 Gaussians per workgroup; their vec4 are shared out.
+// Reads:   step, failure; missed
+// Writes:  parameters, first and second moments [N], active colours alone; touched_at [N] of those that had missed some
+// Math:    see caught_up.glsl. A list of its own does so after a failure too.
+// Mirror:  src/reference/lazy.rs::caught_up
+
+layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+READ1(1, uint, failure);
+INOUT(2, uint, touched_at);
+READ(3, uvec4, missed);
+INOUT(4, vec4, means);
+INOUT(5, vec4, scales);
+INOUT(6, vec4, quats);
+INOUT(7, vec4, sh0);
+INOUT(8, vec4, sh1);
+INOUT(9, vec4, sh2);
+INOUT(10, vec4, sh3);
+INOUT(11, vec4, m_means);
+INOUT(12, vec4, m_scales);
+INOUT(13, vec4, m_quats);
+INOUT(14, vec4, m_sh0);
+INOUT(15, vec4, m_sh1);
+INOUT(16, vec4, m_sh2);
+INOUT(17, vec4, m_sh3);
+INOUT(18, vec4, u_means);
+INOUT(19, vec4, u_scales);
+INOUT(20, vec4, u_quats);
+INOUT(21, vec4, u_sh0);
+INOUT(22, vec4, u_sh1);
+INOUT(23, vec4, u_sh2);
+INOUT(24, vec4, u_sh3);
+
+#define LAZY
+#define plane4(name, e) name[e]
+#define touched(i) touched_at[i]
+#include "caught_up.glsl"
+#include "late_adam.glsl"
+
+shared uint late_count; // Gaussians that have missed updates: rows, and how many they missed
+shared uint late_row[64];
+shared uint late_age[64];
+
+// Finds the late Gaussian of a vec4 in a plane with so many of them each. Returns its element.
+uint find(uint at, uint stride) {
+    uint slot = at / stride;
+    look_up(late_age[slot]);
+    return stride * late_row[slot] + (at - slot * stride);
+}
+
+void main() {
+    uint lane = gl_LocalInvocationID.x, i = linear_group_id() * 64u + lane;
+    if (lane == 0u) {
+        late_count = 0u;
+    }
+    barrier();
+    uint age = i < step.trained_count && (failure == 0u || missed[0].z != 0u) ? missed_updates(i) : 0u;
+    if (age > 0u) {
+        uint slot = atomicAdd(late_count, 1u); // in any order: each catches up for itself
+        late_row[slot] = i;
+        late_age[slot] = age;
+        touched_at[i] = missed[0].x;
+    }
+    barrier();
+    for (uint at = lane; at < late_count; at += 64u) {
+        uint e = find(at, 1u);
+        means_catch_up(e);
+        scales_catch_up(e);
+        quats_catch_up(e);
+        sh0_catch_up(e);
+    }
+    for (uint at = lane; SH_DEGREE >= 1u && at < 3u * late_count; at += 64u) {
+        sh1_catch_up(find(at, 3u));
+    }
+    for (uint at = lane; SH_DEGREE >= 2u && at < 4u * late_count; at += 64u) {
+        sh2_catch_up(find(at, 4u));
+    }
+    for (uint at = lane; SH_DEGREE >= 3u && at < 6u * late_count; at += 64u) {
+        sh3_catch_up(find(at, 6u));
+    }
+}

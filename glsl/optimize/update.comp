@@ -1,0 +1,212 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+#include "projection.glsl"
+#include "sh.glsl"
+// update — what a step changes of the Gaussians that it touched: sums the gradient records of each, carries them back to its
+//          parameters, and applies the updates of Adam that it has missed, then that of the step.
+// Work:    64 Gaussians of the model per workgroup, one an invocation; colours by vec4, shared out. A splat with many records is
+//          summed by all invocations, in a tree.
+// Reads:   step, failure; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
+//          labels: labels [N], layer_from_label
+// Writes:  parameters, first and second moments [N], active colours alone; touched_at [N]; densify_stats [N];
+//          counters.nonfinite_* (integer atomics)
+// Math:    gather, project_backward and adam. A Gaussian whose gradients are all 0 stays as it is: it has missed one update
+//          more (caught_up.glsl).
+// Order:   fixed, bitwise reproducible; no atomics on floats.
+// Mirror:  src/reference/project.rs::project_backward, densify.rs::accumulate, adam.rs::adam, lazy.rs::caught_up
+
+layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(constant_id = 18) const uint CHANGES = 1; // 0: the statistic alone
+layout(local_size_x = 64) in;
+READ1(0, StepUniforms, step);
+INOUT1(1, Counters, counters);
+READ1(2, uint, failure);
+FETCHU(3, splat_from_gaussian);
+FETCHU(4, tiles_touched);
+FETCHU(5, instance_offsets);
+FETCH4(6, v_instances_a);
+FETCH4(7, v_instances_b);
+FETCH4(8, v_instances_c);
+INOUT(9, vec2, densify_stats);
+INOUT(10, uint, touched_at);
+READ(11, uvec4, missed);
+INOUT(12, vec4, means);
+INOUT(13, vec4, scales);
+INOUT(14, vec4, quats);
+INOUT(15, vec4, sh0);
+INOUT(16, vec4, sh1);
+INOUT(17, vec4, sh2);
+INOUT(18, vec4, sh3);
+INOUT(19, vec4, m_means);
+INOUT(20, vec4, m_scales);
+INOUT(21, vec4, m_quats);
+INOUT(22, vec4, m_sh0);
+INOUT(23, vec4, m_sh1);
+INOUT(24, vec4, m_sh2);
+INOUT(25, vec4, m_sh3);
+INOUT(26, vec4, u_means);
+INOUT(27, vec4, u_scales);
+INOUT(28, vec4, u_quats);
+INOUT(29, vec4, u_sh0);
+INOUT(30, vec4, u_sh1);
+INOUT(31, vec4, u_sh2);
+INOUT(32, vec4, u_sh3);
+#ifdef LABELS
+FETCHU(33, labels);
+FETCHU(34, layer_from_label);
+#endif
+
+#define GROUP
+#define LAZY
+#define plane4(name, e) name[e]
+#define touched(i) touched_at[i]
+#include "caught_up.glsl"
+#include "caught_up_planes.glsl"
+#include "sh_fetch.glsl"
+#include "sh_colour.glsl"
+#include "sh_backward.glsl"
+#include "records.glsl"
+#include "late_adam.glsl"
+
+shared uint seen_count;    // Gaussians with a splat
+shared uint large_lane[WALKERS]; // of the large ones
+shared uint touched_count; // Gaussians with a gradient: row, what they missed of colours, and the gradients of these
+shared uint touched_row[WALKERS];
+shared vec4 touched_late[WALKERS];
+shared vec3 touched_colour[WALKERS];
+shared float touched_basis[15u * WALKERS];
+
+// Sums the records of the Gaussian of each invocation that has a splat.
+Sums sum_all(Records r, uint s) {
+    uint lane = gl_LocalInvocationID.x;
+    Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
+    if (r.total > WALKERS) {
+        uint k = atomicAdd(large_count, 1u); // in any order: each splat is summed for itself
+        large[k] = s;
+        large_lane[k] = lane;
+    } else {
+        sums = sum_records(r, 0u, 1u);
+    }
+    barrier();
+    for (uint k = 0u; k < large_count; k++) {
+        uint owner = large_lane[k];
+        Sums all = sum_together(records(large[k], linear_group_id() * WALKERS + owner));
+        if (lane == 0u) {
+            shared_a[0] = all.a;
+            shared_b[0] = all.b;
+            shared_c[0] = all.c;
+        }
+        barrier();
+        if (lane == owner) {
+            sums = Sums(shared_a[0], shared_b[0], shared_c[0]);
+        }
+        barrier();
+    }
+    return sums;
+}
+
+// Updates all but colours, and keeps what their update needs.
+void update_geometry(StepUniforms u, uint i, Sums sums) {
+    look_up(missed_updates(i));
+    vec4 mean = means_now(i), quat = quats_now(i);
+    Projection p = project_gaussian(u, mean.xyz, scales_now(i).xyz, quat);
+    vec4 a = sums.a, b = sums.b;
+    float blue = sums.c.x;
+    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
+#include "splat_backward.glsl"
+    if (!sane) {
+        atomicAdd(counters.nonfinite_count, 1u);
+        atomicMin(counters.nonfinite_first, i);
+    }
+    if (!sane || CHANGES == 0u) {
+        return;
+    }
+    means_step(u, i, vec4(v_mean, v_logit), u.rate_means);
+    scales_step(u, i, vec4(v_log_scale, 0.0), vec4(u.rate_scales));
+    quats_step(u, i, v_quat, vec4(u.rate_quats));
+    touched_at[i] = missed[0].x + 1u;
+    uint slot = atomicAdd(touched_count, 1u); // in any order: each is updated for itself
+    touched_row[slot] = i;
+    touched_late[slot] = is_late ? vec4(late_rest.zw, late_shrink) : vec4(0.0);
+    touched_colour[slot] = v_colour;
+    for (uint k = 0u; k < 15u; k++) {
+        touched_basis[15u * slot + k] = basis[k];
+    }
+}
+
+// Gradient of one vec4 of a band of coefficients, of which `first` is the first and `floats` is three times their number.
+vec4 coefficient_gradient(uint slot, uint first, uint floats, uint part) {
+    vec4 g = vec4(0.0);
+    for (uint c = 0u; c < 4u; c++) {
+        uint at = 4u * part + c;
+        g[c] = at < floats ? touched_basis[15u * slot + first + at / 3u] * touched_colour[slot][at % 3u] : 0.0;
+    }
+    return g;
+}
+
+// Finds the touched Gaussian of a vec4 in a plane with so many of them each, and its element.
+uint find(uint at, uint stride, out uint part) {
+    uint slot = at / stride;
+    part = at - slot * stride;
+    vec4 late = touched_late[slot];
+    is_late = late.z > 0.0;
+    late_rest.zw = late.xy;
+    late_shrink = late.zw;
+    return slot;
+}
+
+void update_colours(StepUniforms u) {
+    uint lane = gl_LocalInvocationID.x, part;
+    for (uint at = lane; at < touched_count; at += WALKERS) {
+        uint slot = find(at, 1u, part);
+        sh0_step(u, touched_row[slot], vec4(SH_C0 * touched_colour[slot], 0.0), vec4(u.rate_sh0));
+    }
+    vec4 rate = vec4(u.rate_sh_rest);
+    for (uint at = lane; SH_DEGREE >= 1u && at < 3u * touched_count; at += WALKERS) {
+        uint slot = find(at, 3u, part);
+        sh1_step(u, 3u * touched_row[slot] + part, coefficient_gradient(slot, 0u, 9u, part), rate);
+    }
+    for (uint at = lane; SH_DEGREE >= 2u && at < 4u * touched_count; at += WALKERS) {
+        uint slot = find(at, 4u, part);
+        sh2_step(u, 4u * touched_row[slot] + part, coefficient_gradient(slot, 3u, 15u, part), rate);
+    }
+    for (uint at = lane; SH_DEGREE >= 3u && at < 6u * touched_count; at += WALKERS) {
+        uint slot = find(at, 6u, part);
+        sh3_step(u, 6u * touched_row[slot] + part, coefficient_gradient(slot, 8u, 21u, part), rate);
+    }
+}
+
+void main() {
+    StepUniforms u = step;
+    uint lane = gl_LocalInvocationID.x, i = linear_group_id() * WALKERS + lane;
+    if (lane == 0u) {
+        seen_count = 0u;
+        large_count = 0u;
+        touched_count = 0u;
+    }
+    barrier();
+    bool is_trained = i < u.trained_count && failure == 0u;
+    uint s = is_trained ? fetchu(splat_from_gaussian, i) : NO_SPLAT;
+    if (s != NO_SPLAT) {
+        atomicAdd(seen_count, 1u);
+    }
+    barrier();
+    if (seen_count == 0u) {
+        return;
+    }
+    Records r = Records(0u, 0u, 0u, i);
+    if (s != NO_SPLAT) {
+        r = records(s, i);
+    }
+    Sums sums = sum_all(r, s);
+    note_gradient(r, sums);
+    if (any(notEqual(sums.a, vec4(0.0))) || any(notEqual(sums.b, vec4(0.0))) || sums.c.x != 0.0) {
+        update_geometry(u, i, sums);
+    }
+    barrier();
+    update_colours(u);
+}

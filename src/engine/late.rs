@@ -1,0 +1,122 @@
+//! Late Gaussians on the host: a model or a state is read without a change of what is on the device, so that a training has
+//! the same bits whoever reads it.
+
+use super::Engine;
+use super::missed::{Missed, Weights};
+use crate::error::Result;
+use crate::pass::ATTRIBUTES;
+use crate::pass::buffers::TABLE;
+use crate::records::checkpoint::Plane;
+use crate::scheduler::Scheduler;
+use crate::scheduler::plan::Buf;
+use crate::shaders::constants::ADAM_EPSILON;
+
+/// Name of the plane with the weights of missed updates, after a row with the numbers of updates.
+const MISSED: &str = "missed_updates";
+/// Words of its rows.
+const WORDS: u32 = 8;
+
+/// What each Gaussian has missed.
+pub(super) struct Late {
+    /// Number of updates, of each trained Gaussian.
+    ages: Vec<usize>,
+    /// By number of updates: sums for the eight rates, factors of first and second moments.
+    sums: Vec<(Weights, [f32; 2])>,
+}
+
+impl Late {
+    fn new(missed: &Missed, touched_at: &[u32]) -> Self {
+        let ages = touched_at.iter().map(|&at| missed.age(at) as usize).collect();
+        Self { ages, sums: missed.sums() }
+    }
+
+    /// Catches up the values of a plane of parameters, given with its moments, which it catches up too.
+    fn settle(&self, plane: Buf, [values, m, u]: [&mut [f32]; 3]) {
+        let Some(attribute) = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane) else { return };
+        let (rate, floats) = (attribute.rate as usize, 4 * attribute.stride as usize);
+        for (row, &age) in self.ages.iter().enumerate().filter(|(_, age)| **age > 0) {
+            let (sums, [first, second]) = &self.sums[age];
+            for at in row * floats..(row + 1) * floats {
+                let sum = if rate == 0 { sums[at % 4] } else { sums[3 + rate] };
+                values[at] -= sum * (m[at] / (u[at].sqrt() + ADAM_EPSILON));
+                m[at] *= first;
+                u[at] *= second;
+            }
+        }
+    }
+}
+
+/// Reads floats of a plane of parameters; `late`, with the updates that Gaussians have missed.
+pub(super) fn read(sched: &mut Scheduler, late: Option<&Late>, plane: Buf, floats: usize) -> Result<Vec<f32>> {
+    let mut values = sched.download::<f32>(plane, 0, 0, floats)?;
+    let attribute = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane);
+    if let (Some(late), Some(attribute)) = (late, attribute) {
+        let trained = late.ages.len() * 4 * attribute.stride as usize;
+        let mut m = sched.download::<f32>(attribute.planes[1], 0, 0, trained)?;
+        let mut u = sched.download::<f32>(attribute.planes[2], 0, 0, trained)?;
+        late.settle(plane, [&mut values[..trained], &mut m, &mut u]);
+    }
+    Ok(values)
+}
+
+/// Returns the planes of a state without the updates that Gaussians have missed, and with these where no Gaussian may be late.
+pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
+    let find = |name: &str| planes.iter().find(|plane| plane.name == name);
+    let (missed, touched_at) = (find(MISSED)?, find(TABLE[Buf::TOUCHED_AT.index()].name)?);
+    let late = Late::new(&Missed::of_words(&missed.data), &touched_at.data);
+    let mut all: Vec<Plane> = planes.to_vec();
+    for attribute in &ATTRIBUTES {
+        let names = attribute.planes.map(|buf| TABLE[buf.index()].name);
+        let floats = |plane: &&mut Plane| plane.data.iter().map(|&word| f32::from_bits(word)).collect::<Vec<f32>>();
+        let mut of = names.map(|name| all.iter_mut().find(|plane| plane.name == name).as_ref().map(floats));
+        let [Some(values), Some(m), Some(u)] = &mut of else { continue };
+        late.settle(attribute.planes[0], [values, m, u]);
+        for (name, values) in names.iter().zip(of.iter().flatten()) {
+            if let Some(plane) = all.iter_mut().find(|plane| plane.name == *name) {
+                plane.data = values.iter().map(|value| value.to_bits()).collect();
+            }
+        }
+    }
+    all.retain(|plane| plane.name != missed.name && plane.name != touched_at.name);
+    Some(all)
+}
+
+/// Checks the planes of late Gaussians in a state; `take` removes a plane from those that were given.
+pub(super) fn check<'a>(mut take: impl FnMut(&str) -> Option<&'a Plane>, trained: u32) -> Result<(), String> {
+    match (take(TABLE[Buf::TOUCHED_AT.index()].name), take(MISSED)) {
+        (None, None) => Ok(()),
+        (Some(touched_at), Some(missed)) => {
+            let rows = touched_at.data.len() == trained as usize && touched_at.words == 1;
+            let is_whole = missed.words == WORDS && missed.data.len().is_multiple_of(WORDS as usize);
+            let knows = |missed: &Missed| touched_at.data.iter().all(|&at| missed.knows(at));
+            match rows && is_whole && !missed.data.is_empty() && knows(&Missed::of_words(&missed.data)) {
+                true => Ok(()),
+                false => Err(format!("the planes {} and {MISSED} do not fit", touched_at.name)),
+            }
+        }
+        _ => Err(format!("one of the planes {} and {MISSED} is missing", TABLE[Buf::TOUCHED_AT.index()].name)),
+    }
+}
+
+impl Missed {
+    /// The plane of a state.
+    pub(super) fn plane(&self) -> Plane {
+        Plane { name: MISSED.to_owned(), words: WORDS, data: self.words() }
+    }
+
+    /// Finds it.
+    pub(super) fn find(planes: &[Plane]) -> Option<Self> {
+        planes.iter().find(|plane| plane.name == MISSED).map(|plane| Self::of_words(&plane.data))
+    }
+}
+
+impl Engine {
+    /// Returns what Gaussians have missed; `None` if nothing.
+    pub(super) fn late(&mut self) -> Result<Option<Late>> {
+        if !self.missed.is_late() {
+            return Ok(None);
+        }
+        let touched_at = self.sched.download::<u32>(Buf::TOUCHED_AT, 0, 0, self.trained_count() as usize)?;
+        Ok(Some(Late::new(&self.missed, &touched_at)))
+    }
+}

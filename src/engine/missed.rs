@@ -1,0 +1,263 @@
+//! What Gaussians have missed while no step touched them (glsl/include/caught_up.glsl).
+//!
+//! The engine numbers the updates itself, from the upload of a model or a state on.
+
+use super::{Engine, Input, ListKey};
+use crate::error::Result;
+use crate::pass::{Update, Variant, is_fused};
+use crate::scheduler::plan::Buf;
+use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, MISSED_MOST};
+use crate::shaders::structs::StepUniforms;
+use bytemuck::Zeroable;
+use std::collections::VecDeque;
+
+/// Learning rates of an update with the corrections of its moments: position and opacity, then scales, rotations, colours of
+/// degree 0 and of higher ones.
+pub(super) type Weights = [f32; 8];
+
+/// A row of the table on the device.
+type Row = [[u32; 4]; 3];
+
+/// Updates that a failure may take back: more than there are steps in flight.
+const TAKEN_BACK: usize = 32;
+
+/// Numbers of updates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Mark {
+    /// All updates so far.
+    now: u32,
+    /// The last one that no Gaussian has missed.
+    whole: u32,
+}
+
+/// The updates that Gaussians may have missed.
+#[derive(Debug, Default)]
+pub(super) struct Missed {
+    mark: Mark,
+    /// Weights of the newest updates, the last one at the end.
+    weights: VecDeque<Weights>,
+}
+
+impl Missed {
+    /// Returns true if Gaussians have missed updates.
+    pub(super) fn is_late(&self) -> bool {
+        self.mark.now > self.mark.whole
+    }
+
+    /// Returns how many updates a Gaussian has missed, the last of which was that of this number.
+    pub(super) fn age(&self, touched_at: u32) -> u32 {
+        self.mark.now.saturating_sub(touched_at.max(self.mark.whole)).min(MISSED_MOST)
+    }
+
+    /// Returns true if the weights of all updates that such a Gaussian has missed are known.
+    pub(super) fn knows(&self, touched_at: u32) -> bool {
+        touched_at <= self.mark.now && self.age(touched_at) as usize <= self.weights.len()
+    }
+
+    /// Returns the sums of the weights and the powers beta1^n and beta2^n for each number n of missed updates.
+    pub(super) fn sums(&self) -> Vec<(Weights, [f32; 2])> {
+        self.rows()
+            .map(|(sums, [first, second, _])| (sums.map(|sum| sum as f32), [first as f32, second as f32]))
+            .collect()
+    }
+
+    /// Returns the same in f64, with the powers of beta1 / sqrt(beta2).
+    fn rows(&self) -> impl Iterator<Item = ([f64; 8], [f64; 3])> {
+        let [beta1, beta2] = [ADAM_BETA1, ADAM_BETA2].map(f64::from);
+        let ratio = beta1 / beta2.sqrt();
+        // Before the first update there was none.
+        let newest = self.weights.iter().rev().copied().chain(std::iter::repeat(Weights::default()));
+        let start = ([0.0; 8], [1.0; 3]);
+        let older = newest.scan(start, move |(sums, powers), weights| {
+            sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum = ratio * (f64::from(weight) + *sum));
+            powers.iter_mut().zip([beta1, beta2, ratio]).for_each(|(power, factor)| *power *= factor);
+            Some((*sums, *powers))
+        });
+        std::iter::once(start).chain(older).take(MISSED_MOST as usize + 1)
+    }
+
+    /// Returns the table for a step that moves parameters by `next`, or that works `after_failure`.
+    fn table(&self, next: Weights, after_failure: bool) -> Vec<Row> {
+        let halves = |of: Weights| {
+            let word = |at: usize| of[at].to_bits();
+            [[0, 1, 2, 3].map(word), [4, 5, 6, 7].map(word)]
+        };
+        let [of_means, of_rest] = halves(next);
+        let head = [[self.mark.now, self.mark.whole, u32::from(after_failure), 0], of_means, of_rest];
+        let rows = self.rows().map(|(sums, powers)| {
+            let [of_means, of_rest] = halves(sums.map(|sum| sum as f32));
+            let [first, second, ratio] = powers.map(|power| (power as f32).to_bits());
+            [of_means, of_rest, [first, second, ratio, 0]]
+        });
+        std::iter::once(head).chain(rows).collect()
+    }
+
+    /// Words of a state: the numbers of updates, then the weights.
+    pub(super) fn words(&self) -> Vec<u32> {
+        let head = [self.mark.now, self.mark.whole, 0, 0, 0, 0, 0, 0];
+        std::iter::once(head).chain(self.weights.iter().map(|weights| weights.map(f32::to_bits))).flatten().collect()
+    }
+
+    /// The inverse of [`Missed::words`].
+    pub(super) fn of_words(words: &[u32]) -> Self {
+        let mut rows = words.as_chunks::<8>().0.iter();
+        let mark = rows.next().map_or(Mark::default(), |head| Mark { now: head[0], whole: head[1].min(head[0]) });
+        Self { mark, weights: rows.map(|row| row.map(f32::from_bits)).collect() }
+    }
+
+    fn advance(&mut self, weights: Weights) {
+        self.mark.now += 1;
+        self.weights.push_back(weights);
+        if self.weights.len() > MISSED_MOST as usize + TAKEN_BACK {
+            self.weights.pop_front();
+        }
+    }
+
+    fn go_back(&mut self, mark: Mark) {
+        let taken_back = self.mark.now.saturating_sub(mark.now) as usize;
+        self.weights.truncate(self.weights.len().saturating_sub(taken_back));
+        self.mark = mark;
+    }
+}
+
+/// Returns the weights of an update.
+fn weights(uniforms: &StepUniforms) -> Weights {
+    let u = uniforms;
+    let factor = f64::from(u.adam_correction1) / f64::from(u.adam_correction2).sqrt();
+    let [x, y, z, opacity] = u.rate_means;
+    [x, y, z, opacity, u.rate_scales, u.rate_quats, u.rate_sh0, u.rate_sh_rest]
+        .map(|rate| (factor * f64::from(rate)) as f32)
+}
+
+impl Engine {
+    /// Returns true if Gaussians may miss updates.
+    pub(crate) fn may_be_late(&self) -> bool {
+        self.capacity.missed_rows > 0
+    }
+
+    /// The variant of a training step, and whether one kernel makes its update; `None` for other lists.
+    fn step_of(&self, key: ListKey) -> Option<(Variant, bool)> {
+        match key {
+            ListKey::Train(variant) => Some((variant, is_fused(&self.shape, (&(), 0)))),
+            ListKey::Extended(variant, passes) => Some((variant, is_fused(&self.shape, (&*self.extension, passes)))),
+            _ => None,
+        }
+    }
+
+    /// Returns the list for a step: with a pass in which all Gaussians catch up, if it is due.
+    pub(super) fn caught_up(&self, key: ListKey) -> ListKey {
+        let (Mark { now, whole }, of) = (self.missed.mark, self.step_of(key));
+        let catch_up = match of.filter(|_| self.may_be_late()) {
+            Some((_, true)) if self.shape.update == Update::Fused => true,
+            Some((_, true)) => now - whole >= MISSED_MOST,
+            Some((_, false)) => now > whole,
+            None => return key,
+        };
+        match key {
+            ListKey::Train(variant) => ListKey::Train(Variant { catch_up, ..variant }),
+            ListKey::Extended(variant, passes) => ListKey::Extended(Variant { catch_up, ..variant }, passes),
+            other => other,
+        }
+    }
+
+    /// Notes the update of a step that was submitted. Returns the numbers before it.
+    pub(super) fn note_update(&mut self, key: ListKey, uniforms: &StepUniforms) -> Mark {
+        let before = self.missed.mark;
+        if let Some((variant, is_fused)) = self.step_of(key).filter(|_| self.may_be_late()) {
+            if variant.catch_up {
+                self.missed.mark.whole = before.now;
+            }
+            if variant.update {
+                self.missed.advance(weights(uniforms));
+            }
+            // Passes of their own update all Gaussians.
+            if variant.update && !is_fused {
+                self.missed.mark.whole = self.missed.mark.now;
+            }
+        }
+        before
+    }
+
+    /// Takes the updates back that a failed list and those after it have not made.
+    pub(super) fn take_back(&mut self, before: Mark) {
+        self.missed.go_back(before);
+    }
+
+    /// Starts anew, with a model that has missed nothing.
+    pub(super) fn start_updates(&mut self) -> Result<()> {
+        self.missed = Missed::default();
+        if self.may_be_late() { self.sched.fill(Buf::TOUCHED_AT, 0) } else { Ok(()) }
+    }
+
+    /// Writes what Gaussians have missed before a list.
+    pub(super) fn write_missed(&mut self, frame: usize, input: Input) -> Result<()> {
+        if !self.may_be_late() {
+            return Ok(());
+        }
+        let next = if let Input::Train(train) = input { weights(&train.uniforms) } else { Weights::default() };
+        self.sched.upload(Buf::MISSED, frame, 0, &self.missed.table(next, false))
+    }
+
+    /// Gives all Gaussians the updates that they have missed, before something changes planes of the state. Steps that
+    /// failed have made none. No list may be in flight.
+    #[doc(hidden)]
+    pub fn catch_up(&mut self) -> Result<()> {
+        if !self.missed.is_late() {
+            return Ok(());
+        }
+        self.check_idle()?;
+        let list = self.list(ListKey::CatchUp)?;
+        self.write(0, Input::Uniforms(&StepUniforms::zeroed()))?;
+        self.sched.upload(Buf::MISSED, 0, 0, &self.missed.table([0.0; 8], true))?;
+        self.sched.run(list, 0)?;
+        self.missed.mark.whole = self.missed.mark.now;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Mark, Missed};
+
+    fn number(word: u32) -> f64 {
+        f64::from(f32::from_bits(word))
+    }
+
+    #[test]
+    fn sums_are_those_of_the_updates_missed() {
+        let mut missed = Missed::default();
+        for update in 1..=400 {
+            missed.advance([update as f32; 8]);
+        }
+        missed.mark.whole = 145;
+        let table = missed.table([7.0; 8], false);
+        assert_eq!(table.len(), 257);
+        assert_eq!((table[0][0], number(table[0][2][3])), ([400, 145, 0, 0], 7.0));
+        let ratio = f64::from(0.9_f32) / f64::from(0.999_f32).sqrt();
+        for age in [0, 1, 2, 30, 255] {
+            let sum: f64 = (1..=age).map(|k| ratio.powi(k) * f64::from(400 - age + k)).sum();
+            let [means, rest, powers] = table[1 + age as usize];
+            for word in means.into_iter().chain(rest) {
+                assert!((number(word) - sum).abs() <= 1e-7 * sum, "{age}: {} {sum}", number(word));
+            }
+            let expected = [f64::from(0.9_f32).powi(age), f64::from(0.999_f32).powi(age), ratio.powi(age)];
+            for (word, power) in powers.into_iter().zip(expected) {
+                assert!((number(word) - power).abs() <= 1e-7 * power, "{age}: {} {power}", number(word));
+            }
+        }
+    }
+
+    #[test]
+    fn updates_that_were_not_made_are_taken_back() {
+        let (mut missed, mut other) = (Missed::default(), Missed::default());
+        for update in 0..300 {
+            [&mut missed, &mut other].into_iter().for_each(|of| of.advance([update as f32; 8]));
+        }
+        let before = missed.mark;
+        (0..4).for_each(|_| missed.advance([1e9; 8]));
+        missed.mark.whole = 302;
+        missed.go_back(before);
+        assert_eq!(missed.mark, Mark { now: 300, whole: 0 });
+        assert_eq!(missed.table([0.0; 8], true), other.table([0.0; 8], true));
+    }
+}

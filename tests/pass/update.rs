@@ -1,0 +1,159 @@
+//! The update of a step in one kernel against the passes that it replaces, and Gaussians that are late.
+
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove, readable};
+use super::walks::{WALKERS, tall_scene};
+use crate::reference::Row;
+use crate::support::device;
+use crate::support::device::Turn;
+use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::pass::{KernelShape, Update};
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::fixture;
+use labelgs::verify::selftest::update::{late, partly_frozen, step};
+
+const COUNT: usize = 90;
+const FROZEN: usize = 10;
+
+/// The state after each step.
+struct After {
+    planes: [Vec<Row>; 3],
+    stats: Vec<[f32; 2]>,
+    visible: u32,
+    nonfinite: u32,
+    /// Gaussians that have no splat.
+    unseen: usize,
+}
+
+/// Steps whose camera looks at either half of the scene in turn; `late`: nobody catches up before the last step.
+fn steps(update: Update, (labels, antialiased): (bool, bool), count: u32) -> Option<Vec<After>> {
+    let turn = device()?;
+    let shape = Shape { gaussians: COUNT, ..Shape::default() };
+    let mut scene = Scene { frozen: FROZEN as u32, ..scene(103, &shape) };
+    scene.gaussians.antialiased = antialiased;
+    let kernels = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
+    let mut fixture = Fixture::with_update(turn, scene, labels, kernels);
+    fixture.input.update = true;
+    let cx = fixture.scene.camera.cx;
+    let mut all = Vec::new();
+    for step in 1..=count {
+        (fixture.input.step, fixture.input.updates) = (step, step);
+        // 30 px to a side: most Gaussians are outside.
+        fixture.scene.camera.cx = if step % 3 == 0 { cx + 40.0 } else { cx - 40.0 };
+        let counters = fixture.train().counters;
+        let seen = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, COUNT);
+        if update == Update::Fused || step == count {
+            fixture.engine.catch_up().expect("it catches up");
+        }
+        let trained = COUNT - FROZEN;
+        let planes =
+            [fixture.rows(PARAMETERS, COUNT), fixture.rows(MOMENTS_1, trained), fixture.rows(MOMENTS_2, trained)];
+        all.push(After {
+            planes,
+            stats: fixture.get(Buf::DENSIFY_STATS, trained),
+            visible: counters.visible_count,
+            nonfinite: counters.nonfinite_count,
+            unseen: seen.iter().filter(|&&splat| splat == u32::MAX).count(),
+        });
+    }
+    Some(all)
+}
+
+/// Largest differences of parameters, relative to the largest step so far, and of moments, relative to the largest of their
+/// Gaussian.
+fn differences(a: &After, b: &After) -> [f64; 3] {
+    let most = |k: usize, scale: &dyn Fn(&Row) -> f64| {
+        let of = |(a, b): (&Row, &Row)| {
+            let scale = scale(b);
+            a.floats().iter().zip(b.floats()).map(|(a, b)| (a - b).abs() / scale).fold(0.0, f64::max)
+        };
+        a.planes[k].iter().zip(&b.planes[k]).map(of).fold(0.0, f64::max)
+    };
+    let largest = |row: &Row| row.floats().iter().fold(1e-30, |most: f64, of| most.max(of.abs()));
+    [most(0, &|_| 1.0), most(1, &largest), most(2, &largest)]
+}
+
+fn lazy(turn: Turn, seed: u64) -> Fixture {
+    let shape = KernelShape::of(turn.capabilities()).with_lazy_updates(turn.capabilities()).expect("few buffers");
+    Fixture::with_update(turn, partly_frozen(seed), true, shape)
+}
+
+#[test]
+fn an_update_in_one_kernel_equals_its_mirror() {
+    let Some(turn) = device() else { return };
+    let gpu = turn.gpu();
+    let shape = KernelShape::of(turn.capabilities());
+    let mut fused = lazy(turn, 104);
+    let mut split = fixture::Fixture::new(gpu, partly_frozen(104), true, shape, readable()).expect("it starts");
+    let judge = step(&mut fused, &mut split).expect("it runs");
+    prove("update", &["adam_beta1", "adam_beta2"], judge);
+}
+
+#[test]
+fn late_gaussians_equal_their_mirror() {
+    let Some(turn) = device() else { return };
+    let judge = late(&mut lazy(turn, 105)).expect("it runs");
+    prove("late Gaussians", &["adam_beta1", "adam_beta2"], judge);
+}
+
+#[test]
+fn one_kernel_updates_as_the_passes_do() {
+    for what in [(false, false), (true, false), (false, true)] {
+        let Some(split) = steps(Update::Split, what, 7) else { return };
+        let fused = steps(Update::Fused, what, 7).expect("a device");
+        for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
+            let found = differences(a, b);
+            println!("(labels, antialiased) {what:?}, step {}: {found:?}, {} of {COUNT} unseen", step + 1, a.unseen);
+        }
+        for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
+            assert_eq!((a.visible, a.nonfinite, a.unseen), (b.visible, b.nonfinite, b.unseen), "step {step}");
+            let [parameters, first, second] = differences(a, b);
+            assert!(parameters < 2e-6 && first < 1e-5 && second < 1e-5, "step {step}: {parameters} {first} {second}");
+            assert!(a.unseen > 20 && a.visible > 10, "{} unseen, {} visible", a.unseen, a.visible);
+            for (a, b) in a.stats.iter().zip(&b.stats) {
+                assert!((a[0] - b[0]).abs() <= 1e-5 * b[0].abs() && a[1] == b[1], "{a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn late_gaussians_catch_up_to_those_of_every_step() {
+    let Some(lazy) = steps(Update::Lazy, (true, false), 12) else { return };
+    let fused = steps(Update::Fused, (true, false), 12).expect("a device");
+    let (mut late, mut last) = (0, [0.0; 3]);
+    for (a, b) in lazy.iter().zip(&fused) {
+        last = differences(a, b);
+        late += usize::from(last[0] > 1e-4);
+        println!("{last:?}");
+        assert_eq!((a.visible, a.unseen), (b.visible, b.unseen));
+    }
+    assert!(late > 3, "Gaussians were late in {late} steps");
+    assert!(last[0] < 2e-6 && last[1] < 1e-5 && last[2] < 1e-5, "{last:?}");
+}
+
+/// A splat with more records than a workgroup has invocations is summed by all of them, in the order of `gather`: the same bits of
+/// the statistic.
+#[test]
+fn large_splats_are_summed_by_a_workgroup() {
+    let run = |update| {
+        let turn = device()?;
+        let shape = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
+        let scene = tall_scene();
+        let count = scene.gaussians.len();
+        let mut fixture = Fixture::with_update(turn, scene, true, shape);
+        fixture.config.sh_degree = 0;
+        fixture.input.update = true;
+        let visible = fixture.train().counters.visible_count as usize;
+        let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, visible);
+        let large = touched.iter().filter(|&&records| records > WALKERS).count();
+        assert!(large > 3 && large + 3 < visible, "{large} of {visible} are large");
+        Some((fixture.get::<[u32; 2]>(Buf::DENSIFY_STATS, count), fixture.rows(MOMENTS_1, count)))
+    };
+    let Some((stats, moments)) = run(Update::Split) else { return };
+    let (found, found_moments) = run(Update::Lazy).expect("a device");
+    assert!(stats.iter().filter(|stat| stat[1] != 0).count() > 10 && found == stats);
+    for (a, b) in found_moments.iter().zip(&moments) {
+        let scale = b.floats().iter().fold(1e-30, |most: f64, of| most.max(of.abs()));
+        assert!(a.floats().iter().zip(b.floats()).all(|(a, b)| (a - b).abs() < 1e-5 * scale), "{a:?} {b:?}");
+    }
+}
