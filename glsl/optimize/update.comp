@@ -10,7 +10,7 @@
 //          parameters, and applies the updates of Adam that it has missed, then that of the step.
 // Work:    64 Gaussians of the model per workgroup, one an invocation; colours by vec4, shared out. A splat with many records is
 //          summed by all invocations, in a tree.
-// Reads:   step, failure; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
+// Reads:   step, failure, counters; splat_from_gaussian [N]; instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
 //          labels: labels [N], layer_from_label
 // Writes:  parameters, first and second moments [N], active colours alone; touched_at [N]; densify_stats [N];
 //          counters.nonfinite_* (integer atomics)
@@ -26,40 +26,46 @@ READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
 READ1(2, uint, failure);
 FETCHU(3, splat_from_gaussian);
-FETCHU(4, tiles_touched);
-FETCHU(5, instance_offsets);
-FETCH4(6, v_instances_a);
-FETCH4(7, v_instances_b);
-FETCH4(8, v_instances_c);
-INOUT(9, vec2, densify_stats);
-INOUT(10, uint, touched_at);
-READ(11, uvec4, missed);
-INOUT(12, vec4, means);
-INOUT(13, vec4, scales);
-INOUT(14, vec4, quats);
-INOUT(15, vec4, sh0);
-INOUT(16, vec4, sh1);
-INOUT(17, vec4, sh2);
-INOUT(18, vec4, sh3);
-INOUT(19, vec4, m_means);
-INOUT(20, vec4, m_scales);
-INOUT(21, vec4, m_quats);
-INOUT(22, vec4, m_sh0);
-INOUT(23, vec4, m_sh1);
-INOUT(24, vec4, m_sh2);
-INOUT(25, vec4, m_sh3);
-INOUT(26, vec4, u_means);
-INOUT(27, vec4, u_scales);
-INOUT(28, vec4, u_quats);
-INOUT(29, vec4, u_sh0);
-INOUT(30, vec4, u_sh1);
-INOUT(31, vec4, u_sh2);
-INOUT(32, vec4, u_sh3);
+FETCHU(4, instance_offsets);
+FETCH4(5, v_instances_a);
+FETCH4(6, v_instances_b);
+FETCH4(7, v_instances_c);
+INOUT(8, vec2, densify_stats);
+INOUT(9, uint, touched_at);
+READ(10, uvec4, missed);
+INOUT(11, vec4, means);
+INOUT(12, vec4, scales);
+INOUT(13, vec4, quats);
+INOUT(14, vec4, sh0);
+INOUT(15, vec4, sh1);
+INOUT(16, vec4, sh2);
+INOUT(17, vec4, sh3);
+INOUT(18, vec4, m_means);
+INOUT(19, vec4, m_scales);
+INOUT(20, vec4, m_quats);
+INOUT(21, vec4, m_sh0);
+INOUT(22, vec4, m_sh1);
+INOUT(23, vec4, m_sh2);
+INOUT(24, vec4, m_sh3);
+INOUT(25, vec4, u_means);
+INOUT(26, vec4, u_scales);
+INOUT(27, vec4, u_quats);
+INOUT(28, vec4, u_sh0);
+INOUT(29, vec4, u_sh1);
+INOUT(30, vec4, u_sh2);
+INOUT(31, vec4, u_sh3);
 #ifdef LABELS
-FETCHU(33, labels);
-FETCHU(34, layer_from_label);
+FETCHU(32, labels);
+FETCHU(33, layer_from_label);
 #endif
 
+// The records of a splat end where those of the next one begin: no binding for their number, so that a device with 32 bindings
+// runs this without labels.
+uint records_end(uint s) {
+    return s + 1u < counters.visible_count ? fetchu(instance_offsets, s + 1u) : counters.instance_count;
+}
+
+#define records_of(s) (records_end(s) - fetchu(instance_offsets, s))
 #define GROUP
 #define LAZY
 #define plane4(name, e) name[e]

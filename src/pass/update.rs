@@ -18,7 +18,7 @@ pub(super) fn update(b: &mut Builder, changes: bool) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, update(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A,
+        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A,
         v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, densify_stats: Buf::DENSIFY_STATS,
         touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, means: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
         sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES,

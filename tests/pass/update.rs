@@ -25,12 +25,12 @@ struct After {
 }
 
 /// Steps whose camera looks at either half of the scene in turn; `late`: nobody catches up before the last step.
-fn steps(update: Update, (labels, antialiased): (bool, bool), count: u32) -> Option<Vec<After>> {
+fn steps(update: Update, (labels, antialiased, texel): (bool, bool, bool), count: u32) -> Option<Vec<After>> {
     let turn = device()?;
     let shape = Shape { gaussians: COUNT, ..Shape::default() };
     let mut scene = Scene { frozen: FROZEN as u32, ..scene(103, &shape) };
     scene.gaussians.antialiased = antialiased;
-    let kernels = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
+    let kernels = KernelShape { group_walks: true, update, texel, ..KernelShape::of(turn.capabilities()) };
     let mut fixture = Fixture::with_update(turn, scene, labels, kernels);
     fixture.input.update = true;
     let cx = fixture.scene.camera.cx;
@@ -97,12 +97,17 @@ fn late_gaussians_equal_their_mirror() {
 
 #[test]
 fn one_kernel_updates_as_the_passes_do() {
-    for what in [(false, false), (true, false), (false, true)] {
+    // With labels, lavapipe has too few bindings without texel reads.
+    for what in [(false, false, true), (false, false, false), (true, false, true), (false, true, true)] {
         let Some(split) = steps(Update::Split, what, 7) else { return };
         let fused = steps(Update::Fused, what, 7).expect("a device");
         for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
             let found = differences(a, b);
-            println!("(labels, antialiased) {what:?}, step {}: {found:?}, {} of {COUNT} unseen", step + 1, a.unseen);
+            println!(
+                "(labels, antialiased, texel) {what:?}, step {}: {found:?}, {} of {COUNT} unseen",
+                step + 1,
+                a.unseen
+            );
         }
         for (step, (a, b)) in fused.iter().zip(&split).enumerate() {
             assert_eq!((a.visible, a.nonfinite, a.unseen), (b.visible, b.nonfinite, b.unseen), "step {step}");
@@ -118,8 +123,8 @@ fn one_kernel_updates_as_the_passes_do() {
 
 #[test]
 fn late_gaussians_catch_up_to_those_of_every_step() {
-    let Some(lazy) = steps(Update::Lazy, (true, false), 12) else { return };
-    let fused = steps(Update::Fused, (true, false), 12).expect("a device");
+    let Some(lazy) = steps(Update::Lazy, (false, false, false), 12) else { return };
+    let fused = steps(Update::Fused, (false, false, false), 12).expect("a device");
     let (mut late, mut last) = (0, [0.0; 3]);
     for (a, b) in lazy.iter().zip(&fused) {
         last = differences(a, b);
