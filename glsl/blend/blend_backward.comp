@@ -4,8 +4,6 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "record.glsl"
-#include "blend_tile.glsl"
-#include "transposed_sums.glsl"
 // blend_backward — walk one tile of one layer back to front; write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
 // Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
@@ -40,7 +38,6 @@ READ1(11, Counters, counters);
 FETCHU(12, layer_tiles);
 READ(13, uvec2, layer_state);
 READ(14, float, layer_weights);
-#include "label_state.glsl"
 #endif
 #ifdef DISAGREEMENT
 FETCHC(11, target);
@@ -54,6 +51,14 @@ READ(11, float, depths);
 #endif
 #if defined(DISAGREEMENT) || defined(DEPTH)
 #define CHANNEL
+#endif
+#include "blend_tile.glsl"
+#include "transposed_sums.glsl"
+#include "moments.glsl"
+#ifdef LABELS
+#include "label_state.glsl"
+#endif
+#ifdef CHANNEL
 #include "channel.glsl"
 #endif
 #ifdef SEGMENTED
@@ -65,26 +70,17 @@ INOUT(31, uvec4, segment_rest); // x: disagreement behind
 
 void main() {
     StepUniforms u = step;
-    uint jobs = u.tile_count;
-#ifdef LABELS
-    jobs += counters.layer_tile_count;
-#endif
+    uint jobs = job_count(u);
     uint group = linear_group_id();
     if (group >= jobs) {
         return;
     }
     uint job = interleave(group, jobs);
-    uint virtual_tile = job, layer_tile = 0u;
-#ifdef LABELS
-    if (job >= u.tile_count) {
-        layer_tile = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_tile);
-    }
-#endif
-    TileJob t = locate(virtual_tile, layer_tile, u);
+    uint virtual_tile;
+    TileJob t = locate_job(job, u, virtual_tile);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, virtual_tile);
-    vec2 corner = vec2(float(t.x - (lane % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
+    vec2 corner = tile_corner(t, u);
 
 #ifdef SEGMENTED
     uint kept = job * (TILE_WIDTH * TILE_HEIGHT) + lane;
@@ -204,21 +200,8 @@ void main() {
             add_transposed(vec3(m0, my, my * qx), vec3(m0 * qx, m0 * qx * qx, myy), vec2(vr, vb), vec2(vg, ml), j, sums);
         }
         return_sums(sums);
-        float o0 = sums[0], ox = sums[1], oy = sums[2], oxx = sums[3], oxy = sums[4], oyy = sums[5];
-        // convert moments about the tile's centre to gradients of the lane's own splat
-        vec2 d = vec2(mine.x, mine.y) - centre;
-        vec3 conic = conic_from_exponent(vec3(mine.a, mine.b, mine.c));
-        float Sx = d.x * o0 - ox, Sy = d.y * o0 - oy;
-        float Sxx = d.x * (d.x * o0 - 2.0 * ox) + oxx;
-        float Sxy = d.x * (d.y * o0 - oy) - d.y * ox + oxy;
-        float Syy = d.y * (d.y * o0 - 2.0 * oy) + oyy;
         if (lane < count) {
-            v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
-#ifdef CHANNEL
-            o0 += sums[9]; // not in the moments above: shapes and places follow the photo
-#endif
-            v_instances_b[instance] = vec4(-0.5 * Syy, o0, sums[6], sums[7]);
-            v_instances_c[instance] = vec4(sums[8], uintBitsToFloat(u.stamp), 0.0, 0.0);
+            write_record(instance, vec2(mine.x, mine.y), vec3(mine.a, mine.b, mine.c), sums, u.stamp);
         }
     }
 #ifdef SEGMENTED

@@ -3,7 +3,6 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-#include "blend_tile.glsl"
 layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
 // blend_forward — alpha-blend one tile of one layer front to back.
 // Work:    one subgroup (= workgroup) per tile: the scene's tiles, then (variant labels) the occupied layer tiles.
@@ -55,6 +54,7 @@ READ(18, float, layer_weights);
 INOUT(30, vec4, segment_colours); // [jobs, pixels of a tile] (colour, transmittance with the sign of `T`)
 INOUT(31, uvec4, segment_rest);   // (last, main splat, its weight, depth)
 #endif
+#include "blend_tile.glsl"
 #ifdef LABELS
 #include "label_state.glsl"
 #include "label_rules.glsl"
@@ -64,24 +64,14 @@ const bool REMEMBERS_MAIN = true; // in variants with a main splat
 
 void main() {
     StepUniforms u = step;
-    uint layer_count = counters.layer_tile_count;
-    uint jobs = u.tile_count;
-#ifdef LABELS
-    jobs += layer_count;
-#endif
+    uint jobs = job_count(u);
     uint group = linear_group_id();
     if (group >= jobs) {
         return;
     }
     uint job = interleave(group, jobs);
-    uint virtual_tile = job, layer_tile = 0u;
-#ifdef LABELS
-    if (job >= u.tile_count) {
-        layer_tile = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_tile);
-    }
-#endif
-    TileJob t = locate(virtual_tile, layer_tile, u);
+    uint virtual_tile;
+    TileJob t = locate_job(job, u, virtual_tile);
     uint lane = gl_LocalInvocationID.x;
     uint list_start = fetchu(tile_starts, virtual_tile), list_end = fetchu(tile_ends, virtual_tile);
 #ifdef SEGMENTED
@@ -91,7 +81,7 @@ void main() {
 #else
     uint begin = list_start, end = list_end;
 #endif
-    vec2 corner = vec2(float(t.x - (gl_LocalInvocationID.x % TILE_WIDTH)), float((t.tile / u.tiles_x) * TILE_HEIGHT));
+    vec2 corner = tile_corner(t, u);
 
     float T[ROWS], cr[ROWS], cg[ROWS], cb[ROWS];
     uint final_[ROWS];

@@ -58,6 +58,7 @@ READ(19, float, chunk_channel);
 shared uint staged_channel[BATCH];
 #endif
 #include "group_sums.glsl"
+#include "moments.glsl"
 shared uint staged_instance[BATCH];
 shared uvec2 hits_in[SUBGROUPS];
 shared uint deepest;
@@ -78,22 +79,8 @@ void finish(uint lane, uint stamp) {
     if (!is_hit) {
         return;
     }
-    // Convert moments about the tile's centre to gradients of the splat.
     vec4 r0 = staged_0[lane];
-    vec2 d = r0.xy - vec2(float(TILE_WIDTH), float(TILE_HEIGHT)) * 0.5;
-    vec3 conic = conic_from_exponent(vec3(r0.zw, staged_1[lane].x));
-    float Sx = d.x * o[0] - o[1], Sy = d.y * o[0] - o[2];
-    float Sxx = d.x * (d.x * o[0] - 2.0 * o[1]) + o[3];
-    float Sxy = d.x * (d.y * o[0] - o[2]) - d.y * o[1] + o[4];
-    float Syy = d.y * (d.y * o[0] - 2.0 * o[2]) + o[5];
-    float v_log_opacity = o[0];
-#ifdef CHANNEL
-    v_log_opacity += o[9]; // not in the moments above: shapes and places follow the photo
-#endif
-    uint instance = staged_instance[lane];
-    v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
-    v_instances_b[instance] = vec4(-0.5 * Syy, v_log_opacity, o[6], o[7]);
-    v_instances_c[instance] = vec4(o[8], uintBitsToFloat(stamp), 0.0, 0.0);
+    write_record(staged_instance[lane], r0.xy, vec3(r0.zw, staged_1[lane].x), o, stamp);
 }
 
 void main() {
@@ -179,7 +166,7 @@ void main() {
         if (lane < count) {
             uint instance = fetchu(instance_from_sorted, start + base + lane), index = fetchu(splat_from_instance, instance);
             staged_instance[lane] = instance;
-            stage(lane, index, corner(t, u));
+            stage(lane, index, tile_corner(t, u));
 #ifdef CHANNEL
             staged_channel[lane] = channel_of_splat(index, staged_2[lane].y);
 #endif

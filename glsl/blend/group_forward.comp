@@ -146,7 +146,7 @@ void main() {
         walked += count;
         if (lane < count) {
             uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, base + lane));
-            stage(lane, index, corner(t, u));
+            stage(lane, index, tile_corner(t, u));
             staged_index[lane] = index;
 #ifdef CHANNEL
             staged_channel[lane] = channel_of_splat(index, staged_2[lane].y);

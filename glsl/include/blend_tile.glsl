@@ -14,21 +14,11 @@ layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
 
 const uint ROWS = TILE_WIDTH * TILE_HEIGHT / SUBGROUP_SIZE;
 
-#include "tile_job.glsl"
-
-TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
-    TileJob t;
-    t.layer_tile = layer_tile;
-    t.layer = virtual_tile / u.tile_count;
-    t.tile = virtual_tile % u.tile_count;
-    uint lane = gl_LocalInvocationID.x;
-    uint column = lane % TILE_WIDTH, band = lane / TILE_WIDTH;
-    t.x = (t.tile % u.tiles_x) * TILE_WIDTH + column;
-    t.y0 = (t.tile / u.tiles_x) * TILE_HEIGHT + band * ROWS;
-    t.px = float(column) + 0.5;
-    t.row0 = float(band * ROWS) + 0.5;
-    return t;
+uvec2 lane_corner() {
+    return uvec2(gl_LocalInvocationID.x % TILE_WIDTH, gl_LocalInvocationID.x / TILE_WIDTH * ROWS);
 }
+
+#include "tile_job.glsl"
 
 // Where memory keeps a pixel of the lane, within its tile.
 uint tile_pixel(TileJob t, uint k) {

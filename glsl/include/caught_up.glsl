@@ -67,6 +67,16 @@ vec4 late_direction(vec4 m, vec4 v) {
     }
 #define value4(name, e) name##_now(e)
 
+// Declares something of every plane, with its sums.
+#define EACH_PLANE(DECLARE) \
+    DECLARE(means, late_means) \
+    DECLARE(scales, late_rest.x) \
+    DECLARE(quats, late_rest.y) \
+    DECLARE(sh0, late_rest.z) \
+    DECLARE(sh1, late_rest.w) \
+    DECLARE(sh2, late_rest.w) \
+    DECLARE(sh3, late_rest.w)
+
 #else
 #define value4(name, e) plane4(name, e)
 #endif

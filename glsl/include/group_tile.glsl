@@ -29,8 +29,6 @@ const uint BATCH = BATCH_MOST < CHUNK_LENGTH ? BATCH_MOST : CHUNK_LENGTH; // spl
 const uint NO_CHUNK = 0xffffffffu;   // slot without work
 const uint LAST_CHUNK = 0x80000000u; // bit of a slot's job: nothing behind it was walked
 
-#include "tile_job.glsl"
-
 // First pixel of the subgroup's block in the tile.
 uvec2 block_corner() {
     const uint columns = TILE_WIDTH / BLOCK_WIDTH;
@@ -41,44 +39,7 @@ uvec2 lane_corner() {
     return block_corner() + uvec2(subgroup_lane() % BLOCK_WIDTH, subgroup_lane() / BLOCK_WIDTH * ROWS);
 }
 
-TileJob locate(uint virtual_tile, uint layer_tile, StepUniforms u) {
-    TileJob t;
-    t.layer_tile = layer_tile;
-    t.layer = virtual_tile / u.tile_count;
-    t.tile = virtual_tile % u.tile_count;
-    uvec2 own = lane_corner();
-    t.x = (t.tile % u.tiles_x) * TILE_WIDTH + own.x;
-    t.y0 = (t.tile / u.tiles_x) * TILE_HEIGHT + own.y;
-    t.px = float(own.x) + 0.5;
-    t.row0 = float(own.y) + 0.5;
-    return t;
-}
-
-// Number of jobs: the scene's tiles, then (variant labels) the occupied tiles of object layers.
-uint job_count(StepUniforms u) {
-#ifdef LABELS
-    return u.tile_count + counters.layer_tile_count;
-#else
-    return u.tile_count;
-#endif
-}
-
-TileJob locate_job(uint job, StepUniforms u, out uint virtual_tile) {
-    uint layer_tile = 0u;
-    virtual_tile = job;
-#ifdef LABELS
-    if (job >= u.tile_count) {
-        layer_tile = job - u.tile_count;
-        virtual_tile = fetchu(layer_tiles, layer_tile);
-    }
-#endif
-    return locate(virtual_tile, layer_tile, u);
-}
-
-// Top left corner of the tile, px.
-vec2 corner(TileJob t, StepUniforms u) {
-    return vec2(float(t.tile % u.tiles_x * TILE_WIDTH), float(t.tile / u.tiles_x * TILE_HEIGHT));
-}
+#include "tile_job.glsl"
 
 uint tile_pixel(TileJob t, uint k) {
     uvec2 own = lane_corner();

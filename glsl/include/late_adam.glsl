@@ -32,10 +32,4 @@ void adam_step(StepUniforms u, inout vec4 value, inout vec4 m, inout vec4 v, vec
         u_##name[e] = v; \
     }
 
-LATE_ADAM(means, late_means)
-LATE_ADAM(scales, late_rest.x)
-LATE_ADAM(quats, late_rest.y)
-LATE_ADAM(sh0, late_rest.z)
-LATE_ADAM(sh1, late_rest.w)
-LATE_ADAM(sh2, late_rest.w)
-LATE_ADAM(sh3, late_rest.w)
+EACH_PLANE(LATE_ADAM)

@@ -71,7 +71,7 @@ uint records_end(uint s) {
 #define plane4(name, e) name[e]
 #define touched(i) touched_at[i]
 #include "caught_up.glsl"
-#include "caught_up_planes.glsl"
+EACH_PLANE(CAUGHT_UP)
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 #include "sh_backward.glsl"

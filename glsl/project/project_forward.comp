@@ -59,7 +59,7 @@ READ(30, uvec4, missed);
 #define plane4(name, e) fetch4(name, e)
 #include "caught_up.glsl"
 #ifdef LAZY
-#include "caught_up_planes.glsl"
+EACH_PLANE(CAUGHT_UP)
 #endif
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"

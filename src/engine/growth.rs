@@ -41,9 +41,11 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let gaussians = size.gaussians.max(1);
     // About what trained scenes have: larger tiles share fewer Gaussians.
     let instances = if shape.tile_pixels() >= 256 { gaussians * 5 / 2 } else { gaussians * 6 }.max(tiles * 16);
+    let trained = if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 };
+    let late = if shape.update == Update::Split { 0 } else { trained };
     let mut capacity = Capacity {
         gaussians,
-        trained: if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 },
+        trained,
         labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },
@@ -58,20 +60,14 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape, width, height)),
-        late_gaussians: late(shape, size, gaussians),
-        missed_rows: if late(shape, size, gaussians) > 0 { u64::from(MISSED_ROWS) } else { 0 },
+        late_gaussians: late,
+        missed_rows: if late > 0 { u64::from(MISSED_ROWS) } else { 0 },
         segments: 1,
         shared_rows: u64::from(size.shared_rows),
         ..Capacity::default()
     };
     derive(shape, &mut capacity, instances, size.trained);
     capacity
-}
-
-/// Returns how many Gaussians may miss updates.
-fn late(shape: &KernelShape, size: &EngineSize, gaussians: u64) -> u64 {
-    let is_lazy = size.trained && shape.update != Update::Split;
-    if is_lazy { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 }
 }
 
 /// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].

@@ -111,13 +111,8 @@ impl KernelShape {
             Some("split") => Update::Split,
             Some("fused") => Update::Fused,
             Some("lazy") => Update::Lazy,
-            _ => {
-                if is_card {
-                    Update::Lazy
-                } else {
-                    Update::Split
-                }
-            }
+            _ if is_card => Update::Lazy,
+            _ => Update::Split,
         };
         let shape = shape.with_lazy_updates(device).map_or(shape, |shape| Self { update, ..shape });
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
