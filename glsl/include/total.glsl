@@ -10,15 +10,15 @@ void put_groups(uint at, uint count) {
     dispatch_args[at + 1u] = groups.y;
 }
 
-// All tiles of the scene, then the occupied tiles of object layers.
+// All tiles of the scene, then the occupied tiles of object layers. Nothing after any failure: pairs that were only counted have no
+// lists, and the backward walk no chunks to find.
 void put_blend(uint layers) {
-    uint failed = (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
+    failure |= (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
         | (counters.longest_list > step.longest_list ? FAILED_SEGMENTS : 0u);
-    failure |= failed;
     uint jobs = step.tile_count + layers;
-    put_groups(ARGS_BLEND, failed != 0u ? 0u : jobs);
+    put_groups(ARGS_BLEND, failure != 0u ? 0u : jobs);
     if (step.chunk_length > 0u) {
-        put_groups(ARGS_CHUNKS, failed != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+        put_groups(ARGS_CHUNKS, failure != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
     }
 }
 
