@@ -10,18 +10,22 @@
 //          pairs, so a binary search per tile is cheaper than a test per pair.
 // Reads:   step, counters, failure; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
-//          order); variant labels: layer_occupied [layers * T] 0 or 1
+//          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
+//          workgroup (blend_args.glsl): dispatch_args, failure
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+INOUT1(1, uint, failure);
 INOUT1(2, Counters, counters);
 FETCHU(3, tile_keys);
 WRITE(4, uint, tile_starts);
 WRITE(5, uint, tile_ends);
 #ifdef LABELS
 WRITE(6, uint, layer_occupied);
+#else
+INOUT(7, uint, dispatch_args);
+#include "blend_args.glsl"
 #endif
 
 // The first pair with a key of at least `key`.
@@ -52,4 +56,15 @@ void main() {
         layer_occupied[t] = t >= step.tile_count && end > start ? 1u : 0u;
 #endif
     }
+#ifndef LABELS
+    memoryBarrierBuffer();
+    barrier();
+    if (gl_LocalInvocationID.x == 0u) {
+        uint done = atomicAdd(counters.ranges_groups, 1u) + 1u;
+        memoryBarrierBuffer();
+        if (done == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
+            put_blend(0u, atomicMax(counters.longest_list, 0u));
+        }
+    }
+#endif
 }
