@@ -7,7 +7,7 @@
 // mark_near — mark the Gaussians that fog the camera of the step or one on the way to another camera: before its near
 //             plane, or so large that they engulf the camera of the step. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step, failure; means, scales [N]; variant lazy: moments of both, touched_at [N], missed
+// Reads:   step, counters; means, scales [N]; variant lazy: moments of both, touched_at [N], missed
 // Writes:  densify_stats [N]: (0, STAT_NEAR) for a marked Gaussian
 // Math:    0 <= z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
 //          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
@@ -19,7 +19,7 @@ READ1(0, StepUniforms, step);
 FETCH4(1, means);
 FETCH4(2, scales);
 INOUT(3, vec2, densify_stats);
-READ1(4, uint, failure);
+READ1(4, Counters, counters);
 #ifdef LAZY
 FETCH4(5, m_means);
 FETCH4(6, m_scales);
@@ -56,7 +56,7 @@ bool fogs(StepUniforms u, vec3 from, vec3 to, float near) {
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.trained_count || failure != 0u) {
+    if (i >= u.trained_count || counters.failure != 0u) {
         return;
     }
 #ifdef LAZY

@@ -6,7 +6,7 @@
 #include "gaussian.glsl"
 // gather — sum the gradient records of each splat, in the order of instances; update the densification statistic.
 // Work:    64 splats per workgroup; variant group: a splat with many records by all of them, in a tree.
-// Reads:   step, counters, failure; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
+// Reads:   step, counters; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b
 //          densify_stats [N] += (|scene v_mean2d| in NDC units, 1) of trained ones
@@ -17,7 +17,6 @@
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, tiles_touched);
 FETCHU(4, instance_offsets);
 FETCH4(5, v_instances_a);
@@ -48,7 +47,7 @@ void main() {
     }
     barrier();
 #endif
-    if (s < counters.visible_count && failure == 0u) {
+    if (s < counters.visible_count && counters.failure == 0u) {
         Records r = records(s, fetchu(gaussian_from_splat, s));
 #ifdef GROUP
         if (r.total > WALKERS) {

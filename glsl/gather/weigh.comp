@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 // weigh — add the blending weight of each splat in the view, summed over all pixels, to that of its Gaussian.
 // Work:    64 splats per workgroup.
-// Reads:   counters, failure; tiles_touched, instance_offsets [V]; gaussian_from_splat [V]; v_instances_b, _c [I] for a
+// Reads:   counters; tiles_touched, instance_offsets [V]; gaussian_from_splat [V]; v_instances_b, _c [I] for a
 //          gradient of 1 of the red of every pixel; step (its stamp)
 // Writes:  densify_stats [N].x += weight, px
 // Math:    the picture is linear in the colours of the splats, and the factors are the blending weights: the gradient of
@@ -16,7 +16,6 @@
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, tiles_touched);
 FETCHU(4, instance_offsets);
 FETCHU(5, gaussian_from_splat);
@@ -26,7 +25,7 @@ INOUT(8, vec2, densify_stats);
 
 void main() {
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (s >= counters.visible_count || failure != 0u) {
+    if (s >= counters.visible_count || counters.failure != 0u) {
         return;
     }
     uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s);

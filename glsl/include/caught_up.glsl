@@ -37,6 +37,11 @@ void look_up(uint age) {
     late_shrink = missed_row(1u + age, 2u).xy;
 }
 
+// Looks up what a Gaussian has missed before this step, if it is trained.
+void look_up_trained(StepUniforms u, uint i) {
+    look_up(i < u.trained_count ? missed_updates(i) : 0u);
+}
+
 // The same after this step's update, which the Gaussian may have missed too.
 void look_up_after(uint i) {
     uvec4 now = missed[0];
@@ -79,4 +84,5 @@ vec4 late_direction(vec4 m, vec4 v) {
 
 #else
 #define value4(name, e) plane4(name, e)
+#define look_up_trained(u, i)
 #endif

@@ -66,6 +66,12 @@ const uint SWEEP_HISTOGRAMS = 32u;           // first word of the histograms, an
 const uint SWEEP_WORDS = SWEEP_HISTOGRAMS + SWEEP_SORTS * SWEEP_DIGITS;
 const uint SWEEP_STRIDE = 2u * SWEEP_DIGITS + SWEEP_SCANS; // words of a partition: two passes of a sort in turn, and the scans
 
+// Passes with a word a partition (look_back.glsl).
+const uint VISIBLE_LANES = 128u;             // invocations of a workgroup of project_visible,
+const uint VISIBLE_ITEMS_MIN = 2u;           // and the Gaussians of one
+const uint VISIBLE_ITEMS_MOST = 8u;
+const uint ORDERED_LANES = 64u;              // splats of a workgroup of emit_ordered
+
 // Factors of the real spherical harmonics (sh.glsl).
 const float SH_C0 = 0.28209479177387814;
 const float SH_C1 = 0.48860251190291992;
@@ -91,4 +97,5 @@ const uint ARGS_SWEEP_SPLATS = 24u;
 const uint ARGS_SWEEP_INSTANCES = 27u;
 const uint ARGS_SWEEP_TILES = 30u;
 const uint ARGS_CHUNKS = 33u;                // chunks of the backward blend (group_tile.glsl)
-const uint ARGS_WORDS = 36u;                 // of all entries
+const uint ARGS_VISIBLE = 36u;               // partitions of project_visible
+const uint ARGS_WORDS = 39u;                 // of all entries

@@ -1,10 +1,6 @@
 // Sums of the gradient records of a splat. The includer declares their planes, what finds them, densify_stats and step. GROUP:
 // also of a splat with many records, by all invocations of a workgroup.
 
-#ifndef records_of
-#define records_of(s) fetchu(tiles_touched, s)
-#endif
-
 #ifdef GROUP
 const uint WALKERS = 64u; // invocations of a workgroup
 shared uint large_count;  // splats with more records than that,
@@ -25,7 +21,7 @@ struct Sums {
 
 Records records(uint s, uint gaussian) {
     Records r;
-    r.total = records_of(s);
+    r.total = fetchu(tiles_touched, s);
     r.first = fetchu(instance_offsets, s);
     r.scene = r.total;
     r.gaussian = gaussian;

@@ -1,7 +1,9 @@
 // The rows of tiles of a workgroup's splats, shared out among its invocations one by one, so that nobody waits for the one with a
 // large splat. All invocations of the workgroup call share_rows and sums_before.
 
-const uint WALKERS = 64u; // invocations of a workgroup
+#ifndef WALKERS
+#define WALKERS 64u // invocations of a workgroup
+#endif
 shared uvec4 ellipses[2u * WALKERS]; // of each splat, packed: tiles of an axis fit in 16 bits
 shared uint starts[2u * WALKERS]; // of a table's entries, ascending: first row of each splat; for the caller's use
 shared uvec2 sums[2u * WALKERS];

@@ -62,10 +62,11 @@ struct Counters {
     uint ranges_groups, loss_groups; // workgroups of tile_ranges and of loss_tile that are done
     uint undecided_tiles;   // tiles whose label map needs another walk
     uint cloned_count, split_count, pruned_count;
+    uint failure;           // sticky bits (below), from step to step until the host clears them
     float loss_l1, loss_ssim, loss_label; // sums without normalisation; the label loss minus that of empty layers
 };
 
-// Bits of the sticky failure word. While it is not 0, passes do not change the model.
+// Bits of counters.failure. While it is not 0, passes do not change the model.
 const uint FAILED_INSTANCES = 1u;
 const uint FAILED_LAYER_TILES = 2u;
 const uint FAILED_SEGMENTS = 4u;

@@ -5,14 +5,14 @@
 #include "dispatch.glsl"
 // lift_resolve — give each Gaussian the label with its highest key of this step.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step, failure; label_keys [N]
+// Reads:   step, counters; label_keys [N]
 // Writes:  labels [N] of Gaussians with a key; label_keys [N] = 0
 // Math:    LabelGS eq. 6 and 7; without the filter, the larger weight wins, then the larger label.
 // Mirror:  src/reference/lift.rs::lift
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+READ1(1, Counters, counters);
 INOUT(2, uint, label_keys);
 WRITE(3, uint, labels);
 
@@ -24,7 +24,7 @@ void main() {
     uint key = label_keys[i];
     if (key != 0u) {
         label_keys[i] = 0u;
-        if (failure == 0u && i < step.trained_count) {
+        if (counters.failure == 0u && i < step.trained_count) {
             labels[i] = key & 0xffffu;
         }
     }

@@ -7,8 +7,8 @@
 //        stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other rows stay
 //        unchanged, and the number of updates of each row corrects its moments.
 // Work:    one vec4 of one Gaussian per invocation; STRIDE vec4 per Gaussian. SHARED: one row of the step.
-// Reads:   step, failure; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
-//          second_moments_in [N,STRIDE]. SHARED: failure; step_rows, step_rates, gradients, weights and the rest [S]
+// Reads:   step, counters; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
+//          second_moments_in [N,STRIDE]. SHARED: counters; step_rows, step_rates, gradients, weights and the rest [S]
 // Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: also weights [S]
 // Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is
 //          kept as the moment of a gradient of 1, without a power or a count of updates.
@@ -27,7 +27,7 @@ layout(constant_id = 16) const uint SEEN_ONLY = 0;
 READ1(0, StepUniforms, step);
 FETCHU(2, splat_from_gaussian);
 #endif
-READ1(1, uint, failure);
+READ1(1, Counters, counters);
 FETCH4(3, gradients);
 // Two bindings for one buffer: texel reads where they are fast, storage writes. An invocation reads only its own
 // elements, before it writes them.
@@ -42,7 +42,7 @@ void main() {
 #ifdef SHARED
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
     uint e = i < ROWS ? step_rows[i] : NO_ROW;
-    if (e == NO_ROW || failure != 0u) {
+    if (e == NO_ROW || counters.failure != 0u) {
         return;
     }
     vec4 rate = step_rates[i];
@@ -58,7 +58,7 @@ void main() {
     StepUniforms u = step;
     uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
     uint i = e / STRIDE;
-    if (i >= u.trained_count || failure != 0u) {
+    if (i >= u.trained_count || counters.failure != 0u) {
         return;
     }
     uint s = fetchu(splat_from_gaussian, i);

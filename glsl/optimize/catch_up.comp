@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 // catch_up — give all Gaussians the updates of Adam that they have missed.
 // Work:    64 Gaussians per workgroup; their vec4 are shared out.
-// Reads:   step, failure; missed
+// Reads:   step, counters; missed
 // Writes:  parameters, first and second moments [N], active colours alone; touched_at [N] of those that had missed some
 // Math:    see caught_up.glsl. A list of its own does so after a failure too.
 // Mirror:  src/reference/lazy.rs::caught_up
@@ -13,7 +13,7 @@
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+READ1(1, Counters, counters);
 INOUT(2, uint, touched_at);
 READ(3, uvec4, missed);
 INOUT(4, vec4, means);
@@ -61,7 +61,7 @@ void main() {
         late_count = 0u;
     }
     barrier();
-    uint age = i < step.trained_count && (failure == 0u || missed[0].z != 0u) ? missed_updates(i) : 0u;
+    uint age = i < step.trained_count && (counters.failure == 0u || missed[0].z != 0u) ? missed_updates(i) : 0u;
     if (age > 0u) {
         uint slot = atomicAdd(late_count, 1u); // in any order: each catches up for itself
         late_row[slot] = i;

@@ -7,14 +7,14 @@
 #include "random.glsl"
 // explore — move Gaussians at random within their own shape, the fainter the farther.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step, failure; means_in, scales, quats [N]
+// Reads:   step, counters; means_in, scales, quats [N]
 // Writes:  means.xyz [N], the same buffer
 // Math:    3DGS-MCMC: x += noise sigmoid(-NOISE_STEEP (o - NOISE_OPACITY)) Sigma xi, xi standard normal.
 // Mirror:  src/reference/relocate.rs::explored
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+READ1(1, Counters, counters);
 FETCH4(2, means_in);
 FETCH4(3, scales);
 FETCH4(4, quats);
@@ -23,7 +23,7 @@ WRITE(5, vec4, means);
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.trained_count || failure != 0u) {
+    if (i >= u.trained_count || counters.failure != 0u) {
         return;
     }
     vec4 mean = fetch4(means_in, i);

@@ -6,14 +6,13 @@
 #include "gaussian.glsl"
 // regularise — add the gradients of the mean opacity and of the mean standard deviation to those of the view.
 // Work:    64 splats per workgroup.
-// Reads:   step, failure, counters; gaussian_from_splat [V]; means, scales [N]
+// Reads:   step, counters; gaussian_from_splat [V]; means, scales [N]
 // Writes:  v_means.w, v_scales.xyz [V], added
 // Math:    3DGS-MCMC: L += opacity_weight sum o + scale_weight sum (s_x + s_y + s_z), over the visible Gaussians.
 // Mirror:  src/reference/relocate.rs::regularised
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
 READ1(2, Counters, counters);
 FETCHU(3, gaussian_from_splat);
 FETCH4(4, means);
@@ -24,7 +23,7 @@ INOUT(7, vec4, v_scales);
 void main() {
     StepUniforms u = step;
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (s >= counters.visible_count || failure != 0u) {
+    if (s >= counters.visible_count || counters.failure != 0u) {
         return;
     }
     uint i = fetchu(gaussian_from_splat, s);

@@ -6,7 +6,7 @@
 #include "gaussian.glsl"
 // smooth — keep Gaussians from becoming finer than the photos can show, or views from nearby would find needles and gaps.
 // Work:    64 Gaussians per workgroup.
-// Reads:   step, failure; means, scales_in [N]
+// Reads:   step, counters; means, scales_in [N]
 // Writes:  scales [N], the same buffer: w is the limit, the least over the views so far that see the centre; 0: none yet
 // Math:    3-D filter of Mip-Splatting as a lower limit: s >= FINEST z / f, f of the photo at full size; the update of
 //          Adam is projected to it.
@@ -14,7 +14,7 @@
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+READ1(1, Counters, counters);
 FETCH4(2, means);
 FETCH4(3, scales_in);
 WRITE(4, vec4, scales);
@@ -22,7 +22,7 @@ WRITE(4, vec4, scales);
 void main() {
     StepUniforms u = step;
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i >= u.trained_count || failure != 0u) {
+    if (i >= u.trained_count || counters.failure != 0u) {
         return;
     }
     vec4 s = fetch4(scales_in, i);

@@ -10,7 +10,7 @@
 //          parameters, and applies the updates of Adam that it has missed, then that of the step.
 // Work:    64 Gaussians of the model per workgroup, one an invocation; colours by vec4, shared out. A splat with many records is
 //          summed by all invocations, in a tree.
-// Reads:   step, failure, counters; splat_from_gaussian [N]; instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
+// Reads:   step, counters; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
 //          labels: labels [N], layer_from_label
 // Writes:  parameters, first and second moments [N], active colours alone; touched_at [N]; densify_stats [N];
 //          counters.nonfinite_* (integer atomics)
@@ -24,7 +24,7 @@ layout(constant_id = 18) const uint CHANGES = 1; // 0: the statistic alone
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
-READ1(2, uint, failure);
+FETCHU(2, tiles_touched);
 FETCHU(3, splat_from_gaussian);
 FETCHU(4, instance_offsets);
 FETCH4(5, v_instances_a);
@@ -59,13 +59,6 @@ FETCHU(32, labels);
 FETCHU(33, layer_from_label);
 #endif
 
-// The records of a splat end where those of the next one begin: no binding for their number, so that a device with 32 bindings
-// runs this without labels.
-uint records_end(uint s) {
-    return s + 1u < counters.visible_count ? fetchu(instance_offsets, s + 1u) : counters.instance_count;
-}
-
-#define records_of(s) (records_end(s) - fetchu(instance_offsets, s))
 #define GROUP
 #define LAZY
 #define plane4(name, e) name[e]
@@ -195,7 +188,7 @@ void main() {
         touched_count = 0u;
     }
     barrier();
-    bool is_trained = i < u.trained_count && failure == 0u;
+    bool is_trained = i < u.trained_count && counters.failure == 0u;
     uint s = is_trained ? fetchu(splat_from_gaussian, i) : NO_SPLAT;
     if (s != NO_SPLAT) {
         atomicAdd(seen_count, 1u);

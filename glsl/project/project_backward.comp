@@ -8,7 +8,7 @@
 #include "sh.glsl"
 // project_backward — carry the gradients of each splat back to the parameters of its Gaussian.
 // Work:    64 splats per workgroup.
-// Reads:   step, failure; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
+// Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
 // Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,3], v_sh2 [V,4],
 //          v_sh3 [V,6]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
@@ -19,7 +19,6 @@
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
 FETCHU(2, gaussian_from_splat);
 FETCH4(3, means);
 FETCH4(4, scales);
@@ -46,7 +45,7 @@ INOUT1(18, Counters, counters);
 void main() {
     StepUniforms u = step;
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (s >= counters.visible_count || failure != 0u) {
+    if (s >= counters.visible_count || counters.failure != 0u) {
         return;
     }
     uint i = fetchu(gaussian_from_splat, s);

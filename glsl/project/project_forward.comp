@@ -9,9 +9,9 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
-// Work:    64 splats per workgroup, splats in depth order; variant group: the rows of their tiles are shared out.
+// Work:    64 splats per workgroup, splats in depth order.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
-//          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
+//          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
@@ -37,107 +37,23 @@ WRITE(12, uint, splat_from_gaussian);
 FETCHU(13, labels);
 FETCHU(14, layer_from_label);
 #endif
-
-#ifdef LAZY
-FETCH4(15, m_means);
-FETCH4(16, m_scales);
-FETCH4(17, m_quats);
-FETCH4(18, m_sh0);
-FETCH4(19, m_sh1);
-FETCH4(20, m_sh2);
-FETCH4(21, m_sh3);
-FETCH4(22, u_means);
-FETCH4(23, u_scales);
-FETCH4(24, u_quats);
-FETCH4(25, u_sh0);
-FETCH4(26, u_sh1);
-FETCH4(27, u_sh2);
-FETCH4(28, u_sh3);
-FETCHU(29, touched_at);
-READ(30, uvec4, missed);
-#endif
 #define plane4(name, e) fetch4(name, e)
 #include "caught_up.glsl"
-#ifdef LAZY
-EACH_PLANE(CAUGHT_UP)
-#endif
-#include "sh_fetch.glsl"
-#include "sh_colour.glsl"
-#ifdef GROUP
-#include "rows.glsl"
-shared uint tiles[WALKERS];
-#endif
-
-// Writes the record of a splat. Returns where its tiles are.
-Ellipse project(StepUniforms u, uint s, uint i) {
-#ifdef LAZY
-    look_up(i < u.trained_count ? missed_updates(i) : 0u);
-#endif
-    vec4 mean = value4(means, i);
-    Projection p = project_gaussian(u, mean.xyz, value4(scales, i).xyz, value4(quats, i));
-    vec3 q = exponent_from_conic(p.conic);
-    float log2_o = log2_opacity(mean.w);
-#ifdef ANTIALIASED
-    log2_o += 0.5 * log2(p.coverage);
-#endif
-    vec2 centre = vec2(u.fx, u.fy) * p.slope_raw + vec2(u.cx, u.cy);
-    float reach = 2.0 * LN2 * (log2_o - LOG2_ALPHA_MIN);
-    vec2 extent = box_of(sqrt(p.cov.xz * max(reach, 0.0)));
-    vec3 direction = normalize(mean.xyz - u.camera_centre);
-    float basis[15];
-    sh_basis(direction, SH_DEGREE, basis);
-    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
-
-    bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + raw.x + raw.y + raw.z);
-    if (!sane) {
-        atomicAdd(counters.unprojected_count, 1u);
-        atomicMin(counters.unprojected_first, i);
-    }
-    splats[3u * s] = vec4(centre, q.x, q.y);
-    splats[3u * s + 1u] = vec4(q.z, log2_o, colour.x, colour.y);
-    splats[3u * s + 2u] = vec4(colour.z, p.view.z, extent);
-    splat_from_gaussian[i] = s;
-    Ellipse e = ellipse(u, centre, extent, q, log2_o);
-    e.rows = sane ? e.rows : 0u;
-    return e;
-}
-
-// Counts the tiles of the splat of this invocation, which may have no rows.
-uint count_tiles(StepUniforms u, Ellipse e) {
-#ifdef GROUP
-    uint lane = gl_LocalInvocationID.x, unused;
-    tiles[lane] = 0u;
-    uint rows = share_rows(e, 0u, unused);
-    for (uint row = lane; row < rows; row += WALKERS) {
-        uint splat = entry_at(0u, row);
-        atomicAdd(tiles[splat], tiles_of_row(u, ellipse_of(splat), row - starts[splat]).y);
-    }
-    barrier();
-    return tiles[lane];
-#else
-    uint count = 0u;
-    for (uint row = 0u; row < e.rows; row++) {
-        count += tiles_of_row(u, e, row).y;
-    }
-    return count;
-#endif
-}
+#include "splat.glsl"
 
 void main() {
     StepUniforms u = step;
-    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x, i = 0u;
-    bool is_splat = s < counters.visible_count;
-    Ellipse e;
-    e.rows = 0u;
-    if (is_splat) {
-        i = fetchu(gaussian_from_splat, s);
-        e = project(u, s, i);
+    uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
+    if (s >= counters.visible_count) {
+        return;
     }
-    uint touched = count_tiles(u, e);
-    if (is_splat) {
+    uint i = fetchu(gaussian_from_splat, s), touched = 0u;
+    Ellipse e = project_splat(u, s, i);
+    for (uint row = 0u; row < e.rows; row++) {
+        touched += tiles_of_row(u, e, row).y;
+    }
 #ifdef LABELS
-        touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
+    touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
 #endif
-        tiles_touched[s] = touched;
-    }
+    tiles_touched[s] = touched;
 }

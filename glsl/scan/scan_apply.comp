@@ -6,7 +6,7 @@
 #include "saturate.glsl"
 // scan_apply — third of three: each lane writes the exclusive prefix sum of its share.
 // Work:    as scan_reduce.
-// Reads:   step, counters, failure; values [n]; partials [LANES] (exclusive)
+// Reads:   step, counters; values [n]; partials [LANES] (exclusive)
 // Writes:  offsets [n]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/scan.rs::exclusive_scan
@@ -15,13 +15,12 @@ layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(local_size_x_id = 0) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, values);
 READ(4, uint, partials);
 WRITE(5, uint, offsets);
 
 void main() {
-    uint n = item_count(step, counters, failure);
+    uint n = item_count(step, counters, counters.failure);
     uint lane = gl_GlobalInvocationID.x;
     uint share = (n + LANES - 1u) / LANES;
     uint begin = min(lane * share, n), end = min(begin + share, n);

@@ -6,7 +6,7 @@
 #include "saturate.glsl"
 // scan_reduce — first of three: each lane sums its contiguous share of the values.
 // Work:    LANES lanes over all workgroups; lane i owns values [i c, (i+1) c), c = ceil(n / LANES).
-// Reads:   step, counters, failure; values [n] (variant flag: counts values other than KEY_INVISIBLE)
+// Reads:   step, counters; values [n] (variant flag: counts values other than KEY_INVISIBLE)
 // Writes:  partials [LANES]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/scan.rs::exclusive_scan
@@ -15,12 +15,11 @@ layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 layout(local_size_x_id = 0) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, values);
 WRITE(4, uint, partials);
 
 void main() {
-    uint n = item_count(step, counters, failure);
+    uint n = item_count(step, counters, counters.failure);
     uint lane = gl_GlobalInvocationID.x;
     uint share = (n + LANES - 1u) / LANES;
     uint begin = min(lane * share, n), end = min(begin + share, n);

@@ -6,7 +6,7 @@
 // scan_spine — second of three: exclusive scan of the lanes' sums; the total goes to a counter.
 // Work:    one workgroup of one subgroup.
 // Reads:   step; partials [LANES]
-// Writes:  partials [LANES] (exclusive); what follows from the total (total.glsl): counters, dispatch_args, failure
+// Writes:  partials [LANES] (exclusive); what follows from the total (total.glsl): counters, dispatch_args
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/scan.rs::exclusive_scan
 
@@ -15,7 +15,6 @@ layout(local_size_x_id = 0) in;
 INOUT(0, uint, partials);
 INOUT1(1, Counters, counters);
 READ1(2, StepUniforms, step);
-INOUT1(3, uint, failure);
 INOUT(4, uint, dispatch_args);
 #include "total.glsl"
 

@@ -4,30 +4,23 @@
 #include "step.glsl"
 #include "count.glsl"
 #include "saturate.glsl"
-// scan_sweep — exclusive prefix sum in one dispatch; or (variant compact) lists the visible Gaussians in the order of the model;
-//              or (variant list) the occupied tiles of object layers.
+// scan_sweep — exclusive prefix sum in one dispatch; or (variant list) lists the occupied tiles of object layers.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS items per workgroup.
-// Reads:   step, counters, failure; values [n] (variant compact: depth keys; variant list: 1 for an occupied tile)
-// Writes:  offsets [n]; sweep; what follows from the total (total.glsl): counters, dispatch_args, failure
-//          variant compact: keys_out [V] depth bits; values_out [V] Gaussian index; sweep (histograms of the digits of the keys)
+// Reads:   step, counters; values [n] (variant list: 1 for an occupied tile)
+// Writes:  offsets [n]; sweep; what follows from the total (total.glsl): counters, dispatch_args
 //          variant list: layer_tiles [occupied] (layer * T + tile)
 // Order:   exact integers, equal in every run. Sums from 2^30 on become 2^32 - 1 in the counter.
-// Mirror:  src/reference/scan.rs::exclusive_scan, scan.rs::compact
+// Mirror:  src/reference/scan.rs::exclusive_scan
 
 #define EXCHANGE_LANES SWEEP_LANES
 #include "subgroup.glsl"
 layout(local_size_x = SWEEP_LANES) in;
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
-INOUT1(2, uint, failure);
 READ(3, uint, values);
 INOUT(4, uint, sweep);
 INOUT(7, uint, dispatch_args);
-#ifdef COMPACT
-WRITE(5, uint, keys_out);
-WRITE(6, uint, values_out);
-#include "digit_counts.glsl"
-#elif defined(LIST)
+#ifdef LIST
 WRITE(5, uint, layer_tiles);
 #else
 WRITE(5, uint, offsets);
@@ -39,15 +32,11 @@ shared uint sums[SWEEP_SUBGROUPS];
 shared uint prefix;
 
 uint value(uint i, uint n) {
-#ifdef COMPACT
-    return i < n && values[i] != KEY_INVISIBLE ? 1u : 0u;
-#else
     return i < n ? values[i] : 0u;
-#endif
 }
 
 uint counted_items() {
-    return item_count(step, counters, failure);
+    return item_count(step, counters, counters.failure);
 }
 
 void sweep_recount(uint part) {
@@ -103,23 +92,13 @@ void main() {
             put_total(total == SWEEP_SUM ? 0xffffffffu : total);
         }
     }
-#ifdef COMPACT
-    clear_bins(lane, SWEEP_LANES);
-#endif
     barrier();
     first = sweep_add(first, prefix);
     [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {
         uint i = sweep_item(part, k);
         if (i < n) {
             uint to = sweep_add(first, before[k]);
-#ifdef COMPACT
-            uint key = values[i];
-            if (key != KEY_INVISIBLE) {
-                keys_out[to] = key;
-                values_out[to] = i;
-                count_digits(key);
-            }
-#elif defined(LIST)
+#ifdef LIST
             if (values[i] != 0u && to < step.layer_tile_capacity) {
                 layer_tiles[to] = i;
             }
@@ -128,8 +107,4 @@ void main() {
 #endif
         }
     }
-#ifdef COMPACT
-    barrier();
-    add_bins(lane, SWEEP_LANES);
-#endif
 }

@@ -6,7 +6,7 @@
 // radix_count — histogram of one digit of the keys, one histogram per lane.
 // Work:    LANES lanes over all workgroups of one subgroup; lane i owns keys [i c, (i+1) c). Each lane has its own column
 //          of the table: this needs no atomics, and equal keys keep their order.
-// Reads:   step, counters, failure; keys_in [n]
+// Reads:   step, counters; keys_in [n]
 // Writes:  histogram [2^DIGIT_BITS, LANES]: sums over the lanes before in the workgroup; totals [2^DIGIT_BITS,
 //          workgroups]
 // Order:   exact integers, equal in every run.
@@ -19,13 +19,12 @@ const uint DIGITS = 1u << DIGIT_BITS;
 shared uint table[DIGITS * SUBGROUP_SIZE];
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, keys_in);
 WRITE(4, uint, histogram);
 WRITE(5, uint, totals);
 
 void main() {
-    uint n = item_count(step, counters, failure);
+    uint n = item_count(step, counters, counters.failure);
     uint lane = gl_GlobalInvocationID.x, column = gl_LocalInvocationID.x;
     uint share = (n + LANES - 1u) / LANES;
     uint begin = min(lane * share, n), end = min(begin + share, n);

@@ -5,7 +5,7 @@
 #include "count.glsl"
 // radix_scatter — move keys and values to their sorted positions for one digit; stable.
 // Work:    as radix_count.
-// Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram,
+// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); histogram,
 //          totals (scanned)
 // Writes:  keys_out [n], values_out [n]
 // Order:   exact integers, equal in every run.
@@ -19,7 +19,6 @@ const uint DIGITS = 1u << DIGIT_BITS;
 shared uint table[DIGITS * SUBGROUP_SIZE];
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 FETCHU(3, keys_in);
 FETCHU(4, values_in);
 FETCHU(5, histogram);
@@ -28,7 +27,7 @@ WRITE(7, uint, keys_out);
 WRITE(8, uint, values_out);
 
 void main() {
-    uint n = item_count(step, counters, failure);
+    uint n = item_count(step, counters, counters.failure);
     uint lane = gl_GlobalInvocationID.x, column = gl_LocalInvocationID.x;
     uint share = (n + LANES - 1u) / LANES;
     uint begin = min(lane * share, n), end = min(begin + share, n);

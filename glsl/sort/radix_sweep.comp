@@ -6,7 +6,7 @@
 // radix_sweep — move keys and values to their sorted positions for one digit, in one dispatch; stable.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS pairs per workgroup. Subgroups rank their keys by ballots; the pairs of
 //          each digit leave together, through shared memory.
-// Reads:   step, counters, failure; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the digit)
+// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the digit)
 // Writes:  keys_out [n], values_out [n]; sweep (words of this pass, and zeros in those of the next one)
 // Order:   exact integers, equal in every run: that of the radix_scatter passes.
 // Mirror:  src/reference/sort.rs::radix_sort
@@ -18,7 +18,6 @@ layout(constant_id = 10) const uint IDENTITY = 0;
 layout(local_size_x = SWEEP_LANES) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ1(2, uint, failure);
 READ(3, uint, keys_in);
 READ(4, uint, values_in);
 INOUT(5, uint, sweep);
@@ -38,7 +37,7 @@ uint digit_of(uint key) {
 }
 
 uint counted_items() {
-    return item_count(step, counters, failure);
+    return item_count(step, counters, counters.failure);
 }
 
 void sweep_recount(uint part) {

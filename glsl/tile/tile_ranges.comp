@@ -8,15 +8,14 @@
 // labels) the occupied tiles of object layers.
 // Work:    one tile of one layer per invocation; the grid covers the step's layers. There are far fewer tiles than
 //          pairs, so a binary search per tile is cheaper than a test per pair.
-// Reads:   step, counters, failure; tile_keys [I] sorted
+// Reads:   step, counters; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
 //          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
-//          workgroup (blend_args.glsl): dispatch_args, failure
+//          workgroup (count_args.glsl): dispatch_args, counters.failure
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-INOUT1(1, uint, failure);
 INOUT1(2, Counters, counters);
 FETCHU(3, tile_keys);
 WRITE(4, uint, tile_starts);
@@ -25,7 +24,7 @@ WRITE(5, uint, tile_ends);
 WRITE(6, uint, layer_occupied);
 #else
 INOUT(7, uint, dispatch_args);
-#include "blend_args.glsl"
+#include "count_args.glsl"
 #endif
 
 // The first pair with a key of at least `key`.
@@ -43,7 +42,7 @@ uint first_not_less(uint key, uint count) {
 void main() {
     uint t = linear_group_id() * 64u + gl_LocalInvocationID.x;
     bool some = t < step.tile_count * (step.layer_count + 1u);
-    uint count = some && failure == 0u ? counters.instance_count : 0u;
+    uint count = some && counters.failure == 0u ? counters.instance_count : 0u;
     uint start = first_not_less(t, count), end = first_not_less(t + 1u, count);
     uint longest = subgroup_max(end - start);
     if (subgroup_elect() && longest > 0u) {

@@ -88,6 +88,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.chunk_pixels = trained(shape.chunks(instances, 1) * u64::from(shape.tile_pixels()));
     capacity.chunk_channels = if capacity.labelled + capacity.known_depths > 0 { capacity.chunk_pixels } else { 0 };
     capacity.sweep_cells = shape.sweep_cells(instances.max(capacity.gaussians).max(capacity.virtual_tiles));
+    capacity.look_cells = shape.look_cells(capacity.gaussians);
     if shape.sweeps() {
         return;
     }
@@ -232,7 +233,7 @@ impl Engine {
     /// lists that were in flight have then changed nothing.
     #[doc(hidden)]
     pub fn recover(&mut self, report: &Report) -> Result<bool> {
-        if report.failure == 0 {
+        if report.counters.failure == 0 {
             return Ok(false);
         }
         self.abandon()?;
@@ -244,7 +245,7 @@ impl Engine {
         if new == self.capacity {
             return Err(Error::Bug(format!(
                 "failure {}, but all buffers are large enough: {needed:?}",
-                report.failure
+                report.counters.failure
             )));
         }
         tracing::debug!(
@@ -257,7 +258,7 @@ impl Engine {
             Err(error) if error.is_out_of_memory() && new != least => self.set_capacity(least)?,
             other => other?,
         }
-        self.sched.fill(Buf::FAILURE, 0)?;
+        self.sched.fill(Buf::COUNTERS, 0)?;
         Ok(true)
     }
 

@@ -52,8 +52,6 @@ pub enum ListKey {
 pub struct Report {
     /// Counters.
     pub counters: Counters,
-    /// Sticky failure bits (glsl/include/step.glsl).
-    pub failure: u32,
 }
 
 /// A list in flight; [`Engine::retire`] waits for it.
@@ -139,7 +137,7 @@ impl Engine {
             self.sched.run(list, 0)?;
             let before = self.note_update(key, input.uniforms());
             let report = self.report(0)?;
-            if report.failure != 0 {
+            if report.counters.failure != 0 {
                 self.take_back(before);
             }
             if self.has_guards {
@@ -195,7 +193,7 @@ impl Engine {
         self.sched.wait(flight.ticket)?;
         self.in_flight[flight.recording.frame] = false;
         let report = self.report(flight.recording.frame)?;
-        if report.failure != 0 {
+        if report.counters.failure != 0 {
             self.take_back(flight.before);
         }
         Ok(report)
@@ -220,9 +218,7 @@ impl Engine {
     #[doc(hidden)]
     pub fn report(&mut self, frame: usize) -> Result<Report> {
         self.sched.wait_frame(frame)?;
-        let counters = self.sched.download::<Counters>(Buf::REPORT, frame, 0, 1)?[0];
-        let failure = self.sched.download::<u32>(Buf::REPORT_FAILURE, frame, 0, 1)?[0];
-        Ok(Report { counters, failure })
+        Ok(Report { counters: self.sched.download::<Counters>(Buf::REPORT, frame, 0, 1)?[0] })
     }
 
     /// Sets whether lists write the times of their items from now on ([`Scheduler::time_items`]).

@@ -10,8 +10,7 @@ use crate::scheduler::plan::{Buf, Stage};
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, mark_near(lazy: b.late) {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, failure: Buf::FAILURE,
-        m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, counters: Buf::COUNTERS, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
         touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
     } [], over_gaussians());
 }

@@ -9,7 +9,7 @@ use crate::scheduler::plan::{Buf, Stage};
 pub(super) fn gather(b: &mut Builder) {
     b.list.stage = Stage::GATHER;
     pass!(b, gather(labels: b.supervision.has_layers(), group: b.shape.group_walks) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
+        step: Buf::STEP, counters: Buf::COUNTERS, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B,
         v_instances_c: Buf::V_INSTANCES_C, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, v_splats: Buf::V_SPLATS,
         densify_stats: Buf::DENSIFY_STATS, labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
@@ -20,7 +20,7 @@ pub(super) fn gather(b: &mut Builder) {
 pub(super) fn weigh(b: &mut Builder) {
     b.list.stage = Stage::GATHER;
     pass!(b, weigh {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, tiles_touched: Buf::TILES_TOUCHED,
+        step: Buf::STEP, counters: Buf::COUNTERS, tiles_touched: Buf::TILES_TOUCHED,
         instance_offsets: Buf::INSTANCE_OFFSETS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, densify_stats: Buf::DENSIFY_STATS,
     } [], over_splats());

@@ -11,7 +11,7 @@ use crate::shaders::constants;
 pub(super) fn resolve(b: &mut Builder) {
     b.list.stage = Stage::LABELS;
     pass!(b, lift_resolve {
-        step: Buf::STEP, failure: Buf::FAILURE, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
+        step: Buf::STEP, counters: Buf::COUNTERS, label_keys: Buf::LABEL_KEYS, labels: Buf::LABELS,
     } [], over_gaussians());
 }
 

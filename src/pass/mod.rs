@@ -28,7 +28,7 @@ pub(crate) use update::is_fused;
 
 use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
-use crate::scheduler::plan::{Buf, PassList};
+use crate::scheduler::plan::{Buf, Grid, PassList};
 
 pub use crate::scheduler::plan::Stage;
 
@@ -130,18 +130,19 @@ impl Extension for () {
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degree: u32) -> Builder<'a> {
     let late = capacity.late_gaussians > 0;
     let mut b = Builder { sh_degree, late, ..Builder::new(name, shape, capacity) };
-    if shape.sweeps() {
-        b.list.fill(Buf::SWEEP, 0);
-    }
-    pass!(b, step_begin { step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS } [],
-        build::ONE);
+    let (look, sweep) = (shape.group_walks, shape.sweeps());
+    let cleared = capacity.look_cells + capacity.sweep_cells;
+    let groups = Grid::Groups(cleared.div_ceil(4096).clamp(1, 4096) as u32, 1, 1);
+    pass!(b, step_begin(look: look, sweep: sweep) {
+        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, look_back: Buf::LOOK_BACK,
+        sweep: Buf::SWEEP,
+    } [cells: capacity.sweep_cells as u32], groups);
     b
 }
 
 fn end(mut b: Builder) -> PassList {
     b.list.stage = Stage::REPORT;
     b.list.copy(Buf::COUNTERS, Buf::REPORT, 0);
-    b.list.copy(Buf::FAILURE, Buf::REPORT_FAILURE, 0);
     b.list
 }
 

@@ -77,7 +77,7 @@ fn update(
     let rows = b.capacity.shared_rows as u32;
     let [parameters, first, second] = planes;
     pass!(b, adam(shared: shared) {
-        step: Buf::STEP, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, gradients: gradients,
+        step: Buf::STEP, counters: Buf::COUNTERS, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, gradients: gradients,
         parameters_in: parameters, first_moments_in: first, second_moments_in: second, parameters: parameters,
         first_moments: first, second_moments: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
         weights: Buf::W_SHARED,
@@ -88,7 +88,7 @@ fn update(
 pub(crate) fn regularise(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, regularise {
-        step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         means: Buf::MEANS, scales: Buf::SCALES, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES,
     } [], over_splats());
 }
@@ -96,7 +96,7 @@ pub(crate) fn regularise(b: &mut Builder) {
 /// Keeps Gaussians from becoming finer than the photos can show.
 pub(crate) fn smooth(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, smooth { step: Buf::STEP, failure: Buf::FAILURE, means: Buf::MEANS, scales_in: Buf::SCALES, scales: Buf::SCALES } [],
+    pass!(b, smooth { step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales_in: Buf::SCALES, scales: Buf::SCALES } [],
         over_gaussians());
 }
 
@@ -104,7 +104,7 @@ pub(crate) fn smooth(b: &mut Builder) {
 pub(crate) fn explore(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, explore {
-        step: Buf::STEP, failure: Buf::FAILURE, means_in: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
+        step: Buf::STEP, counters: Buf::COUNTERS, means_in: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
         means: Buf::MEANS,
     } [], over_gaussians());
 }

@@ -1,10 +1,11 @@
 //! Projects Gaussians to splats in depth order, and carries gradients back.
 
-use super::build::{Builder, Count, ONE, over_gaussians, over_splats};
+use super::build::{Builder, Count, ONE, args, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
+use crate::shaders::constants;
 
 /// Gaussian of each splat; the depth sort ends in this buffer.
 pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
@@ -12,29 +13,31 @@ pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 /// Bits of a depth key.
 const DEPTH_BITS: u32 = 32;
 
-/// Lists the visible Gaussians in depth order and projects them.
+/// Lists the visible Gaussians, projects them, and sorts them by depth. Afterwards splats are numbered in the order of depth; or,
+/// where passes look back, in that of the model, and `Buf::DEPTH_ORDER` has their order.
 pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::PROJECT;
-    pass!(b, cull(lazy: b.late) {
+    if b.shape.group_walks {
+        let keys = [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B];
+        let buffers = SortBuffers { keys, values: [Buf::DEPTH_ORDER, Buf::DEPTH_VALUES_B] };
+        let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
+        project_visible(b, buffers.keys[0]);
+        sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", true);
+        return;
+    }
+    pass!(b, cull {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, m_means: Buf::M_MEANS,
-        m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, touched_at: Buf::TOUCHED_AT,
-        missed: Buf::MISSED,
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
     } [], over_gaussians());
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
     };
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
-    if b.shape.sweeps() {
-        scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
-    } else {
-        scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
-        pass!(b, compact {
-            step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
-            keys_out: buffers.keys[0], values_out: buffers.values[0], failure: Buf::FAILURE,
-        } [], over_gaussians());
-    }
+    scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
+    pass!(b, compact {
+        step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
+        keys_out: buffers.keys[0], values_out: buffers.values[0], counters: Buf::COUNTERS, } [], over_gaussians());
     sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", false);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
@@ -42,15 +45,29 @@ pub(super) fn visible_splats(b: &mut Builder) {
 
 fn project_forward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks, lazy: b.late) {
+    pass!(b, project_forward(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
+        splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+    } [sh_degree: sh_degree], over_splats());
+}
+
+/// All of these in one pass, but for the sort.
+fn project_visible(b: &mut Builder, keys: Buf) {
+    let (sh_degree, sort_slot) = (b.sh_degree, b.sweeps.sorts);
+    let labels = b.supervision.has_layers();
+    pass!(b, project_visible(labels: labels, lazy: b.late, sweep: b.shape.sweeps()) {
+        step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales: Buf::SCALES,
+        quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
         labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES,
         m_quats: Buf::M_QUATS, m_sh0: Buf::M_SH0, m_sh1: Buf::M_SH1, m_sh2: Buf::M_SH2, m_sh3: Buf::M_SH3,
         u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
-        u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
-    } [sh_degree: sh_degree], over_splats());
+        u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, keys_out: keys,
+        gaussian_from_splat: GAUSSIAN_FROM_SPLAT, look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
+        sweep: Buf::SWEEP,
+    } [sh_degree: sh_degree, sort_slot: sort_slot], args(constants::ARGS_VISIBLE));
 }
 
 /// Corrects the pose of the step's camera by rows `row` and the next of the step.
@@ -80,7 +97,7 @@ pub(super) fn project_backward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, project_backward {
-        step: Buf::STEP, failure: Buf::FAILURE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
+        step: Buf::STEP, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
         v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,

@@ -21,29 +21,23 @@ pub enum Total {
 /// follow from it.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
     if b.shape.sweeps() {
-        sweep(b, (values, [offsets; 2]), count, total, (false, false));
+        sweep(b, (values, offsets), count, total, false);
     } else {
         reduce_then_scan(b, (values, offsets), count, total, false);
     }
 }
 
-/// Writes the visible keys and their Gaussians, in the order of the model, and the number of them to `visible_count`, in one
-/// pass; and the histograms for a sort of these keys by the next passes.
-pub fn compact_by_sweep(b: &mut Builder, keys: Buf, (keys_out, values_out): (Buf, Buf)) {
-    sweep(b, (keys, [keys_out, values_out]), Count::Gaussians, Total::Visible, (true, false));
-}
-
 /// Writes the tiles whose value is not 0, and the number of them to `layer_tile_count`, in one pass.
 pub fn list_by_sweep(b: &mut Builder, occupied: Buf, tiles: Buf) {
-    sweep(b, (occupied, [tiles; 2]), Count::VirtualTiles, Total::LayerTiles, (false, true));
+    sweep(b, (occupied, tiles), Count::VirtualTiles, Total::LayerTiles, true);
 }
 
-fn sweep(b: &mut Builder, (values, out): (Buf, [Buf; 2]), count: Count, total: Total, (compact, list): (bool, bool)) {
-    let (slot, sort_slot) = (b.next_scan(), b.sweeps.sorts);
-    pass!(b, scan_sweep(compact: compact, list: list) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, sweep: Buf::SWEEP,
-        offsets: out[0], layer_tiles: out[0], keys_out: out[0], values_out: out[1], dispatch_args: Buf::DISPATCH_ARGS,
-    } [count_source: count as u32, total: total as u32, sweep_slot: slot, sort_slot: sort_slot], count.partitions());
+fn sweep(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: Total, list: bool) {
+    let slot = b.next_scan();
+    pass!(b, scan_sweep(list: list) {
+        step: Buf::STEP, counters: Buf::COUNTERS, values: values, sweep: Buf::SWEEP,
+        offsets: out, layer_tiles: out, dispatch_args: Buf::DISPATCH_ARGS,
+    } [count_source: count as u32, total: total as u32, sweep_slot: slot], count.partitions());
 }
 
 /// Same as [`scan`]; each key other than `KEY_INVISIBLE` counts as 1.
@@ -55,14 +49,13 @@ fn reduce_then_scan(b: &mut Builder, (values, offsets): (Buf, Buf), count: Count
     let lanes = b.capacity.scan_lanes as u32;
     let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
     pass!(b, scan_reduce(flag: flag) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, partials: Buf::SCAN_PARTIALS,
+        step: Buf::STEP, counters: Buf::COUNTERS, values: values, partials: Buf::SCAN_PARTIALS,
     } [count_source: count as u32, lanes: lanes], groups);
     pass!(b, scan_spine {
-        partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS, step: Buf::STEP, failure: Buf::FAILURE,
-        dispatch_args: Buf::DISPATCH_ARGS,
+        partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS, step: Buf::STEP, dispatch_args: Buf::DISPATCH_ARGS,
     } [lanes: lanes, total: total as u32], ONE);
     pass!(b, scan_apply(flag: flag) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, values: values, partials: Buf::SCAN_PARTIALS,
+        step: Buf::STEP, counters: Buf::COUNTERS, values: values, partials: Buf::SCAN_PARTIALS,
         offsets: offsets,
     } [count_source: count as u32, lanes: lanes], groups);
 }

@@ -3,8 +3,10 @@
 use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
-use crate::shaders::constants::{LABEL_BORDER, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS};
-use crate::shaders::{BindingKind, update};
+use crate::shaders::constants::{
+    LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_LANES,
+};
+use crate::shaders::{BindingKind, project_visible, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -28,8 +30,8 @@ pub struct KernelShape {
     pub loss_tile: u32,
     /// Pixels of a mask on the device have 16 bits.
     pub narrow_labels: bool,
-    /// The tiles of splats, and the records of those with many, are shared out among the invocations of a workgroup; else one
-    /// invocation walks those of a splat.
+    /// Splats are listed, projected and numbered by passes that look back (glsl/include/look_back.glsl), and their tiles, and the
+    /// records of those with many, are shared out among the invocations of a workgroup; else one invocation walks those of a splat.
     pub group_walks: bool,
     /// The blends of a card; `None` with a subgroup for each tile.
     pub group_blend: Option<GroupBlend>,
@@ -114,7 +116,8 @@ impl KernelShape {
             _ if is_card => Update::Lazy,
             _ => Update::Split,
         };
-        let shape = shape.with_lazy_updates(device).map_or(shape, |shape| Self { update, ..shape });
+        let lazy = shape.with_lazy_updates(device).filter(|_| update != Update::Split);
+        let shape = lazy.map_or(shape, |shape| Self { update, ..shape });
         let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
@@ -161,9 +164,13 @@ impl KernelShape {
     pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
         let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
         let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
-        let bindings = own.map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
+        let projections =
+            project_visible::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
+        let bindings = own
+            .chain(projections)
+            .map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
         let fits = bindings.max().unwrap_or(0) <= device.limits.plan.max_storage_buffers as usize;
-        fits.then_some(Self { update: Update::Lazy, ..self })
+        fits.then_some(Self { update: Update::Lazy, group_walks: true, ..self })
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -180,7 +187,8 @@ impl KernelShape {
 
     /// Returns this shape with sorts and scans of one dispatch a pass, of so many items an invocation.
     pub fn with_sweeps_of(self, items: u32) -> Self {
-        Self { sweep_items: items, digit_bits: if self.subgroup >= 16 { 8 } else { 4 }, ..self }
+        let digit_bits = if self.subgroup >= 16 { 8 } else { 4 };
+        Self { sweep_items: items, digit_bits, group_walks: true, ..self }
     }
 
     /// Shared memory of a pass of the sort that looks back, bytes.
@@ -202,6 +210,15 @@ impl KernelShape {
         }
         let partitions = items.div_ceil(u64::from(SWEEP_LANES * self.sweep_items));
         u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
+    }
+
+    /// Words of `Buf::LOOK_BACK` for so many Gaussians.
+    pub fn look_cells(&self, gaussians: u64) -> u64 {
+        if !self.group_walks {
+            return 0;
+        }
+        let partitions = gaussians.div_ceil(u64::from(VISIBLE_LANES * VISIBLE_ITEMS_MIN));
+        2 + partitions + gaussians.div_ceil(u64::from(ORDERED_LANES))
     }
 
     /// Returns the shape for a subgroup size; `cpu` is true if the device is a processor.

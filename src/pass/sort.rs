@@ -46,7 +46,7 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         if b.shape.sweeps() {
             pass!(b, radix_sweep {
-                step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+                step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
                 values_in: values_in, sweep: Buf::SWEEP, keys_out: buffers.keys[to], values_out: buffers.values[to],
             } [count_source: count as u32, shift: shift, sweep_slot: b.sweeps.sorts,
                 identity: u32::from(identity_now)], count.partitions());
@@ -56,12 +56,12 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.
         let digit_bits = digit_bits.min(bits.max(1) - shift);
         pass!(b, radix_count {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+            step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
         pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: workgroups << digit_bits], ONE);
         pass!(b, radix_scatter {
-            step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, keys_in: buffers.keys[from],
+            step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
             values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
             keys_out: buffers.keys[to], values_out: buffers.values[to],
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,

@@ -13,13 +13,24 @@ use crate::shaders::constants;
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
-    let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
-    pass!(b, emit_instances(labels: b.supervision.has_layers(), group: b.shape.group_walks, sweep: sweep) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
-        splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, sweep: Buf::SWEEP,
-    } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
+    let labels = b.supervision.has_layers();
+    if b.shape.group_walks {
+        let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
+        pass!(b, emit_ordered(labels: labels, sweep: sweep) {
+            step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, order: Buf::DEPTH_ORDER,
+            look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS, sweep: Buf::SWEEP,
+        } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
+    } else {
+        pass!(b, emit_instances(labels: labels) {
+            step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
+        } [], over_splats());
+    }
     let buffers =
         SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
@@ -30,7 +41,7 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
 fn tile_ranges(b: &mut Builder, keys: Buf) {
     let groups = args(constants::ARGS_TILES);
     pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
-        step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
+        step: Buf::STEP, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
         dispatch_args: Buf::DISPATCH_ARGS,
     } [], groups);
@@ -42,7 +53,7 @@ fn tile_ranges(b: &mut Builder, keys: Buf) {
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
     pass!(b, layer_list {
-        step: Buf::STEP, failure: Buf::FAILURE, layer_occupied: Buf::LAYER_OCCUPIED,
+        step: Buf::STEP, counters: Buf::COUNTERS, layer_occupied: Buf::LAYER_OCCUPIED,
         layer_offsets: Buf::LAYER_OFFSETS, layer_tiles: Buf::LAYER_TILES,
     } [], groups);
 }

@@ -17,8 +17,8 @@ pub(super) fn update(b: &mut Builder, changes: bool) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::OPTIMISE;
     pass!(b, update(labels: b.supervision.has_layers()) {
-        step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A,
+        step: Buf::STEP, counters: Buf::COUNTERS, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, v_instances_a: Buf::V_INSTANCES_A,
         v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C, densify_stats: Buf::DENSIFY_STATS,
         touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, means: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
         sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES,
@@ -32,7 +32,7 @@ pub(super) fn update(b: &mut Builder, changes: bool) {
 pub(super) fn catch_up(b: &mut Builder) {
     let sh_degree = b.sh_degree;
     pass!(b, catch_up {
-        step: Buf::STEP, failure: Buf::FAILURE, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, means: Buf::MEANS,
+        step: Buf::STEP, counters: Buf::COUNTERS, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, m_quats: Buf::M_QUATS, m_sh0: Buf::M_SH0, m_sh1: Buf::M_SH1,
         m_sh2: Buf::M_SH2, m_sh3: Buf::M_SH3, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS,

@@ -11,6 +11,7 @@ use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::pass::GroupBlend;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::judge;
+use labelgs::verify::selftest::order::DepthOrder;
 
 /// Faint to opaque, so that pixels stop and alphas are clamped.
 pub fn opaque_scene(seed: u64) -> Scene {
@@ -196,6 +197,7 @@ fn no_tile_misses_a_visible_splat() {
     fixture.train();
     let (splats, (width, height), shape) = (fixture.splats(), fixture.size(), *fixture.engine.shape());
     let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let touched = DepthOrder::of(&mut fixture).expect("an order").sorted(&touched);
     let grid = tile::TileGrid { size: (width, height), tile: (shape.tile_width as usize, shape.tile_height as usize) };
     let rules = Rules::default();
     for (splat, &touched) in splats.iter().zip(&touched) {

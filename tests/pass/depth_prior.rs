@@ -7,7 +7,6 @@ use crate::support::compare::{check, exact, gradients};
 use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::pass::GroupBlend;
-use labelgs::scheduler::plan::Buf;
 
 /// Weight of the depths, far above that of the photo.
 const WEIGHT: f64 = 1e5;
@@ -27,13 +26,13 @@ fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else_of(form: Op
     fixture.train();
     let splats = fixture.splats();
     let count = splats.len();
-    let without: Vec<[f32; 12]> = fixture.get(Buf::V_SPLATS, count);
+    let without: Vec<[f32; 12]> = fixture.splat_records();
     let middle = splats.iter().map(|splat| splat.depth).sum::<f64>() / count as f64;
     let pixels = fixture.size().0 * fixture.size().1;
     let known = |at: usize| [0.0, 0.5 / middle, 1.0 / middle, 1.5 / middle][at % 4] as f32;
     fixture.view.depths = (0..pixels).map(known).collect();
     fixture.train();
-    let with: Vec<[f32; 12]> = fixture.get(Buf::V_SPLATS, count);
+    let with: Vec<[f32; 12]> = fixture.splat_records();
     let others = |rows: &[[f32; 12]]| -> Vec<f32> {
         rows.iter().flat_map(|row| [0, 1, 2, 3, 4, 6, 7, 8].map(|i| row[i])).collect()
     };

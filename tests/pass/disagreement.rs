@@ -7,7 +7,6 @@ use crate::support::device;
 use crate::support::scenes::{Shape, scene};
 use labelgs::pass::GroupBlend;
 use labelgs::run::LabelRule;
-use labelgs::scheduler::plan::Buf;
 
 /// Gradients of the photo are 1e-5 of those of the labels, and both are sums in f32; 0.6 of it seen.
 pub(super) const BOUNDS: GradientBounds = GradientBounds {
@@ -36,10 +35,10 @@ fn disagreement_of_a_step_equals_its_mirror_and_moves_opacities_only_of(form: Op
     let report = fixture.train();
     let splats = fixture.splats();
     let count = splats.len();
-    let with: Vec<[f32; 12]> = fixture.get(Buf::V_SPLATS, count);
+    let with: Vec<[f32; 12]> = fixture.splat_records();
     fixture.input.labels = false;
     fixture.train();
-    let without: Vec<[f32; 12]> = fixture.get(Buf::V_SPLATS, count);
+    let without: Vec<[f32; 12]> = fixture.splat_records();
     let others = |rows: &[[f32; 12]]| -> Vec<f32> {
         rows.iter().flat_map(|row| [0, 1, 2, 3, 4, 6, 7, 8].map(|i| row[i])).collect()
     };

@@ -12,6 +12,7 @@ use labelgs::pass::{GroupBlend, KernelShape};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::fixture;
+use labelgs::verify::selftest::order::DepthOrder;
 use std::ops::{Deref, DerefMut};
 
 pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
@@ -101,9 +102,16 @@ impl Fixture {
         self.inner.get(buf, count).expect("the buffer can be read")
     }
 
-    /// Splats that the device projected, in its order.
+    /// Splats that the device projected, by depth.
     pub fn splats(&mut self) -> Vec<Splat> {
         self.inner.splats().expect("the splats can be read")
+    }
+
+    /// Sums of the gradient records of each splat, by depth.
+    pub fn splat_records(&mut self) -> Vec<[f32; 12]> {
+        let order = DepthOrder::of(self).expect("an order");
+        let records = self.get(Buf::V_SPLATS, order.splats.len());
+        order.sorted(&records)
     }
 
     /// Gradients of the splats.

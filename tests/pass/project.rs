@@ -10,9 +10,11 @@ use crate::reference::{Rules, tile};
 use crate::support::compare::{GradientBounds, Tolerance, check, close, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::pass::KernelShape;
 use labelgs::scheduler::plan::Buf;
 use labelgs::shaders::constants::KEY_INVISIBLE;
 use labelgs::verify::selftest::judge;
+use labelgs::verify::selftest::order::DepthOrder;
 
 /// Half of the Gaussians far outside, so that slopes are clamped and many are culled; some behind the near plane.
 pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
@@ -29,11 +31,25 @@ pub fn wide_scene(seed: u64, sh_degree: u32) -> Scene {
 /// The device drops no visible Gaussian, and keeps none that is behind the near plane or too faint.
 #[test]
 fn visible_gaussians_come_in_depth_order() {
-    let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, wide_scene(11, 3), false);
+    for looks_back in [false, true] {
+        let Some(fixture) = projecting(wide_scene(11, 3), looks_back) else { return };
+        come_in_depth_order(fixture);
+    }
+}
+
+/// With projections of a processor, or with those of a card, which look back.
+fn projecting(scene: Scene, looks_back: bool) -> Option<Fixture> {
+    let turn = device()?;
+    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+    Some(Fixture::with_shape(turn, scene, false, shape))
+}
+
+fn come_in_depth_order(mut fixture: Fixture) {
     let report = fixture.train();
     let count = fixture.scene.gaussians.len();
-    let keys = fixture.get::<u32>(Buf::DEPTH_KEYS, count);
+    let found = DepthOrder::of(&mut fixture).expect("an order");
+    let mut keys = vec![KEY_INVISIBLE; count];
+    found.gaussians.iter().zip(&found.keys).for_each(|(&gaussian, &key)| keys[gaussian as usize] = key);
     let (model, camera, size) = (fixture.model(), fixture.scene.camera.clone(), fixture.size());
     prove("cull", &["near"], |rules| {
         let mut depths = (Vec::new(), Vec::new());
@@ -64,17 +80,19 @@ fn visible_gaussians_come_in_depth_order() {
     assert!(listed.len() == visible && visible > 100 && visible < 280, "{visible} of {count} are visible");
     let order = radix_sort(&listed.iter().map(|&i| keys[i as usize]).collect::<Vec<_>>());
     let expected: Vec<u32> = order.iter().map(|&place| listed[place]).collect();
-    check("depth order", exact(&fixture.get::<u32>(Buf::DEPTH_VALUES_A, visible), &expected));
+    check("depth order", exact(&found.gaussians, &expected));
     let mut splat_of = vec![u32::MAX; count];
-    expected.iter().enumerate().for_each(|(splat, &gaussian)| splat_of[gaussian as usize] = splat as u32);
+    let numbered = if fixture.engine.shape().group_walks { &listed } else { &expected };
+    numbered.iter().enumerate().for_each(|(splat, &gaussian)| splat_of[gaussian as usize] = splat as u32);
     check("splat_from_gaussian", exact(&fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count), &splat_of));
 }
 
 #[test]
 fn project_forward_of_each_degree_equals_its_mirror() {
-    for sh_degree in 0..=3 {
-        let Some(turn) = device() else { return };
-        let mut fixture = Fixture::new(turn, wide_scene(20 + u64::from(sh_degree), sh_degree), false);
+    for (sh_degree, looks_back) in (0..=3).flat_map(|degree| [(degree, false), (degree, true)]) {
+        let Some(mut fixture) = projecting(wide_scene(20 + u64::from(sh_degree), sh_degree), looks_back) else {
+            return;
+        };
         fixture.render();
         let (splats, model, camera) = (fixture.splats(), fixture.model(), fixture.scene.camera.clone());
         let mut bearing = vec!["dilation", "jacobian_margin", "colour_bias", "sh_c0"];

@@ -18,7 +18,7 @@ use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
     ARGS_BLEND, ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_SWEEP_TILES, ARGS_WORDS,
-    KEY_INVISIBLE, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
+    SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
 };
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -146,41 +146,6 @@ fn occupied_tiles_are_listed_and_counted() {
             assert_eq!(counters(engine).layer_tile_count as usize, expected.len(), "{count} tiles");
             let groups = if count == 0 { 0 } else { count + expected.len() };
             assert_eq!(get(engine, Buf::DISPATCH_ARGS, ARGS_BLEND as usize + 1)[ARGS_BLEND as usize], groups as u32);
-        }
-    });
-}
-
-#[test]
-fn visible_keys_are_listed_and_sorted() {
-    let buffers = SortBuffers {
-        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
-        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
-    };
-    each_size(MOST, |engine| {
-        let id = list(engine, Some(2), |b| {
-            scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
-        });
-        let mut random = generator(72);
-        for count in COUNTS {
-            let key =
-                |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
-            let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
-            announce(engine, count, &[]);
-            engine.raw_mut().upload(Buf::DEPTH_KEYS, 0, 0, &keys).expect("upload");
-            run(engine, id);
-            let visible: Vec<u32> = (0..count as u32).filter(|&i| keys[i as usize] != KEY_INVISIBLE).collect();
-            let of: Vec<u32> = visible.iter().map(|&i| keys[i as usize]).collect();
-            assert_eq!(counters(engine).visible_count as usize, if count == 0 { 0 } else { visible.len() });
-            check("values", exact(&get(engine, buffers.values[0], visible.len()), &visible));
-            check("keys", exact(&get(engine, buffers.keys[0], visible.len()), &of));
-            let words = get(engine, Buf::SWEEP, (SWEEP_HISTOGRAMS + 8 * SWEEP_DIGITS) as usize);
-            let bits = engine.shape().digit_bits;
-            for pass in 0..32 / bits {
-                let mut digits = vec![0_u32; 1 << bits];
-                of.iter().for_each(|key| digits[(key >> (pass * bits)) as usize & ((1 << bits) - 1)] += 1);
-                let at = (SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS) as usize;
-                check("digits", exact(&words[at..][..1 << bits], &digits));
-            }
         }
     });
 }

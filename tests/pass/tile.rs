@@ -9,22 +9,32 @@ use crate::reference::tile::{TileGrid, counted_tiles, row_interval, tile_lengths
 use crate::support::compare::{Summary, check, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, generator, scene, uniform};
+use labelgs::pass::KernelShape;
 use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::order::DepthOrder;
 
 /// Log2 units that the device may err on the side of one tile too many: 0.01, 2e-6 of the exponent's terms, and 0.001 px.
 const SLACK: f64 = 0.02;
 
 #[test]
 fn tile_lists_equal_their_mirror() {
-    let Some(turn) = device() else { return };
-    let mut fixture = Fixture::new(turn, opaque_scene(81), true);
+    for looks_back in [false, true] {
+        let Some(turn) = device() else { return };
+        let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+        lists_equal_their_mirror(Fixture::with_shape(turn, opaque_scene(81), true, shape));
+    }
+}
+
+fn lists_equal_their_mirror(mut fixture: Fixture) {
     let counters = fixture.train().counters;
+    let order = DepthOrder::of(&mut fixture).expect("an order");
     let (splats, pairs) = (fixture.splats(), counters.instance_count as usize);
     let (uniforms, shape, labels) = (fixture.uniforms(), *fixture.engine.shape(), fixture.model().labels);
     let grid = TileGrid { size: fixture.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
-    let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len());
+    let touched = order.sorted(&fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len()));
     let (offsets, total) = exclusive_scan(&touched);
-    check("instance_offsets", exact(&fixture.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()), &offsets));
+    let found = order.sorted(&fixture.get::<u32>(Buf::INSTANCE_OFFSETS, splats.len()));
+    check("instance_offsets", exact(&found, &offsets));
     assert_eq!(counters.instance_count, total);
 
     let (sorted_keys, slots) = fixture.sorted_pairs(pairs);
@@ -32,7 +42,7 @@ fn tile_lists_equal_their_mirror() {
     slots.iter().zip(&sorted_keys).for_each(|(&slot, &key)| keys[slot as usize] = key);
     check("order of pairs", exact(&slots, &radix_sort(&keys).iter().map(|&slot| slot as u32).collect::<Vec<_>>()));
     let splat_from_instance = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
-    let owners = touched.iter().enumerate().flat_map(|(splat, &n)| std::iter::repeat_n(splat as u32, n as usize));
+    let owners = touched.iter().zip(&order.splats).flat_map(|(&n, &splat)| std::iter::repeat_n(splat, n as usize));
     check("splat_from_instance", exact(&splat_from_instance, &owners.collect::<Vec<_>>()));
 
     let layers = fixture.input.layers.clone();
@@ -57,10 +67,10 @@ fn tile_lists_equal_their_mirror() {
         }
         Ok(Summary::default())
     });
-    lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance);
+    lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance, &order);
 }
 
-fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32]) {
+fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32], order: &DepthOrder) {
     let (uniforms, counters) = (fixture.uniforms(), fixture.engine.report(0).expect("a report").counters);
     let virtual_tiles = (uniforms.tile_count * (uniforms.layer_count + 1)) as usize;
     let ranges = tile_ranges(sorted_keys, virtual_tiles);
@@ -68,7 +78,9 @@ fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_i
     let ends: Vec<u32> = ranges.iter().map(|range| range[1]).collect();
     check("tile_starts", exact(&fixture.get::<u32>(Buf::TILE_STARTS, virtual_tiles), &starts));
     check("tile_ends", exact(&fixture.get::<u32>(Buf::TILE_ENDS, virtual_tiles), &ends));
-    let sorted: Vec<u32> = slots.iter().map(|&slot| splat_from_instance[slot as usize]).collect();
+    let ranks = order.ranks();
+    let rank = |&slot: &u32| ranks[splat_from_instance[slot as usize] as usize];
+    let sorted: Vec<u32> = slots.iter().map(rank).collect();
     assert!(ranges.iter().all(|&[a, b]| sorted[a as usize..b as usize].is_sorted()), "lists run front to back");
 
     let (longest, occupied) = tile_lengths(&ranges);

@@ -6,9 +6,11 @@ use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device::{Turn, options};
 use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::gpu::{Gpu, GpuOptions};
-use labelgs::pass::KernelShape;
-use labelgs::scheduler::plan::Buf;
-use labelgs::shaders::structs::StepUniforms;
+use labelgs::pass::{KernelShape, render_view};
+use labelgs::scheduler::plan::{Buf, Work};
+use labelgs::shaders::constants::ORDERED_LANES;
+use labelgs::shaders::structs::{Counters, StepUniforms};
+use labelgs::verify::selftest::order::DepthOrder;
 
 /// Invocations of a workgroup, and the most records that one of them sums.
 pub(super) const WALKERS: u32 = 64;
@@ -32,16 +34,21 @@ struct Walked {
 
 fn walk(options: &GpuOptions, group_walks: bool) -> Option<Walked> {
     let turn = Turn::with(Gpu::new(options).ok()?);
-    let shape = KernelShape { group_walks, ..KernelShape::of(turn.capabilities()) };
+    let shape = KernelShape { sweep_items: 0, group_walks, ..KernelShape::of(turn.capabilities()) };
     // Keys are counted for sorts that look back, as on a card, and are not.
-    let shape = if shape.subgroup > 8 { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
+    let sweeps = group_walks && shape.subgroup > 8;
+    let shape = if sweeps { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
     let mut fixture = Fixture::with_shape(turn, tall_scene(), true, shape);
     let counters = fixture.train().counters;
     let (splats, pairs) = (counters.visible_count as usize, counters.instance_count as usize);
+    let order = DepthOrder::of(&mut fixture).expect("an order");
     let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats);
-    gathered(&mut fixture, &touched);
+    let touched: Vec<u32> = order.splats.iter().map(|&splat| touched[splat as usize]).collect();
+    gathered(&mut fixture, &order, &touched);
     let (keys, places) = fixture.sorted_pairs(pairs);
+    let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, splats);
     let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
+    let owners = owners.iter().map(|&splat| own[splat as usize]).collect();
     let rows = fixture.size().1.div_ceil(shape.tile_height as usize);
     Some(Walked { touched, keys, places, owners, rows })
 }
@@ -50,7 +57,7 @@ fn walk(options: &GpuOptions, group_walks: bool) -> Option<Walked> {
 const SUM: Tolerance = Tolerance { absolute: 9.4e-7, relative: 0.0 };
 
 /// Compares the sums of the records of each splat, and the statistic, with those in f64, relative to the magnitudes.
-fn gathered(fixture: &mut Fixture, touched: &[u32]) {
+fn gathered(fixture: &mut Fixture, order: &DepthOrder, touched: &[u32]) {
     let pairs = touched.iter().sum::<u32>() as usize;
     let records: Vec<[f32; 12]> = {
         let [a, b, c] =
@@ -58,7 +65,6 @@ fn gathered(fixture: &mut Fixture, touched: &[u32]) {
         (0..pairs).map(|i| [a[i], b[i], c[i]].concat().try_into().expect("three times four")).collect()
     };
     let uniforms = fixture.get::<StepUniforms>(Buf::STEP, 1)[0];
-    let order = fixture.get::<u32>(Buf::DEPTH_VALUES_A, touched.len());
     let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, fixture.scene.gaussians.len());
     let sums = fixture.get::<[f32; 12]>(Buf::V_SPLATS, touched.len());
     let labels = fixture.model().labels;
@@ -66,8 +72,8 @@ fn gathered(fixture: &mut Fixture, touched: &[u32]) {
     // `leave_out` leaves the largest record of the splats with many out.
     let compare = |leave_out: bool| {
         let (mut actual, mut expected, mut first) = (Vec::new(), Vec::new(), 0);
-        for (splat, &count) in touched.iter().enumerate() {
-            let gaussian = order[splat] as usize;
+        for (rank, &count) in touched.iter().enumerate() {
+            let (splat, gaussian) = (order.splats[rank] as usize, order.gaussians[rank] as usize);
             let scene = if has_layer(gaussian) { count / 2 } else { count } as usize;
             let current = |&(_, record): &(usize, &[f32; 12])| record[9].to_bits() == uniforms.stamp;
             let mut own: Vec<_> = records[first..][..count as usize].iter().enumerate().filter(current).collect();
@@ -112,5 +118,50 @@ fn a_workgroup_walks_splats_as_invocations_do() {
         let large = alone.touched.iter().filter(|&&count| count > WALKERS).count();
         assert!(large > 3 && large + 3 < alone.touched.len(), "{large} of {} are large", alone.touched.len());
         assert!(alone.rows > WALKERS as usize / 2, "{} rows of tiles", alone.rows);
+    }
+}
+
+/// Lists of splats and pairs over many partitions, where partition `held` tells nothing.
+fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32>) -> Option<[Vec<u32>; 5]> {
+    let turn = Turn::with(Gpu::new(options).ok()?);
+    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+    let shape = if looks_back { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
+    let mut fixture = Fixture::with_shape(turn, scene, false, shape);
+    fixture.render();
+    let mut list = render_view(&shape, fixture.engine.capacity(), 0, 0);
+    for work in &mut list.work {
+        let Work::Pass(pass) = work else { continue };
+        if let Some(place) = pass.shader.spec.iter().position(|constant| constant.name == "SWEEP_HELD") {
+            pass.spec[place] = held.map_or(0, |partition| partition + 1);
+        }
+    }
+    let id = fixture.engine.raw_mut().prepare(&list).expect("the list is planned");
+    fixture.engine.raw_mut().run(id, 0).expect("run");
+    fixture.engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
+    let counters = fixture.get::<Counters>(Buf::COUNTERS, 1)[0];
+    let order = DepthOrder::of(&mut fixture).expect("an order");
+    let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, counters.visible_count as usize);
+    let (keys, places) = fixture.sorted_pairs(counters.instance_count as usize);
+    let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, places.len());
+    let owners = places.iter().map(|&place| own[owners[place as usize] as usize]).collect();
+    Some([order.gaussians, order.keys, keys, places, owners])
+}
+
+#[test]
+fn splats_are_listed_and_numbered_wherever_a_partition_is_late() {
+    let many = || scene(78, &Shape { gaussians: 3000, scales: (0.1, 1.5), sh_degree: 0, ..Shape::default() });
+    let emulated = GpuOptions { subgroup_size: Some(32), emulate_subgroups: true, ..options() };
+    for options in [options(), emulated] {
+        let Some(expected) = listed(many(), &options, false, None) else { return };
+        let partitions = expected[0].len() / ORDERED_LANES as usize;
+        assert!(partitions > 10 && expected[2].len() > 5000, "{partitions} partitions, {} pairs", expected[2].len());
+        for held in [None, Some(0), Some(3), Some(9)] {
+            let found = listed(many(), &options, true, held).expect("a device");
+            for (what, (found, expected)) in
+                ["Gaussians", "depths", "tiles", "places", "owners"].iter().zip(found.iter().zip(&expected))
+            {
+                check(what, exact(found, expected));
+            }
+        }
     }
 }

@@ -51,10 +51,9 @@ fn lists() -> Vec<(Capacity, PassList)> {
             .with_group_blend_of(GroupBlend::DEFAULT)
     });
     let one_by_one: Vec<KernelShape> = own.into_iter().chain(emulated).chain(antialiased).chain(sweeping).collect();
-    let shared_out = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape });
-    let split: Vec<KernelShape> = one_by_one.iter().copied().chain(shared_out).collect();
-    let late = split.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
-    for shape in split.iter().copied().chain(late) {
+    let shared_out: Vec<_> = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape }).collect();
+    let late = shared_out.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
+    for shape in one_by_one.iter().chain(&shared_out).copied().chain(late) {
         for segments in [1, 3] {
             let mut capacity = capacity(&shape, &ROOM);
             capacity.segments = segments;

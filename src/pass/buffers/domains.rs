@@ -121,6 +121,8 @@ domains! {
         "Lanes of the scan.";
     SWEEP_CELLS sweep_cells: "sweep cells", cures::pairs,
         "Words of the passes that look back, or 0 where sort and scan do without.", optional;
+    LOOK_CELLS look_cells: "look cells", cures::model,
+        "Words of the passes that list splats, or 0 where they do not look back.", optional;
     LOSS_PARTIALS loss_partials: "loss partials", cures::image,
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,

@@ -1,5 +1,6 @@
 //! A scene on the device: runs the engine's own pass lists and reads all buffers back.
 
+use super::order::DepthOrder;
 use super::scenes::Scene;
 use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, SharedRow, TrainInput};
 use crate::error::{Error, Result};
@@ -226,14 +227,12 @@ impl Fixture {
         Ok((self.get(keys, count)?, self.get(values, count)?))
     }
 
-    /// The splats of the sorted (splat, tile) pairs.
+    /// The splats of the sorted (splat, tile) pairs, by their place in the order of depth.
     pub fn sorted_splats(&mut self, count: usize) -> Result<Vec<u32>> {
         let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count)?;
-        let places = self.sorted_pairs(count)?.1;
-        Ok(places
-            .into_iter()
-            .map(|place| splat_from_instance.get(place as usize).copied().unwrap_or(u32::MAX))
-            .collect())
+        let (places, ranks) = (self.sorted_pairs(count)?.1, DepthOrder::of(self)?.ranks());
+        let rank = |place: u32| ranks.get(*splat_from_instance.get(place as usize)? as usize).copied();
+        Ok(places.into_iter().map(|place| rank(place).unwrap_or(u32::MAX)).collect())
     }
 
     /// Runs a training step; no pass may write outside of its buffers.
@@ -286,22 +285,23 @@ impl Fixture {
         self.size().0 * self.size().1
     }
 
-    /// Splats of the device, in its order.
+    /// Splats of the device, by depth.
     pub fn splats(&mut self) -> Result<Vec<Splat>> {
-        let visible = self.engine.report(0)?.counters.visible_count as usize;
-        let order = self.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
-        let records = self.get::<[f32; 12]>(Buf::SPLATS, visible)?;
+        let order = DepthOrder::of(self)?;
+        let records = self.get::<[f32; 12]>(Buf::SPLATS, order.splats.len())?;
         // The mirrors look these Gaussians up.
         let count = self.scene.gaussians.len();
-        if let Some(wrong) = order.iter().find(|&&gaussian| gaussian as usize >= count) {
+        if let Some(wrong) = order.gaussians.iter().find(|&&gaussian| gaussian as usize >= count) {
             return Err(Error::Check(format!("the device sorts {count} Gaussians and lists number {wrong}")));
         }
-        Ok(order.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect())
+        let records = order.sorted(&records);
+        Ok(order.gaussians.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect())
     }
 
-    /// Gradients of the splats.
+    /// Gradients of the splats, by depth.
     pub fn splat_gradients(&mut self, splats: &[Splat]) -> Result<Vec<SplatGradient>> {
         let records = self.get::<[f32; 12]>(Buf::V_SPLATS, splats.len())?;
+        let records = DepthOrder::of(self)?.sorted(&records);
         let wide = |record: &[f32; 12]| record.map(f64::from);
         let gradients = (records.iter().map(wide).zip(splats))
             .map(|(v, splat)| SplatGradient {
@@ -315,7 +315,7 @@ impl Fixture {
         Ok(gradients)
     }
 
-    /// `count` rows of a set of planes (parameters, moments or gradients).
+    /// `count` rows of a set of planes: parameters or moments by Gaussian, or gradients of splats by depth.
     pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Result<Vec<Row>> {
         let mut floats = vec![[0.0; ROW_FLOATS]; count];
         // Bands of colour above the degree have no plane.
@@ -327,6 +327,9 @@ impl Fixture {
                     (0..length).for_each(|i| row[to + i] = f64::from(values[from + i]));
                 }
             }
+        }
+        if planes == GRADIENTS {
+            floats = DepthOrder::of(self)?.sorted(&floats);
         }
         Ok(floats.iter().map(Row::from_floats).collect())
     }

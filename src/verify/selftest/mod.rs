@@ -7,6 +7,7 @@ mod exposure;
 pub mod fixture;
 pub mod judge;
 pub mod model;
+pub mod order;
 mod pose;
 pub mod relocation;
 pub mod scenes;

@@ -119,6 +119,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         sort_cells: 64 * 256,
         sort_totals: 8 * 256,
         sweep_cells: 0,
+        look_cells: 0,
         loss_partials: 1024,
         sort_lanes: 64,
         late_gaussians: 0,

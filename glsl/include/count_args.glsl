@@ -1,0 +1,39 @@
+// What follows from a number that was counted: its counter, and the sizes of dispatches, unless it does not fit. Step, counters and
+// dispatch_args are declared before.
+
+#include "dispatch.glsl"
+#include "partitions.glsl"
+
+void put_groups(uint at, uint count) {
+    uvec3 groups = folded_groups(count);
+    dispatch_args[at] = groups.x;
+    dispatch_args[at + 1u] = groups.y;
+}
+
+void put_visible(uint total) {
+    counters.visible_count = total;
+    put_groups(ARGS_SPLATS, (total + 63u) / 64u);
+    put_groups(ARGS_SWEEP_SPLATS, partitions(total));
+}
+
+// The need, even beyond capacity; then no pairs are written.
+void put_instances(uint total) {
+    counters.instance_count = total;
+    if (total > step.instance_capacity) {
+        counters.failure |= FAILED_INSTANCES;
+        dispatch_args[ARGS_SPLATS] = 0u;
+    }
+    put_groups(ARGS_SWEEP_INSTANCES, counters.failure != 0u ? 0u : partitions(total));
+}
+
+// All tiles of the scene, then the occupied tiles of object layers, given the longest list. Nothing after any failure: pairs that
+// were only counted have no lists, and the backward walk no chunks to find.
+void put_blend(uint layers, uint longest) {
+    counters.failure |= (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
+        | (longest > step.longest_list ? FAILED_SEGMENTS : 0u);
+    uint jobs = step.tile_count + layers;
+    put_groups(ARGS_BLEND, counters.failure != 0u ? 0u : jobs);
+    if (step.chunk_length > 0u) {
+        put_groups(ARGS_CHUNKS, counters.failure != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+    }
+}

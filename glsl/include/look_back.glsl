@@ -1,0 +1,105 @@
+// Sums over the partitions before this one, for passes of one dispatch with one word a partition. As in sweep.glsl, but all
+// invocations of a workgroup look back at once, each at another partition. The includer declares the buffer look_back, which is 0
+// before the step, and LOOK_LANES, its invocations.
+//
+// The buffer: a ticket for each of the two passes; the words of project_visible; those of emit_ordered.
+
+const uint LOOK_OWN = 1u << 30u;    // of the partition alone
+const uint LOOK_PREFIX = 2u << 30u; // of all partitions up to this one
+const uint LOOK_SUM = (1u << 30u) - 1u;
+const uint LOOK_SPINS = 16u;        // looks at a word that is not there yet
+
+// Gaussians of an invocation of project_visible, of `n` in all: few where there would not be enough workgroups.
+uint visible_items(uint n) {
+    return clamp(n >> 17u, VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST);
+}
+
+uint visible_partitions(uint n) {
+    uint own = VISIBLE_LANES * visible_items(n);
+    return (n + own - 1u) / own;
+}
+
+const uint LOOK_VISIBLE = 2u; // first word of project_visible
+
+uint look_ordered(uint n) { // first word of emit_ordered
+    return LOOK_VISIBLE + visible_partitions(n);
+}
+
+// Words in use in a step over `n` Gaussians.
+uint look_words(uint n) {
+    return look_ordered(n) + (n + ORDERED_LANES - 1u) / ORDERED_LANES;
+}
+
+#ifdef LOOK_LANES
+shared uint look_ticket, look_failed;
+shared uint look_nearest, look_missing, look_low, look_high;
+
+// What a partition has, by all its invocations; each pass has its own.
+uint look_recount(uint part);
+
+// The partition of this workgroup, taken from a ticket, and the failure word, equal for all of them.
+uint look_partition(uint ticket, uint failed, out bool has_failed) {
+    if (gl_LocalInvocationIndex == 0u) {
+        look_ticket = atomicAdd(look_back[ticket], 1u);
+        look_failed = failed;
+    }
+    barrier();
+    has_failed = look_failed != 0u;
+    return look_ticket;
+}
+
+// A sum that does not leave the bits of a word; the largest stands for all above.
+uint look_add(uint a, uint b) {
+    return min(a + b, LOOK_SUM);
+}
+
+// Tells what the partition has, and returns the sum over the partitions before. Called by all invocations of the workgroup, with
+// equal arguments.
+uint look_before(uint words, uint part, uint own) {
+    uint lane = gl_LocalInvocationIndex;
+    bool tells = lane == 0u && part + 1u != SWEEP_HELD;
+    if (tells) {
+        atomicExchange(look_back[words + part], (part == 0u ? LOOK_PREFIX : LOOK_OWN) | own);
+    }
+    uint sum = 0u, left = part, spins = 0u; // left: partitions that are not in the sum
+    while (left > 0u) {
+        if (lane == 0u) {
+            look_nearest = LOOK_LANES;
+            look_missing = LOOK_LANES;
+            look_low = 0u;
+            look_high = 0u;
+        }
+        barrier();
+        uint found = lane < left ? atomicOr(look_back[words + left - 1u - lane], 0u) : LOOK_OWN;
+        if (found <= LOOK_SUM) {
+            atomicMin(look_missing, lane);
+        } else if ((found & LOOK_PREFIX) != 0u) {
+            atomicMin(look_nearest, lane);
+        }
+        barrier();
+        uint nearest = look_nearest, missing = look_missing;
+        bool ends = nearest < missing;
+        uint taken = min(ends ? nearest + 1u : missing, left);
+        if (lane < taken) {
+            // By halves: neither sum overflows.
+            atomicAdd(look_low, found & 0xffffu);
+            atomicAdd(look_high, (found & LOOK_SUM) >> 16u);
+        }
+        barrier();
+        uint high = look_high + (look_low >> 16u);
+        sum = look_add(sum, high >= 0x4000u ? LOOK_SUM : high << 16u | look_low & 0xffffu);
+        left = ends ? 0u : left - taken;
+        spins = taken > 0u ? 0u : spins + 1u;
+        barrier();
+        if (spins > LOOK_SPINS) {
+            sum = look_add(sum, look_recount(left - 1u));
+            left--;
+            spins = 0u;
+        }
+    }
+    if (tells && part > 0u) {
+        atomicExchange(look_back[words + part], LOOK_PREFIX | look_add(sum, own));
+    }
+    return sum;
+}
+#endif

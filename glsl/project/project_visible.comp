@@ -1,0 +1,227 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+#include "projection.glsl"
+#include "sh.glsl"
+#include "record.glsl"
+#include "ellipse.glsl"
+#include "cull.glsl"
+// project_visible — cull, and then project_forward, on cards: list, project and colour the visible Gaussians in the order of the
+//                   model, and count the tiles of each.
+// Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible ones are shared out again, so that
+//          no invocation waits for the others, and so are the rows of their tiles.
+// Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
+//          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits of z;
+//          splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_* (integer atomics) as
+//          cull and project_forward; look_back; variant sweep: sweep (histograms of the digits of the keys)
+// Math:    as cull and project_forward.
+// Order:   exact integers, equal in every run.
+// Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval
+
+layout(constant_id = 11) const uint SH_DEGREE = 3;
+layout(local_size_x = VISIBLE_LANES) in;
+READ1(0, StepUniforms, step);
+INOUT1(1, Counters, counters);
+FETCH4(3, means);
+FETCH4(4, scales);
+FETCH4(5, quats);
+FETCH4(6, sh0);
+FETCH4(7, sh1);
+FETCH4(8, sh2);
+FETCH4(9, sh3);
+WRITE(10, vec4, splats);
+WRITE(11, uint, tiles_touched);
+WRITE(12, uint, splat_from_gaussian);
+#ifdef LABELS
+FETCHU(13, labels);
+FETCHU(14, layer_from_label);
+#endif
+#ifdef LAZY
+FETCH4(15, m_means);
+FETCH4(16, m_scales);
+FETCH4(17, m_quats);
+FETCH4(18, m_sh0);
+FETCH4(19, m_sh1);
+FETCH4(20, m_sh2);
+FETCH4(21, m_sh3);
+FETCH4(22, u_means);
+FETCH4(23, u_scales);
+FETCH4(24, u_quats);
+FETCH4(25, u_sh0);
+FETCH4(26, u_sh1);
+FETCH4(27, u_sh2);
+FETCH4(28, u_sh3);
+FETCHU(29, touched_at);
+READ(30, uvec4, missed);
+#endif
+WRITE(31, uint, keys_out);
+WRITE(32, uint, gaussian_from_splat);
+INOUT(33, uint, look_back);
+WRITE(34, uint, dispatch_args);
+#ifdef SWEEP
+INOUT(35, uint, sweep);
+#include "digit_counts.glsl"
+#endif
+#define plane4(name, e) fetch4(name, e)
+#include "caught_up.glsl"
+#ifdef LAZY
+EACH_PLANE(CAUGHT_UP)
+#endif
+#include "splat.glsl"
+#include "count_args.glsl"
+#define WALKERS VISIBLE_LANES
+#include "rows.glsl"
+#define LOOK_LANES VISIBLE_LANES
+#include "look_back.glsl"
+
+const uint WORDS = VISIBLE_LANES * VISIBLE_ITEMS_MOST / 32u;
+shared uint is_visible[WORDS];     // a bit for each Gaussian of the partition
+shared uint visible_before[WORDS]; // visible ones in the words before
+shared uint tiles[WALKERS];
+
+uint key_of(StepUniforms u, uint i, out bool broken) {
+    look_up_trained(u, i);
+    vec4 mean = value4(means, i);
+    vec3 s = value4(scales, i).xyz;
+    broken = is_broken(mean, s);
+    return depth_key(u, mean, s);
+}
+
+// Sets is_visible and visible_before by a bit of each lane and item.
+uint count_visible(uint flags, uint items) {
+    uint lane = gl_LocalInvocationIndex;
+    for (uint w = lane; w < WORDS; w += VISIBLE_LANES) {
+        is_visible[w] = 0u;
+    }
+    barrier();
+    for (uint k = 0u; k < items; k++) {
+        uint at = k * VISIBLE_LANES + lane;
+        atomicOr(is_visible[at / 32u], (flags >> k & 1u) << (at & 31u));
+    }
+    barrier();
+    for (uint w = lane; w < WORDS; w += VISIBLE_LANES) {
+        uint sum = 0u;
+        for (uint before = 0u; before < w; before++) {
+            sum += bitCount(is_visible[before]);
+        }
+        visible_before[w] = sum;
+    }
+    barrier();
+    return visible_before[WORDS - 1u] + bitCount(is_visible[WORDS - 1u]);
+}
+
+uint look_recount(uint part) {
+    StepUniforms u = step;
+    uint items = visible_items(u.gaussian_count), flags = 0u;
+    for (uint k = 0u; k < items; k++) {
+        uint i = (part * items + k) * VISIBLE_LANES + gl_LocalInvocationIndex;
+        bool broken;
+        flags |= i < u.gaussian_count && key_of(u, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
+    }
+    uint own = count_visible(flags, items);
+    barrier();
+    return own;
+}
+
+// Place in the partition of its n-th visible Gaussian.
+uint nth_visible(uint n) {
+    uint word = 0u;
+    [[unroll]] for (uint jump = WORDS / 2u; jump > 0u; jump /= 2u) {
+        word += visible_before[word + jump] <= n ? jump : 0u;
+    }
+    uint bits = is_visible[word], left = n - visible_before[word], bit = 0u;
+    [[unroll]] for (uint width = 16u; width > 0u; width /= 2u) {
+        uint below = bitCount(bits & ((1u << width) - 1u));
+        bool is_above = left >= below;
+        left -= is_above ? below : 0u;
+        bits = is_above ? bits >> width : bits;
+        bit += is_above ? width : 0u;
+    }
+    return word * 32u + bit;
+}
+
+// Counts the tiles of the splat of this invocation, which may have no rows.
+uint count_tiles(StepUniforms u, Ellipse e) {
+    uint lane = gl_LocalInvocationIndex, unused;
+    tiles[lane] = 0u;
+    uint rows = share_rows(e, 0u, unused);
+    for (uint row = lane; row < rows; row += WALKERS) {
+        uint splat = entry_at(0u, row);
+        atomicAdd(tiles[splat], tiles_of_row(u, ellipse_of(splat), row - starts[splat]).y);
+    }
+    barrier();
+    return tiles[lane];
+}
+
+void main() {
+    StepUniforms u = step;
+    uint lane = gl_LocalInvocationIndex, n = u.gaussian_count, items = visible_items(n), flags = 0u;
+    bool has_failed;
+    uint part = look_partition(0u, counters.failure, has_failed), base = part * items * VISIBLE_LANES;
+    if (base >= n || has_failed) {
+        return;
+    }
+    uint keys[VISIBLE_ITEMS_MOST];
+    [[unroll]] for (uint k = 0u; k < VISIBLE_ITEMS_MOST; k++) {
+        uint i = base + k * VISIBLE_LANES + lane;
+        keys[k] = KEY_INVISIBLE;
+        if (k < items && i < n) {
+            bool broken;
+            keys[k] = key_of(u, i, broken);
+            if (broken) {
+                atomicAdd(counters.broken_count, 1u);
+                atomicMin(counters.broken_first, i);
+            }
+            if (keys[k] == KEY_INVISIBLE) {
+                splat_from_gaussian[i] = NO_SPLAT;
+            } else {
+                flags |= 1u << k;
+            }
+        }
+    }
+    uint own = count_visible(flags, items), first = look_before(LOOK_VISIBLE, part, own);
+    if (part == visible_partitions(n) - 1u && lane == 0u) {
+        put_visible(first + own);
+    }
+    // A partition that was counted instead of a late one has overwritten the bits.
+    count_visible(flags, items);
+#ifdef SWEEP
+    clear_bins(lane, VISIBLE_LANES);
+    barrier();
+#endif
+    [[unroll]] for (uint k = 0u; k < VISIBLE_ITEMS_MOST; k++) {
+        if ((flags >> k & 1u) != 0u) {
+            uint at = k * VISIBLE_LANES + lane;
+            uint s = first + visible_before[at / 32u] + bitCount(is_visible[at / 32u] & ((1u << (at & 31u)) - 1u));
+            keys_out[s] = keys[k];
+            gaussian_from_splat[s] = base + at;
+#ifdef SWEEP
+            count_digits(keys[k]);
+#endif
+        }
+    }
+#ifdef SWEEP
+    barrier();
+    add_bins(lane, VISIBLE_LANES);
+#endif
+    for (uint from = 0u; from < own; from += VISIBLE_LANES) {
+        uint r = from + lane, i = 0u;
+        Ellipse e;
+        e.rows = 0u;
+        if (r < own) {
+            i = base + nth_visible(r);
+            e = project_splat(u, first + r, i);
+        }
+        uint touched = count_tiles(u, e);
+        if (r < own) {
+#ifdef LABELS
+            touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
+#endif
+            tiles_touched[first + r] = touched;
+        }
+    }
+}

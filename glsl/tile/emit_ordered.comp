@@ -1,0 +1,148 @@
+#version 460
+#include "layout.glsl"
+#include "constants.glsl"
+#include "step.glsl"
+#include "dispatch.glsl"
+#include "gaussian.glsl"
+#include "record.glsl"
+#include "ellipse.glsl"
+// emit_ordered — emit_instances on cards: write one (tile key, splat) pair for every tile of a splat, in the order of depth.
+// Work:    64 splats per workgroup, in the order of depth, whose rows and tiles are shared out. A splat's instances are contiguous:
+//          first those of the scene layer, then those of its object layer; keys are layer * tile_count + tile.
+// Reads:   step; order [V] splats by depth; splats [V,3]; tiles_touched [V];
+//          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
+// Writes:  instance_offsets [V]; tile_keys [I]; splat_from_instance [I]; counters.instance_count, and what follows from it (count_args.glsl):
+//          dispatch_args; look_back; variant sweep: sweep (histograms of the digits of the keys)
+// Order:   exact integers, equal in every run. Pairs beyond the capacity are counted, not written.
+// Mirror:  src/reference/tile.rs::emit_instances, tile.rs::row_interval, scan.rs::exclusive_scan
+
+layout(local_size_x = ORDERED_LANES) in;
+READ1(0, StepUniforms, step);
+INOUT1(1, Counters, counters);
+FETCH4(3, splats);
+FETCHU(4, tiles_touched);
+WRITE(5, uint, instance_offsets);
+WRITE(6, uint, tile_keys);
+WRITE(7, uint, splat_from_instance);
+#ifdef LABELS
+FETCHU(8, gaussian_from_splat);
+FETCHU(9, labels);
+FETCHU(10, layer_from_label);
+#endif
+#ifdef SWEEP
+INOUT(11, uint, sweep);
+#include "digit_counts.glsl"
+#endif
+FETCHU(12, order);
+INOUT(13, uint, look_back);
+INOUT(14, uint, dispatch_args);
+#include "count_args.glsl"
+#define WALKERS ORDERED_LANES
+#include "rows.glsl"
+#define LOOK_LANES ORDERED_LANES
+#include "look_back.glsl"
+
+// Where the instances of a splat go.
+struct Target {
+    uint splat, layer;
+    uint first; // instance
+    uint count; // tiles
+};
+shared Target targets[WALKERS];
+shared uint tiles_before[WALKERS]; // of the splats before
+shared uvec2 row_tiles[WALKERS];   // of a row: first tile, splat
+
+uint touched(uint k) {
+    return k < counters.visible_count ? fetchu(tiles_touched, fetchu(order, k)) : 0u;
+}
+
+uint look_recount(uint part) {
+    uvec2 all;
+    sums_before(uvec2(touched(part * ORDERED_LANES + gl_LocalInvocationIndex), 0u), all);
+    return min(all.x, LOOK_SUM);
+}
+
+void put(uint at, uint key, uint splat) {
+    tile_keys[at] = key;
+    splat_from_instance[at] = splat;
+#ifdef SWEEP
+    count_digits(key);
+#endif
+}
+
+// Writes the instances of a splat's n-th tile.
+void put_tile(StepUniforms u, Target t, uint n, uint tile) {
+    if (n < t.count) {
+        put(t.first + n, tile, t.splat);
+#ifdef LABELS
+        if (t.layer != 0u) {
+            put(t.first + t.count + n, t.layer * u.tile_count + tile, t.splat);
+        }
+#endif
+    }
+}
+
+// Rows of tiles by invocation, 64 at a time; then their tiles by invocation, so that neighbours write to neighbouring places.
+void emit(StepUniforms u, Target t, Ellipse e) {
+    uint lane = gl_LocalInvocationIndex, written = 0u;
+    targets[lane] = t;
+    uint rows = share_rows(e, t.count, tiles_before[lane]);
+    for (uint from = 0u; from < rows; from += WALKERS) {
+        uint row = from + lane, splat = entry_at(0u, row);
+        Ellipse shared_out = ellipse_of(splat);
+        uvec2 tiles = row < rows ? tiles_of_row(u, shared_out, row - starts[splat]) : uvec2(0u), all;
+        uint before = sums_before(uvec2(tiles.y, 0u), all).x;
+        starts[WALKERS + lane] = before;
+        row_tiles[lane] = uvec2((shared_out.y_min + row - starts[splat]) * u.tiles_x + tiles.x, splat);
+        barrier();
+        for (uint k = lane; k < all.x; k += WALKERS) {
+            uint r = entry_at(1u, k);
+            splat = row_tiles[r].y;
+            put_tile(u, targets[splat], written + k - tiles_before[splat], row_tiles[r].x + k - starts[WALKERS + r]);
+        }
+        written += all.x;
+    }
+}
+
+void main() {
+    StepUniforms u = step;
+    uint lane = gl_LocalInvocationIndex, visible = counters.visible_count;
+    bool has_failed;
+    uint part = look_partition(1u, counters.failure, has_failed), k = part * ORDERED_LANES + lane;
+    if (part * ORDERED_LANES >= visible || has_failed) {
+        return;
+    }
+    uvec2 all, before = sums_before(uvec2(touched(k), 0u), all);
+    uint own = min(all.x, LOOK_SUM), first = look_before(look_ordered(u.gaussian_count), part, own);
+    if (part == (visible - 1u) / ORDERED_LANES && lane == 0u) {
+        uint total = look_add(first, own);
+        put_instances(total == LOOK_SUM ? 0xffffffffu : total);
+    }
+#ifdef SWEEP
+    clear_bins(lane, ORDERED_LANES);
+    barrier();
+#endif
+    Target t = Target(0u, 0u, first + before.x, 0u);
+    Ellipse e;
+    e.rows = 0u;
+    if (k < visible) {
+        t.splat = fetchu(order, k);
+        instance_offsets[t.splat] = t.first;
+    }
+    if (k < visible && first + own <= u.instance_capacity) {
+        uint s = t.splat;
+#ifdef LABELS
+        t.layer = fetchu(layer_from_label, fetchu(labels, fetchu(gaussian_from_splat, s)));
+#endif
+        t.count = touched(k) / (t.layer != 0u ? 2u : 1u);
+        if (t.count > 0u) {
+            vec4 r0 = fetch4(splats, 3u * s), r1 = fetch4(splats, 3u * s + 1u), r2 = fetch4(splats, 3u * s + 2u);
+            e = ellipse(u, r0.xy, r2.zw, vec3(r0.zw, r1.x), r1.y);
+        }
+    }
+    emit(u, t, e);
+#ifdef SWEEP
+    barrier();
+    add_bins(lane, ORDERED_LANES);
+#endif
+}

@@ -1,0 +1,45 @@
+//! The splats of a view in the order of depth, whichever order numbers them.
+
+use super::fixture::Fixture;
+use crate::error::{Error, Result};
+use crate::scheduler::plan::Buf;
+
+/// The splats of a view, by depth.
+#[derive(Clone, Debug)]
+pub struct DepthOrder {
+    /// Number of each splat.
+    pub splats: Vec<u32>,
+    /// Its Gaussian.
+    pub gaussians: Vec<u32>,
+    /// Bits of its depth.
+    pub keys: Vec<u32>,
+}
+
+impl DepthOrder {
+    /// Reads the order after a step.
+    pub fn of(fixture: &mut Fixture) -> Result<Self> {
+        let visible = fixture.engine.report(0)?.counters.visible_count as usize;
+        let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
+        let splats = if fixture.engine.shape().group_walks {
+            fixture.get::<u32>(Buf::DEPTH_ORDER, visible)?
+        } else {
+            (0..visible as u32).collect()
+        };
+        let gaussian = |&splat: &u32| own.get(splat as usize).copied();
+        let gaussians: Option<Vec<u32>> = splats.iter().map(gaussian).collect();
+        let gaussians = gaussians.ok_or_else(|| Error::Check(format!("the order of {visible} splats names others")))?;
+        Ok(Self { splats, gaussians, keys: fixture.get(Buf::DEPTH_KEYS_A, visible)? })
+    }
+
+    /// What each splat has, by depth.
+    pub fn sorted<T: Copy>(&self, of: &[T]) -> Vec<T> {
+        self.splats.iter().map(|&splat| of[splat as usize]).collect()
+    }
+
+    /// Place of each splat in the order.
+    pub fn ranks(&self) -> Vec<u32> {
+        let mut ranks = vec![0; self.splats.len()];
+        (0..).zip(&self.splats).for_each(|(rank, &splat)| ranks[splat as usize] = rank);
+        ranks
+    }
+}
