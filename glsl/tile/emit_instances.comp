@@ -6,12 +6,13 @@
 #include "gaussian.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
+#include "sort_key.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile of a splat.
 // Work:    64 splats per workgroup. A splat's instances are contiguous: first those of the scene layer, then
 //          those of its object layer; keys are layer * tile_count + tile. Variant group: rows and tiles are shared out.
 // Reads:   step, counters, failure; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
-// Writes:  tile_keys [I]; splat_from_instance [I]; variant sweep: sweep (histograms of the digits of the keys)
+// Writes:  tile_keys [I] (variant narrow: of 16 bits); splat_from_instance [I]; variant sweep: sweep (histograms of the digits of the keys)
 // Mirror:  src/reference/tile.rs::emit_instances, tile.rs::row_interval
 
 layout(local_size_x = 64) in;
@@ -21,7 +22,7 @@ READ1(2, uint, failure);
 FETCH4(3, splats);
 FETCHU(4, tiles_touched);
 FETCHU(5, instance_offsets);
-WRITE(6, uint, tile_keys);
+WRITE(6, KEY, tile_keys);
 WRITE(7, uint, splat_from_instance);
 #ifdef LABELS
 FETCHU(8, gaussian_from_splat);
@@ -45,7 +46,7 @@ struct Target {
 };
 
 void put(uint at, uint key, uint splat) {
-    tile_keys[at] = key;
+    tile_keys[at] = KEY(key);
     splat_from_instance[at] = splat;
 #ifdef SWEEP
     count_digits(key);

@@ -24,6 +24,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
+        narrow: false,
     };
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
     if b.shape.sweeps() {

@@ -14,25 +14,29 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
     let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
-    pass!(b, emit_instances(labels: b.supervision.has_layers(), group: b.shape.group_walks, sweep: sweep) {
+    let (labels, narrow) = (b.supervision.has_layers(), b.shape.has_narrow_keys(b.capacity.virtual_tiles));
+    pass!(b, emit_instances(labels: labels, group: b.shape.group_walks, sweep: sweep, narrow: narrow) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
         tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, sweep: Buf::SWEEP,
     } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
-    let buffers =
-        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+    let buffers = SortBuffers {
+        keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+        values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+        narrow,
+    };
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
-    tile_ranges(b, keys);
+    tile_ranges(b, keys, if narrow { 2 } else { 1 });
     pairs
 }
 
-fn tile_ranges(b: &mut Builder, keys: Buf) {
+fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
     let groups = args(constants::ARGS_TILES);
     pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
-    } [], groups);
+    } [keys_per_word: keys_per_word], groups);
     if !b.supervision.has_layers() {
         pass!(b, prepare_blend {
             step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,

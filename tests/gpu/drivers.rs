@@ -57,20 +57,45 @@ fn the_selftest_passes_on_other_drivers() {
     }
 }
 
-/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either; and walks of
-/// workgroups give the same bits again.
+/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either, with keys of 16
+/// bits or without; and walks of workgroups give the same bits again.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn sorts_that_look_back_change_no_bit() {
     for driver in [Vec::new()].into_iter().chain(swiftshader()) {
-        let model = |sort: &str| {
-            let place = Place::on(
-                [&driver[..], &[("LABELGS_SORT", sort.to_owned()), ("LABELGS_WALK", "group".into())]].concat(),
-            );
+        let model = |sort: &str, keys: &str| {
+            let forms = [("LABELGS_SORT", sort), ("LABELGS_KEYS", keys), ("LABELGS_WALK", "group")];
+            let place = Place::on([&driver[..], &forms.map(|(variable, form)| (variable, form.to_owned()))].concat());
             succeeded(&place.trained("out", &["--iterations", "3", "--set", "label_from=1"]));
             place.model("out", 3)
         };
-        assert!(model("sweep") == model("lanes"), "{driver:?}");
+        let lanes = model("lanes", "narrow");
+        assert!(model("sweep", "wide") == lanes, "{driver:?}");
+        assert!(model("sweep", "narrow") == lanes, "{driver:?}, narrow keys");
+    }
+}
+
+/// Keys of 16 bits take half the words, unless there are too many tiles, or the device cannot store 16 bits, which is no error.
+#[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
+fn keys_are_wide_where_16_bits_do_not_do() {
+    let words = |driver: &[(&'static str, String)], size: &str| {
+        let forms =
+            [("LABELGS_SORT", "sweep"), ("LABELGS_KEYS", "narrow")].map(|(variable, form)| (variable, form.into()));
+        let place = Place::on([driver, &forms].concat());
+        let plan = succeeded_output(&place.labelgs(&["plan", "--gaussians", "101", "--size", size, "--json"]));
+        let plan: serde_json::Value = serde_json::from_slice(&plan).expect("JSON");
+        let buffers = plan["memory"]["buffers"].as_array().expect("buffers");
+        let keys = buffers.iter().find(|buffer| buffer["name"] == "tile_keys_a").expect("keys");
+        (keys["elements"].as_u64(), plan["instances"].as_u64().expect("a number"))
+    };
+    let hidden = [("LABELGS_HIDE", "narrow_storage".to_owned())];
+    let Some(stores) = device().map(|turn| turn.capabilities().has_narrow_storage()) else { return };
+    let (keys, pairs) = words(&[], "64x48");
+    assert_eq!(keys, Some(if stores { pairs.div_ceil(2) } else { pairs }));
+    for (driver, size) in [(&hidden[..], "64x48"), (&[], "2048x2048")] {
+        let (keys, pairs) = words(driver, size);
+        assert_eq!(keys, Some(pairs), "{driver:?}, {size}");
     }
 }
 

@@ -4,9 +4,10 @@ use super::orders::{counters, get};
 use crate::reference::scan::exclusive_scan;
 use crate::reference::sort::radix_sort;
 use crate::support::compare::{check, exact};
-use crate::support::device::{Turn, options};
+use crate::support::device::{Turn, device, options};
 use crate::support::scenes::generator;
 use bytemuck::Zeroable;
+use labelgs::engine::growth::capacity;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::pass::buffers::Capacity;
@@ -29,6 +30,13 @@ const ITEMS: u32 = 4;
 const MOST: usize = 6 * (SWEEP_LANES * ITEMS) as usize + 77;
 /// Numbers of items around the borders of partitions.
 const COUNTS: [usize; 6] = [0, 1, 1023, 1024, 1025, MOST];
+
+/// Buffers of narrow keys.
+const TILES: SortBuffers = SortBuffers {
+    keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+    values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+    narrow: true,
+};
 
 /// Opens a device with subgroups of each size, through shared memory, and calls `test` with its engine.
 fn each_size(items: usize, mut test: impl FnMut(&mut Engine)) {
@@ -152,14 +160,9 @@ fn occupied_tiles_are_listed_and_counted() {
 
 #[test]
 fn visible_keys_are_listed_and_sorted() {
-    let buffers = SortBuffers {
-        keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
-        values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
-    };
+    let (keys_out, values_out) = (Buf::DEPTH_KEYS_A, Buf::DEPTH_VALUES_A);
     each_size(MOST, |engine| {
-        let id = list(engine, Some(2), |b| {
-            scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (buffers.keys[0], buffers.values[0]));
-        });
+        let id = list(engine, Some(2), |b| scan::compact_by_sweep(b, Buf::DEPTH_KEYS, (keys_out, values_out)));
         let mut random = generator(72);
         for count in COUNTS {
             let key =
@@ -171,8 +174,8 @@ fn visible_keys_are_listed_and_sorted() {
             let visible: Vec<u32> = (0..count as u32).filter(|&i| keys[i as usize] != KEY_INVISIBLE).collect();
             let of: Vec<u32> = visible.iter().map(|&i| keys[i as usize]).collect();
             assert_eq!(counters(engine).visible_count as usize, if count == 0 { 0 } else { visible.len() });
-            check("values", exact(&get(engine, buffers.values[0], visible.len()), &visible));
-            check("keys", exact(&get(engine, buffers.keys[0], visible.len()), &of));
+            check("values", exact(&get(engine, values_out, visible.len()), &visible));
+            check("keys", exact(&get(engine, keys_out, visible.len()), &of));
             let words = get(engine, Buf::SWEEP, (SWEEP_HISTOGRAMS + 8 * SWEEP_DIGITS) as usize);
             let bits = engine.shape().digit_bits;
             for pass in 0..32 / bits {
@@ -191,34 +194,88 @@ fn a_sort_is_exact_and_stable() {
     each_size(MOST, |engine| {
         for held in [None, Some(0), Some(5)] {
             let cases = [(MOST, u32::MAX), (MOST, 3), (MOST, 1), (1025, 300), (1, 9), (0, 1)];
-            sort_exactly(engine, held, &cases);
+            sort_exactly(engine, held, false, &cases);
         }
     });
 }
 
+/// Keys of 16 bits, in buffers that end with the last one: all of them, odd numbers, few different ones, the largest alone.
+#[test]
+fn a_sort_of_narrow_keys_is_exact_and_stable() {
+    if !device().is_some_and(|turn| turn.capabilities().has_narrow_storage()) {
+        return;
+    }
+    each_size(MOST, |engine| {
+        let room = Capacity { instances: MOST as u64, key_words: MOST.div_ceil(2) as u64, ..*engine.capacity() };
+        engine.set_capacity(room).expect("room");
+        for held in [None, Some(0), Some(5)] {
+            let cases = [(MOST, 1 << 16), (MOST, 3), (MOST - 1, 1), (1025, 300), (1, 9), (1, 1), (0, 1)];
+            sort_exactly(engine, held, true, &cases);
+        }
+    });
+}
+
+#[test]
+fn keys_are_narrow_where_16_bits_number_all_tiles() {
+    let card = KernelShape { narrow_keys: true, ..KernelShape::new(32, false) };
+    let sweeps = card.with_sweeps_of(16);
+    assert!([1, 65_535, 65_536].iter().all(|&tiles| sweeps.has_narrow_keys(tiles)));
+    assert!(!sweeps.has_narrow_keys(65_537) && !card.has_narrow_keys(1));
+    assert!(!KernelShape { narrow_keys: false, ..sweeps }.has_narrow_keys(1));
+    // 16 x 8 px each.
+    for (height, narrow) in [(2048, true), (2056, false)] {
+        let capacity = capacity(&sweeps, &EngineSize::new(999_999, (4096, height)));
+        assert_eq!((capacity.virtual_tiles <= 65_536, capacity.instances), (narrow, 5_999_994), "{height}");
+        assert_eq!(capacity.key_words, if narrow { 2_999_997 } else { 5_999_994 }, "{height}");
+    }
+}
+
+fn put_keys(engine: &mut Engine, buffer: Buf, keys: &[u32], narrow: bool) {
+    if !narrow {
+        return engine.raw_mut().upload(buffer, 0, 0, keys).expect("upload");
+    }
+    let mut halves: Vec<u16> = keys.iter().map(|&key| u16::try_from(key).expect("16 bits")).collect();
+    halves.resize(halves.len().next_multiple_of(2), 0x5a5a);
+    engine.raw_mut().upload(buffer, 0, 0, &halves).expect("upload");
+}
+
+fn get_keys(engine: &mut Engine, buffer: Buf, count: usize, narrow: bool) -> Vec<u32> {
+    if !narrow {
+        return get(engine, buffer, count);
+    }
+    let halves = engine.raw_mut().download::<u16>(buffer, 0, 0, count.next_multiple_of(2)).expect("download");
+    halves.into_iter().take(count).map(u32::from).collect()
+}
+
 /// Sorts keys and compares. Cases are (number of keys, number of distinct keys); the first one is sorted in ascending order too.
-fn sort_exactly(engine: &mut Engine, held: Option<u32>, cases: &[(usize, u32)]) {
-    let buffers = SortBuffers {
+/// Narrow keys are the largest ones.
+fn sort_exactly(engine: &mut Engine, held: Option<u32>, narrow: bool, cases: &[(usize, u32)]) {
+    let depths = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+        narrow,
     };
+    let (buffers, bits, count) = if narrow { (TILES, 16, Count::Instances) } else { (depths, 32, Count::Splats) };
     let mut found = None;
-    let id = list(engine, held, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, "by depth", false)));
+    let id = list(engine, held, |b| found = Some(sort::sort(b, buffers, bits, count, "by key", false)));
     let (keys_out, values_out) = found.expect("the sort was declared");
     let mut random = generator(73);
     for (case, &(count, different)) in cases.iter().enumerate() {
         let mut keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
+        if narrow {
+            keys.iter_mut().for_each(|key| *key = u32::from(u16::MAX) - *key);
+        }
         if case == 0 {
             keys.sort_unstable();
         }
         let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
         announce(engine, count, &keys);
-        engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        put_keys(engine, buffers.keys[0], &keys, narrow);
         engine.raw_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
         run(engine, id);
         let order = radix_sort(&keys);
         let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
-        check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
+        check("keys", exact(&get_keys(engine, keys_out, count, narrow), &by_order(&keys)));
         let found = get(engine, values_out, count);
         check("values", exact(&found, &by_order(&values)));
         // A sort that turns equal keys around is seen.
@@ -241,10 +298,11 @@ fn ten_million_keys_are_sorted() {
     let size = EngineSize::new(1, (64, 64));
     let mut engine =
         Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");
-    let room = Capacity { instances: KEYS as u64, sweep_cells: shape.sweep_cells(KEYS as u64), ..*engine.capacity() };
+    let keys = KEYS as u64;
+    let room =
+        Capacity { instances: keys, key_words: keys, sweep_cells: shape.sweep_cells(keys), ..*engine.capacity() };
     engine.set_capacity(room).expect("room");
-    let buffers =
-        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+    let buffers = SortBuffers { narrow: false, ..TILES };
     let mut found = None;
     let id = list(&mut engine, None, |b| found = Some(sort::sort(b, buffers, 13, Count::Instances, "by tile", true)));
     let (keys_out, values_out) = found.expect("the sort was declared");

@@ -9,6 +9,7 @@ use crate::reference::tile::{TileGrid, counted_tiles, row_interval, tile_lengths
 use crate::support::compare::{Summary, check, exact};
 use crate::support::device;
 use crate::support::scenes::{Shape, generator, scene, uniform};
+use labelgs::pass::KernelShape;
 use labelgs::scheduler::plan::Buf;
 
 /// Log2 units that the device may err on the side of one tile too many: 0.01, 2e-6 of the exponent's terms, and 0.001 px.
@@ -58,6 +59,37 @@ fn tile_lists_equal_their_mirror() {
         Ok(Summary::default())
     });
     lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance);
+}
+
+/// Keys of 16 bits number 65,536 tiles of all layers; more have wide ones.
+#[test]
+fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
+    for (layers, narrow) in [(63, true), (64, false)] {
+        let Some(turn) = device().filter(|turn| turn.capabilities().has_narrow_storage()) else { return };
+        let own = KernelShape { narrow_keys: true, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(4);
+        let (width, height) = (32 * own.tile_width, 32 * own.tile_height);
+        let size = Shape {
+            gaussians: 40,
+            scales: (0.01, 0.05),
+            width,
+            height,
+            objects: layers,
+            sh_degree: 0,
+            ..Shape::default()
+        };
+        let mut scene = scene(84, &size);
+        // In every tile of the last layer.
+        scene.gaussians.scales[0] = [1.5; 3];
+        scene.gaussians.labels.as_mut().expect("labels")[0] = layers;
+        let mut fixture = Fixture::with_shape(turn, scene, true, own);
+        let pairs = fixture.train().counters.instance_count as usize;
+        let tiles = fixture.engine.capacity().virtual_tiles;
+        assert_eq!((tiles, own.has_narrow_keys(tiles)), (1024 * (u64::from(layers) + 1), narrow));
+        let (keys, slots) = fixture.sorted_pairs(pairs);
+        assert_eq!(keys.last().map(|&key| u64::from(key)), Some(tiles - 1));
+        let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
+        lists(&mut fixture, &keys, &slots, &owners);
+    }
 }
 
 fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32]) {

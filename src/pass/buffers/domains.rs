@@ -85,6 +85,8 @@ domains! {
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     INSTANCES instances: "instances", cures::pairs,
         "(splat, tile) pairs.";
+    KEY_WORDS key_words: "instances", cures::pairs,
+        "Words of the keys of pairs: equal to Instances, or half of them where keys have 16 bits.";
     TRAINED_INSTANCES trained_instances: "trained instances", cures::pairs,
         "Pairs with a gradient record: equal to Instances, or 0 without training.";
     VIRTUAL_TILES virtual_tiles: "virtual tiles", cures::image,

@@ -223,7 +223,13 @@ impl Fixture {
         } else {
             (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
         };
-        Ok((self.get(keys, count)?, self.get(values, count)?))
+        let places = self.get(values, count)?;
+        if !self.engine.shape().has_narrow_keys(virtual_tiles) {
+            return Ok((self.get(keys, count)?, places));
+        }
+        // Whole words are read.
+        let narrow = self.get::<u16>(keys, count.next_multiple_of(2))?;
+        Ok((narrow.into_iter().take(count).map(u32::from).collect(), places))
     }
 
     /// The splats of the sorted (splat, tile) pairs.
