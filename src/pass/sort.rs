@@ -17,6 +17,12 @@ pub struct SortBuffers {
 }
 
 impl SortBuffers {
+    /// Keys and values after a sort by `bits` bits.
+    pub fn sorted(self, shape: &KernelShape, bits: u32) -> (Buf, Buf) {
+        let last = (passes(shape, bits) % 2) as usize;
+        (self.keys[last], self.values[last])
+    }
+
     /// Orders the pairs so that a sort by `bits` bits ends in the first pair of `self`; write its input to the first
     /// pair of the result.
     pub fn ending_in_first(self, shape: &KernelShape, bits: u32) -> Self {
@@ -75,6 +81,5 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
             pass.title = format!("{} {by}", pass.title);
         }
     }
-    let last = (passes % 2) as usize;
-    (buffers.keys[last], buffers.values[last])
+    buffers.sorted(b.shape, bits)
 }

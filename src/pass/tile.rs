@@ -4,28 +4,48 @@ use super::build::{Builder, Count, ONE, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
+use crate::pass::KernelShape;
+use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
+
+/// The sort of the (splat, tile) pairs of a list of passes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileSort {
+    /// Bits of the keys.
+    pub bits: u32,
+    /// The pairs before the sort are in the first buffers.
+    pub buffers: SortBuffers,
+}
+
+impl TileSort {
+    /// Sorts by the tiles of the scene, and those of object layers if the list has these. Without sweeps, digits for the
+    /// layers are there in any case.
+    pub(crate) fn new(shape: &KernelShape, capacity: &Capacity, layers: bool) -> Self {
+        let tiles = if layers || !shape.sweeps() { capacity.virtual_tiles } else { capacity.tiles() };
+        let buffers = SortBuffers {
+            keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+            values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+            narrow: shape.has_narrow_keys(tiles),
+        };
+        Self { bits: 64 - tiles.saturating_sub(1).leading_zeros(), buffers }
+    }
+}
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer with
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
-    let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
-    let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
-    let (labels, narrow) = (b.supervision.has_layers(), b.shape.has_narrow_keys(b.capacity.virtual_tiles));
+    let labels = b.supervision.has_layers();
+    let TileSort { bits, buffers } = TileSort::new(b.shape, b.capacity, labels);
+    let (sweep, narrow, sort_slot) = (b.shape.sweeps(), buffers.narrow, b.sweeps.sorts);
     pass!(b, emit_instances(labels: labels, group: b.shape.group_walks, sweep: sweep, narrow: narrow) {
         step: Buf::STEP, counters: Buf::COUNTERS, failure: Buf::FAILURE, splats: Buf::SPLATS,
-        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+        tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
         splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
         labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, sweep: Buf::SWEEP,
     } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
-    let buffers = SortBuffers {
-        keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
-        values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
-        narrow,
-    };
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys, if narrow { 2 } else { 1 });
     pairs

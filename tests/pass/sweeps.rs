@@ -8,13 +8,13 @@ use crate::support::device::{Turn, device, options};
 use crate::support::scenes::generator;
 use bytemuck::Zeroable;
 use labelgs::engine::growth::capacity;
-use labelgs::engine::{Engine, EngineSize};
+use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::pass::buffers::Capacity;
 use labelgs::pass::build::Count;
 use labelgs::pass::scan::Total;
 use labelgs::pass::sort::SortBuffers;
-use labelgs::pass::{Builder, KernelShape, scan, sort};
+use labelgs::pass::{Builder, GroupBlend, KernelShape, Supervision, Variant, render_view, scan, sort, training_step};
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
@@ -228,6 +228,30 @@ fn keys_are_narrow_where_16_bits_number_all_tiles() {
         assert_eq!((capacity.virtual_tiles <= 65_536, capacity.instances), (narrow, 5_999_994), "{height}");
         assert_eq!(capacity.key_words, if narrow { 2_999_997 } else { 5_999_994 }, "{height}");
     }
+}
+
+/// Lists without object layers are sorted by the tiles of the scene, however many layers others have.
+#[test]
+fn lists_without_layers_sort_fewer_digits() {
+    let shape = KernelShape { narrow_keys: true, ..KernelShape::new(32, false) }.with_sweeps_of(16);
+    let shape = shape.with_group_blend_of(GroupBlend::DEFAULT);
+    let labels = Some(LabelSize { max_label: 40, layers: 10, vote_columns: 9 });
+    let capacity = capacity(&shape, &EngineSize::new(1000, (1600, 1064)).for_training().with_labels(labels));
+    assert_eq!((capacity.tiles(), capacity.virtual_tiles), (6700, 73_700));
+    let step = |supervision| {
+        let variant = Variant { supervision, ..Variant::plain((1600, 1064)) };
+        training_step(&shape, &capacity, variant)
+    };
+    let sorts = |list: PassList| -> Vec<&str> {
+        let by_tile = list.work.iter().filter_map(|work| match work {
+            Work::Pass(pass) if pass.title.ends_with(" by tile") => Some(pass.shader.name),
+            _ => None,
+        });
+        by_tile.collect()
+    };
+    assert_eq!(sorts(step(Supervision::Layers { lift: false })), ["radix_sweep"; 3]);
+    assert_eq!(sorts(step(Supervision::Disagreement)), ["radix_sweep_narrow"; 2]);
+    assert_eq!(sorts(render_view(&shape, &capacity, 3, 1)), ["radix_sweep_narrow"; 2]);
 }
 
 fn put_keys(engine: &mut Engine, buffer: Buf, keys: &[u32], narrow: bool) {

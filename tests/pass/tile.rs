@@ -61,7 +61,7 @@ fn tile_lists_equal_their_mirror() {
     lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance);
 }
 
-/// Keys of 16 bits number 65,536 tiles of all layers; more have wide ones.
+/// Keys of 16 bits number 65,536 tiles of all layers; more have wide ones, and narrow ones again without the layers.
 #[test]
 fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
     for (layers, narrow) in [(63, true), (64, false)] {
@@ -89,6 +89,14 @@ fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
         assert_eq!(keys.last().map(|&key| u64::from(key)), Some(tiles - 1));
         let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
         lists(&mut fixture, &keys, &slots, &owners);
+        let splats = fixture.sorted_splats(pairs);
+        let of_scene = keys.iter().zip(&splats).filter(|(key, _)| **key < 1024);
+        let (keys, splats): (Vec<u32>, Vec<u32>) = of_scene.map(|(key, splat)| (*key, *splat)).unzip();
+        assert_eq!(fixture.render().counters.instance_count as usize, keys.len());
+        check("keys of the scene", exact(&fixture.sorted_pairs(keys.len()).0, &keys));
+        check("splats of the scene", exact(&fixture.sorted_splats(keys.len()), &splats));
+        let starts: Vec<u32> = tile_ranges(&keys, 1024).iter().map(|range| range[0]).collect();
+        check("tile_starts", exact(&fixture.get::<u32>(Buf::TILE_STARTS, 1024), &starts));
     }
 }
 

@@ -144,6 +144,11 @@ domains! {
 }
 
 impl Capacity {
+    /// Tiles of the scene, without those of object layers.
+    pub fn tiles(&self) -> u64 {
+        self.virtual_tiles / self.layers.max(1)
+    }
+
     /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, on a card twice, because
     /// growth costs it more steps; and at least 1.1 times `needed`, so that slow growth does not overflow at every step.
     pub fn grown(current: u64, needed: u64, on_card: bool) -> u64 {
