@@ -205,8 +205,9 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         // The kernels of a card, but for the smallest size.
         let short = GroupBlend { chunk_length: 32, ..GroupBlend::DEFAULT };
         let loss_tile = if size > 32 { 8 } else { 16 };
+        let narrow_keys = turn.capabilities().has_narrow_storage();
         let shape = if size > 4 {
-            KernelShape { loss_tile, narrow_labels: true, group_walks: true, ..shape }.with_sweeps_of(4)
+            KernelShape { loss_tile, narrow_labels: true, narrow_keys, group_walks: true, ..shape }.with_sweeps_of(4)
         } else {
             shape
         };
