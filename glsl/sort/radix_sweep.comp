@@ -3,9 +3,10 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "count.glsl"
+#include "sort_key.glsl"
 // radix_sweep — move keys and values to their sorted positions for one digit, in one dispatch; stable.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS pairs per workgroup. Subgroups rank their keys by ballots; the pairs of
-//          each digit leave together, through shared memory.
+//          each digit leave together, through shared memory. Variant narrow: keys of 16 bits.
 // Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the digit)
 // Writes:  keys_out [n], values_out [n]; sweep (words of this pass, and zeros in those of the next one)
 // Order:   exact integers, equal in every run: that of the radix_scatter passes.
@@ -18,10 +19,10 @@ layout(constant_id = 10) const uint IDENTITY = 0;
 layout(local_size_x = SWEEP_LANES) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
-READ(3, uint, keys_in);
+READ(3, KEY, keys_in);
 READ(4, uint, values_in);
 INOUT(5, uint, sweep);
-WRITE(6, uint, keys_out);
+WRITE(6, KEY, keys_out);
 WRITE(7, uint, values_out);
 #include "sweep.glsl"
 
@@ -47,7 +48,7 @@ void sweep_recount(uint part) {
     for (uint k = 0u; k < SWEEP_ITEMS; k++) {
         uint i = sweep_item(part, k);
         if (i < n) {
-            atomicAdd(sweep_found[digit_of(keys_in[i])], 1u);
+            atomicAdd(sweep_found[digit_of(uint(keys_in[i]))], 1u);
         }
     }
     barrier();
@@ -100,7 +101,7 @@ void main() {
     uint keys[SWEEP_ITEMS], place[SWEEP_ITEMS];
     [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {
         uint i = sweep_item(part, k);
-        keys[k] = keys_in[min(i, n - 1u)];
+        keys[k] = uint(keys_in[min(i, n - 1u)]);
         place[k] = rank(digit_of(keys[k]), i < n, table);
     }
     barrier();
@@ -137,7 +138,7 @@ void main() {
         if (i < count) {
             uint key = words[i];
             to[k] = moves[digit_of(key)] + i;
-            keys_out[to[k]] = key;
+            keys_out[to[k]] = KEY(key);
         }
     }
     barrier();

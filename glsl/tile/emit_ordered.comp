@@ -6,12 +6,13 @@
 #include "gaussian.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
+#include "sort_key.glsl"
 // emit_ordered — emit_instances on cards: write one (tile key, splat) pair for every tile of a splat, in the order of depth.
 // Work:    64 splats per workgroup, in the order of depth, whose rows and tiles are shared out. A splat's instances are contiguous:
 //          first those of the scene layer, then those of its object layer; keys are layer * tile_count + tile.
 // Reads:   step; order [V] splats by depth; splats [V,3]; tiles_touched [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
-// Writes:  instance_offsets [V]; tile_keys [I]; splat_from_instance [I]; counters.instance_count, and what follows from it (count_args.glsl):
+// Writes:  instance_offsets [V]; tile_keys [I] (variant narrow: of 16 bits); splat_from_instance [I]; counters.instance_count, and what follows from it (count_args.glsl):
 //          dispatch_args; look_back; variant sweep: sweep (histograms of the digits of the keys)
 // Order:   exact integers, equal in every run. Pairs beyond the capacity are counted, not written.
 // Mirror:  src/reference/tile.rs::emit_instances, tile.rs::row_interval, scan.rs::exclusive_scan
@@ -22,7 +23,7 @@ INOUT1(1, Counters, counters);
 FETCH4(3, splats);
 FETCHU(4, tiles_touched);
 WRITE(5, uint, instance_offsets);
-WRITE(6, uint, tile_keys);
+WRITE(6, KEY, tile_keys);
 WRITE(7, uint, splat_from_instance);
 #ifdef LABELS
 FETCHU(8, gaussian_from_splat);
@@ -63,7 +64,7 @@ uint look_recount(uint part) {
 }
 
 void put(uint at, uint key, uint splat) {
-    tile_keys[at] = key;
+    tile_keys[at] = KEY(key);
     splat_from_instance[at] = splat;
 #ifdef SWEEP
     count_digits(key);

@@ -8,12 +8,13 @@
 // labels) the occupied tiles of object layers.
 // Work:    one tile of one layer per invocation; the grid covers the step's layers. There are far fewer tiles than
 //          pairs, so a binary search per tile is cheaper than a test per pair.
-// Reads:   step, counters; tile_keys [I] sorted
+// Reads:   step, counters; tile_keys [I] sorted (KEYS_PER_WORD 2: of 16 bits)
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
 //          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
 //          workgroup (count_args.glsl): dispatch_args, counters.failure
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
+layout(constant_id = 23) const uint KEYS_PER_WORD = 1;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 INOUT1(2, Counters, counters);
@@ -27,12 +28,19 @@ INOUT(7, uint, dispatch_args);
 #include "count_args.glsl"
 #endif
 
-// The first pair with a key of at least `key`.
+uint key_at(uint i) {
+    if (KEYS_PER_WORD == 1u) {
+        return fetchu(tile_keys, i);
+    }
+    return (fetchu(tile_keys, i >> 1u) >> 16u * (i & 1u)) & 0xffffu;
+}
+
+// The first pair with a key of at least `key`, which may be one more than keys of 16 bits can be.
 uint first_not_less(uint key, uint count) {
     uint low = 0u, high = count;
     while (low < high) {
         uint middle = (low + high) / 2u;
-        bool less = fetchu(tile_keys, middle) < key;
+        bool less = key_at(middle) < key;
         low = less ? middle + 1u : low;
         high = less ? high : middle;
     }

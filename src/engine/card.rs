@@ -16,7 +16,8 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     // Cards bind far more buffers than is usual elsewhere.
     let limits = PlanLimits { max_storage_buffers: 1 << 20, ..limits };
     let own = KernelShape::new(32, false);
-    let shape = KernelShape { loss_tile: 16, narrow_labels: true, group_walks: true, update: Update::Lazy, ..own };
+    let shape = KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys: true, ..own };
+    let shape = KernelShape { group_walks: true, update: Update::Lazy, ..shape };
     (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.of_card())
 }
 

@@ -79,9 +79,10 @@ fn vote_columns(size: &EngineSize) -> u64 {
 /// Sets the capacities that follow from the numbers of instances and of layer tiles.
 fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained: bool) {
     capacity.instances = instances;
+    capacity.key_words = if shape.has_narrow_keys(capacity.virtual_tiles) { instances.div_ceil(2) } else { instances };
     capacity.trained_instances = if trained { instances } else { 0 };
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
-    let jobs = capacity.virtual_tiles / capacity.layers.max(1) + capacity.layer_tiles;
+    let jobs = capacity.tiles() + capacity.layer_tiles;
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
     let trained = |chunks: u64| if trained { chunks } else { 0 };
     capacity.chunks = trained(shape.chunks(instances, jobs));

@@ -138,6 +138,7 @@ pub(super) struct Features {
     pub(super) size_control: bool,
     pub(super) full_subgroups: bool,
     pub(super) statistics: bool,
+    pub(super) narrow_storage: bool,
 }
 
 /// Properties and features of a device.
@@ -175,6 +176,11 @@ impl Capabilities {
     /// True if the device is the host's processor.
     pub fn is_cpu(&self) -> bool {
         self.kind == DeviceKind::Cpu
+    }
+
+    /// True if shaders can load and store 16 bits.
+    pub fn has_narrow_storage(&self) -> bool {
+        self.features.narrow_storage
     }
 
     /// Sets the subgroups that the options ask for.

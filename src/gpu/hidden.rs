@@ -7,13 +7,14 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const NAMES: [&str; 9] = [
+const NAMES: [&str; 10] = [
     "memory_model",
     "scalar",
     "timeline",
     "robust",
     "size_control",
     "full_subgroups",
+    "narrow_storage",
     "shuffle",
     "timestamps",
     "transfer",
@@ -46,6 +47,7 @@ impl Hidden {
         features.robust &= !self.has("robust");
         features.size_control &= !self.has("size_control");
         features.full_subgroups &= !self.has("full_subgroups");
+        features.narrow_storage &= !self.has("narrow_storage");
     }
 
     pub(super) fn subgroup(&self, subgroup: &mut Subgroup) {

@@ -82,11 +82,12 @@ impl Capabilities {
 fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool, statistics: bool) -> Features {
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
+    let mut storage = vk::PhysicalDevice16BitStorageFeatures::default();
     // SAFETY: the handle belongs to this instance.
     let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
     let mut all = vk::PhysicalDeviceFeatures2::default();
     if version >= vk::API_VERSION_1_2 {
-        all = all.push_next(&mut twelve);
+        all = all.push_next(&mut twelve).push_next(&mut storage);
     }
     if size_control {
         all = all.push_next(&mut control);
@@ -103,6 +104,7 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
         size_control: on(control.subgroup_size_control),
         full_subgroups: on(control.compute_full_subgroups),
         statistics,
+        narrow_storage: on(storage.storage_buffer16_bit_access),
     }
 }
 

@@ -126,6 +126,7 @@ pub(super) fn open(
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default()
         .subgroup_size_control(features.size_control)
         .compute_full_subgroups(features.full_subgroups);
+    let mut storage = vk::PhysicalDevice16BitStorageFeatures::default().storage_buffer16_bit_access(true);
     let priorities = [1.0];
     let families = [capabilities.queue_family].into_iter().chain(capabilities.transfer_family);
     let queue = |family| vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities);
@@ -149,6 +150,9 @@ pub(super) fn open(
         .push_next(&mut twelve);
     if features.size_control {
         info = info.push_next(&mut control);
+    }
+    if features.narrow_storage {
+        info = info.push_next(&mut storage);
     }
     if options.statistics {
         info = info.push_next(&mut executables);

@@ -52,7 +52,10 @@ pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
     for shape in shapes.chain([emulated]) {
         let sweeping = shape.with_sweeps(gpu.capabilities()).filter(|_| !is_cpu);
         let shape = sweeping.unwrap_or(shape);
-        let of_shape = |shader: &&&'static ShaderDesc| shader.macros.contains(&"EMULATED") == shape.emulated;
+        let has_narrow = gpu.capabilities().has_narrow_storage();
+        let of_shape = |shader: &&&'static ShaderDesc| {
+            shader.macros.contains(&"EMULATED") == shape.emulated && (has_narrow || !shader.macros.contains(&"NARROW"))
+        };
         for shader in shaders::ALL.iter().filter(of_shape) {
             let by_groups = shader.spec.iter().any(|constant| constant.name == "GROUP_LANES");
             let shape = if by_groups { shape.with_group_blend_of(GroupBlend::DEFAULT) } else { shape };

@@ -19,7 +19,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::PROJECT;
     if b.shape.group_walks {
         let keys = [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B];
-        let buffers = SortBuffers { keys, values: [Buf::DEPTH_ORDER, Buf::DEPTH_VALUES_B] };
+        let buffers = SortBuffers { keys, values: [Buf::DEPTH_ORDER, Buf::DEPTH_VALUES_B], narrow: false };
         let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
         project_visible(b, buffers.keys[0]);
         sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", true);
@@ -32,6 +32,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
+        narrow: false,
     };
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
     scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);

@@ -26,6 +26,8 @@ pub struct KernelShape {
     pub digit_bits: u32,
     /// Items of an invocation in sorts and scans of one dispatch a pass, which look back; 0 with several dispatches a pass.
     pub sweep_items: u32,
+    /// Sorts of one dispatch a pass have keys of tiles of 16 bits, where all tiles of all layers have one.
+    pub narrow_keys: bool,
     /// Side of the tiles of the photo loss in one dispatch, px; 0 with a dispatch for each filter.
     pub loss_tile: u32,
     /// Pixels of a mask on the device have 16 bits.
@@ -82,6 +84,9 @@ pub enum Update {
 /// Largest id of a pixel of 16 bits, the highest of which is a flag.
 const NARROW_MAX: u32 = 0x7fff;
 
+/// Most tiles of all layers whose numbers have 16 bits.
+const NARROW_TILES: u64 = 1 << 16;
+
 /// Lavapipe ends all loops of an invocation after 65,535 rounds.
 const LOOP_ROUNDS: u32 = 65_000;
 
@@ -106,7 +111,8 @@ impl KernelShape {
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
         let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
-        let shape = Self { narrow_labels, group_walks, ..shape };
+        let narrow_keys = device.has_narrow_storage() && chosen("LABELGS_KEYS", ["wide", "narrow"]).unwrap_or(is_card);
+        let shape = Self { narrow_labels, group_walks, narrow_keys, ..shape };
         let has_groups = chosen("LABELGS_BLEND", ["lane", "group"]).unwrap_or(is_card && !shape.emulated);
         let shape = if has_groups { shape.with_group_blend(device).unwrap_or(shape) } else { shape };
         let update = match lab::var("LABELGS_UPDATE").as_deref() {
@@ -203,6 +209,11 @@ impl KernelShape {
         self.sweep_items > 0
     }
 
+    /// True if so many tiles of all layers have keys of 16 bits.
+    pub fn has_narrow_keys(&self, virtual_tiles: u64) -> bool {
+        self.narrow_keys && self.sweeps() && virtual_tiles <= NARROW_TILES
+    }
+
     /// Words of `Buf::SWEEP` for so many items.
     pub fn sweep_cells(&self, items: u64) -> u64 {
         if !self.sweeps() {
@@ -239,6 +250,7 @@ impl KernelShape {
             texel: cpu,
             digit_bits: if subgroup <= 16 { 8 } else { 4 },
             sweep_items: 0,
+            narrow_keys: false,
             loss_tile: 0,
             narrow_labels: false,
             group_walks: false,

@@ -12,14 +12,22 @@ pub struct SortBuffers {
     pub keys: [Buf; 2],
     /// Values.
     pub values: [Buf; 2],
+    /// Keys have 16 bits, not 32; in sorts that look back alone.
+    pub narrow: bool,
 }
 
 impl SortBuffers {
+    /// Keys and values after a sort by `bits` bits.
+    pub fn sorted(self, shape: &KernelShape, bits: u32) -> (Buf, Buf) {
+        let last = (passes(shape, bits) % 2) as usize;
+        (self.keys[last], self.values[last])
+    }
+
     /// Orders the pairs so that a sort by `bits` bits ends in the first pair of `self`; write its input to the first
     /// pair of the result.
     pub fn ending_in_first(self, shape: &KernelShape, bits: u32) -> Self {
-        let Self { keys: [a, b], values: [c, d] } = self;
-        if passes(shape, bits).is_multiple_of(2) { self } else { Self { keys: [b, a], values: [d, c] } }
+        let Self { keys: [a, b], values: [c, d], .. } = self;
+        if passes(shape, bits).is_multiple_of(2) { self } else { Self { keys: [b, a], values: [d, c], ..self } }
     }
 }
 
@@ -45,7 +53,7 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         if b.shape.sweeps() {
-            pass!(b, radix_sweep {
+            pass!(b, radix_sweep(narrow: buffers.narrow) {
                 step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
                 values_in: values_in, sweep: Buf::SWEEP, keys_out: buffers.keys[to], values_out: buffers.values[to],
             } [count_source: count as u32, shift: shift, sweep_slot: b.sweeps.sorts,
@@ -73,6 +81,5 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
             pass.title = format!("{} {by}", pass.title);
         }
     }
-    let last = (passes % 2) as usize;
-    (buffers.keys[last], buffers.values[last])
+    buffers.sorted(b.shape, bits)
 }

@@ -4,21 +4,47 @@ use super::build::{Builder, Count, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
+use crate::pass::KernelShape;
+use crate::pass::buffers::Capacity;
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
+
+/// The sort of the (splat, tile) pairs of a list of passes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileSort {
+    /// Bits of the keys.
+    pub bits: u32,
+    /// The pairs before the sort are in the first buffers.
+    pub buffers: SortBuffers,
+}
+
+impl TileSort {
+    /// Sorts by the tiles of the scene, and those of object layers if the list has these. Without sweeps, digits for the
+    /// layers are there in any case.
+    pub(crate) fn new(shape: &KernelShape, capacity: &Capacity, layers: bool) -> Self {
+        let tiles = if layers || !shape.sweeps() { capacity.virtual_tiles } else { capacity.tiles() };
+        let buffers = SortBuffers {
+            keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+            values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+            narrow: shape.has_narrow_keys(tiles),
+        };
+        Self { bits: 64 - tiles.saturating_sub(1).leading_zeros(), buffers }
+    }
+}
 
 /// Lists the (splat, tile) pairs, sorts them by layer and tile, and finds each tile's range. Returns the buffer with
 /// each sorted pair's position before the sort.
 pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     b.list.stage = Stage::TILE;
-    let bits = 64 - b.capacity.virtual_tiles.saturating_sub(1).leading_zeros();
     let labels = b.supervision.has_layers();
+    let TileSort { bits, buffers } = TileSort::new(b.shape, b.capacity, labels);
+    let narrow = buffers.narrow;
     if b.shape.group_walks {
         let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
-        pass!(b, emit_ordered(labels: labels, sweep: sweep) {
+        pass!(b, emit_ordered(labels: labels, sweep: sweep, narrow: narrow) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
             labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, order: Buf::DEPTH_ORDER,
             look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS, sweep: Buf::SWEEP,
@@ -26,25 +52,23 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     } else {
         pass!(b, emit_instances(labels: labels) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: Buf::TILE_KEYS_A,
+            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
             labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
         } [], over_splats());
     }
-    let buffers =
-        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
-    tile_ranges(b, keys);
+    tile_ranges(b, keys, if narrow { 2 } else { 1 });
     pairs
 }
 
-fn tile_ranges(b: &mut Builder, keys: Buf) {
+fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
     let groups = args(constants::ARGS_TILES);
     pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
         step: Buf::STEP, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
         dispatch_args: Buf::DISPATCH_ARGS,
-    } [], groups);
+    } [keys_per_word: keys_per_word], groups);
     if !b.supervision.has_layers() {
         return;
     }

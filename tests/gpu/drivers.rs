@@ -57,20 +57,46 @@ fn the_selftest_passes_on_other_drivers() {
     }
 }
 
-/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either; and walks of
-/// workgroups give the same bits again.
+/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either, with keys of 16
+/// bits or without; and walks of workgroups give the same bits again.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn sorts_that_look_back_change_no_bit() {
     for driver in [Vec::new()].into_iter().chain(swiftshader()) {
-        let model = |sort: &str| {
-            let place = Place::on(
-                [&driver[..], &[("LABELGS_SORT", sort.to_owned()), ("LABELGS_WALK", "group".into())]].concat(),
-            );
+        let model = |sort: &str, keys: &str| {
+            let forms = [("LABELGS_SORT", sort), ("LABELGS_KEYS", keys), ("LABELGS_WALK", "group")];
+            let place = Place::on([&driver[..], &forms.map(|(variable, form)| (variable, form.to_owned()))].concat());
             succeeded(&place.trained("out", &["--iterations", "3", "--set", "label_from=1"]));
             place.model("out", 3)
         };
-        assert!(model("sweep") == model("lanes"), "{driver:?}");
+        let lanes = model("lanes", "narrow");
+        assert!(model("sweep", "wide") == lanes, "{driver:?}");
+        assert!(model("sweep", "narrow") == lanes, "{driver:?}, narrow keys");
+    }
+}
+
+/// Keys of 16 bits take half the words, unless there are too many tiles, or the device cannot store 16 bits, which is no error.
+#[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
+fn keys_are_wide_where_16_bits_do_not_do() {
+    let words = |driver: &[(&'static str, String)], layers: &str| {
+        let forms =
+            [("LABELGS_SORT", "sweep"), ("LABELGS_KEYS", "narrow")].map(|(variable, form)| (variable, form.into()));
+        let place = Place::on([driver, &forms].concat());
+        let of = ["--gaussians", "101", "--size", "640x480", "--label-samples", layers];
+        let plan = succeeded_output(&place.labelgs(&[&["plan"][..], &of, &["--json"]].concat()));
+        let plan: serde_json::Value = serde_json::from_slice(&plan).expect("JSON");
+        let buffers = plan["memory"]["buffers"].as_array().expect("buffers");
+        let keys = buffers.iter().find(|buffer| buffer["name"] == "tile_keys_a").expect("keys");
+        (keys["elements"].as_u64(), plan["instances"].as_u64().expect("a number"))
+    };
+    let hidden = [("LABELGS_HIDE", "narrow_storage".to_owned())];
+    let Some(stores) = device().map(|turn| turn.capabilities().has_narrow_storage()) else { return };
+    let (keys, pairs) = words(&[], "1");
+    assert_eq!(keys, Some(if stores { pairs.div_ceil(2) } else { pairs }));
+    for (driver, layers) in [(&hidden[..], "1"), (&[], "200")] {
+        let (keys, pairs) = words(driver, layers);
+        assert_eq!(keys, Some(pairs), "{driver:?}, {layers} layers");
     }
 }
 
@@ -179,8 +205,9 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         // The kernels of a card, but for the smallest size.
         let short = GroupBlend { chunk_length: 32, ..GroupBlend::DEFAULT };
         let loss_tile = if size > 32 { 8 } else { 16 };
+        let narrow_keys = turn.capabilities().has_narrow_storage();
         let shape = if size > 4 {
-            KernelShape { loss_tile, narrow_labels: true, group_walks: true, ..shape }.with_sweeps_of(4)
+            KernelShape { loss_tile, narrow_labels: true, narrow_keys, group_walks: true, ..shape }.with_sweeps_of(4)
         } else {
             shape
         };

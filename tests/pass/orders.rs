@@ -109,6 +109,7 @@ fn sort_exactly(engine: &mut Engine, cases: &[(usize, u32)]) {
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+        narrow: false,
     };
     let mut found = None;
     let id = list(engine, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, "by depth", false)));
@@ -156,6 +157,7 @@ fn sort_by_some_bits_is_exact() {
         let buffers = SortBuffers {
             keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
             values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+            narrow: false,
         };
         let mut found = None;
         let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, bits, Count::Splats, "by tile", true)));

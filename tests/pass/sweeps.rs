@@ -4,16 +4,17 @@ use super::orders::{counters, get};
 use crate::reference::scan::exclusive_scan;
 use crate::reference::sort::radix_sort;
 use crate::support::compare::{check, exact};
-use crate::support::device::{Turn, options};
+use crate::support::device::{Turn, device, options};
 use crate::support::scenes::generator;
 use bytemuck::Zeroable;
-use labelgs::engine::{Engine, EngineSize};
+use labelgs::engine::growth::capacity;
+use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::pass::buffers::Capacity;
 use labelgs::pass::build::Count;
 use labelgs::pass::scan::Total;
 use labelgs::pass::sort::SortBuffers;
-use labelgs::pass::{Builder, KernelShape, scan, sort};
+use labelgs::pass::{Builder, GroupBlend, KernelShape, Supervision, Variant, render_view, scan, sort, training_step};
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
@@ -29,6 +30,13 @@ const ITEMS: u32 = 4;
 const MOST: usize = 6 * (SWEEP_LANES * ITEMS) as usize + 77;
 /// Numbers of items around the borders of partitions.
 const COUNTS: [usize; 6] = [0, 1, 1023, 1024, 1025, MOST];
+
+/// Buffers of narrow keys.
+const TILES: SortBuffers = SortBuffers {
+    keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B],
+    values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B],
+    narrow: true,
+};
 
 /// Opens a device with subgroups of each size, through shared memory, and calls `test` with its engine.
 fn each_size(items: usize, mut test: impl FnMut(&mut Engine)) {
@@ -156,34 +164,112 @@ fn a_sort_is_exact_and_stable() {
     each_size(MOST, |engine| {
         for held in [None, Some(0), Some(5)] {
             let cases = [(MOST, u32::MAX), (MOST, 3), (MOST, 1), (1025, 300), (1, 9), (0, 1)];
-            sort_exactly(engine, held, &cases);
+            sort_exactly(engine, held, false, &cases);
         }
     });
 }
 
+/// Keys of 16 bits, in buffers that end with the last one: all of them, odd numbers, few different ones, the largest alone.
+#[test]
+fn a_sort_of_narrow_keys_is_exact_and_stable() {
+    if !device().is_some_and(|turn| turn.capabilities().has_narrow_storage()) {
+        return;
+    }
+    each_size(MOST, |engine| {
+        let room = Capacity { instances: MOST as u64, key_words: MOST.div_ceil(2) as u64, ..*engine.capacity() };
+        engine.set_capacity(room).expect("room");
+        for held in [None, Some(0), Some(5)] {
+            let cases = [(MOST, 1 << 16), (MOST, 3), (MOST - 1, 1), (1025, 300), (1, 9), (1, 1), (0, 1)];
+            sort_exactly(engine, held, true, &cases);
+        }
+    });
+}
+
+#[test]
+fn keys_are_narrow_where_16_bits_number_all_tiles() {
+    let card = KernelShape { narrow_keys: true, ..KernelShape::new(32, false) };
+    let sweeps = card.with_sweeps_of(16);
+    assert!([1, 65_535, 65_536].iter().all(|&tiles| sweeps.has_narrow_keys(tiles)));
+    assert!(!sweeps.has_narrow_keys(65_537) && !card.has_narrow_keys(1));
+    assert!(!KernelShape { narrow_keys: false, ..sweeps }.has_narrow_keys(1));
+    // 16 x 8 px each.
+    for (height, narrow) in [(2048, true), (2056, false)] {
+        let capacity = capacity(&sweeps, &EngineSize::new(999_999, (4096, height)));
+        assert_eq!((capacity.virtual_tiles <= 65_536, capacity.instances), (narrow, 5_999_994), "{height}");
+        assert_eq!(capacity.key_words, if narrow { 2_999_997 } else { 5_999_994 }, "{height}");
+    }
+}
+
+/// Lists without object layers are sorted by the tiles of the scene, however many layers others have.
+#[test]
+fn lists_without_layers_sort_fewer_digits() {
+    let shape = KernelShape { narrow_keys: true, ..KernelShape::new(32, false) }.with_sweeps_of(16);
+    let shape = shape.with_group_blend_of(GroupBlend::DEFAULT);
+    let labels = Some(LabelSize { max_label: 40, layers: 10, vote_columns: 9 });
+    let capacity = capacity(&shape, &EngineSize::new(1000, (1600, 1064)).for_training().with_labels(labels));
+    assert_eq!((capacity.tiles(), capacity.virtual_tiles), (6700, 73_700));
+    let step = |supervision| {
+        let variant = Variant { supervision, ..Variant::plain((1600, 1064)) };
+        training_step(&shape, &capacity, variant)
+    };
+    let sorts = |list: PassList| -> Vec<&str> {
+        let by_tile = list.work.iter().filter_map(|work| match work {
+            Work::Pass(pass) if pass.title.ends_with(" by tile") => Some(pass.shader.name),
+            _ => None,
+        });
+        by_tile.collect()
+    };
+    assert_eq!(sorts(step(Supervision::Layers { lift: false })), ["radix_sweep"; 3]);
+    assert_eq!(sorts(step(Supervision::Disagreement)), ["radix_sweep_narrow"; 2]);
+    assert_eq!(sorts(render_view(&shape, &capacity, 3, 1)), ["radix_sweep_narrow"; 2]);
+}
+
+fn put_keys(engine: &mut Engine, buffer: Buf, keys: &[u32], narrow: bool) {
+    if !narrow {
+        return engine.raw_mut().upload(buffer, 0, 0, keys).expect("upload");
+    }
+    let mut halves: Vec<u16> = keys.iter().map(|&key| u16::try_from(key).expect("16 bits")).collect();
+    halves.resize(halves.len().next_multiple_of(2), 0x5a5a);
+    engine.raw_mut().upload(buffer, 0, 0, &halves).expect("upload");
+}
+
+fn get_keys(engine: &mut Engine, buffer: Buf, count: usize, narrow: bool) -> Vec<u32> {
+    if !narrow {
+        return get(engine, buffer, count);
+    }
+    let halves = engine.raw_mut().download::<u16>(buffer, 0, 0, count.next_multiple_of(2)).expect("download");
+    halves.into_iter().take(count).map(u32::from).collect()
+}
+
 /// Sorts keys and compares. Cases are (number of keys, number of distinct keys); the first one is sorted in ascending order too.
-fn sort_exactly(engine: &mut Engine, held: Option<u32>, cases: &[(usize, u32)]) {
-    let buffers = SortBuffers {
+/// Narrow keys are the largest ones.
+fn sort_exactly(engine: &mut Engine, held: Option<u32>, narrow: bool, cases: &[(usize, u32)]) {
+    let depths = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [Buf::DEPTH_VALUES_A, Buf::DEPTH_VALUES_B],
+        narrow,
     };
+    let (buffers, bits, count) = if narrow { (TILES, 16, Count::Instances) } else { (depths, 32, Count::Splats) };
     let mut found = None;
-    let id = list(engine, held, |b| found = Some(sort::sort(b, buffers, 32, Count::Splats, "by depth", false)));
+    let id = list(engine, held, |b| found = Some(sort::sort(b, buffers, bits, count, "by key", false)));
     let (keys_out, values_out) = found.expect("the sort was declared");
     let mut random = generator(73);
     for (case, &(count, different)) in cases.iter().enumerate() {
         let mut keys: Vec<u32> = (0..count).map(|_| random.random_range(0..different)).collect();
+        if narrow {
+            keys.iter_mut().for_each(|key| *key = u32::from(u16::MAX) - *key);
+        }
         if case == 0 {
             keys.sort_unstable();
         }
         let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
         announce(engine, count, &keys);
-        engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
+        put_keys(engine, buffers.keys[0], &keys, narrow);
         engine.raw_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
         run(engine, id);
         let order = radix_sort(&keys);
         let by_order = |of: &[u32]| order.iter().map(|&place| of[place]).collect::<Vec<_>>();
-        check("keys", exact(&get(engine, keys_out, count), &by_order(&keys)));
+        check("keys", exact(&get_keys(engine, keys_out, count, narrow), &by_order(&keys)));
         let found = get(engine, values_out, count);
         check("values", exact(&found, &by_order(&values)));
         // A sort that turns equal keys around is seen.
@@ -206,10 +292,11 @@ fn ten_million_keys_are_sorted() {
     let size = EngineSize::new(1, (64, 64));
     let mut engine =
         Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");
-    let room = Capacity { instances: KEYS as u64, sweep_cells: shape.sweep_cells(KEYS as u64), ..*engine.capacity() };
+    let keys = KEYS as u64;
+    let room =
+        Capacity { instances: keys, key_words: keys, sweep_cells: shape.sweep_cells(keys), ..*engine.capacity() };
     engine.set_capacity(room).expect("room");
-    let buffers =
-        SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+    let buffers = SortBuffers { narrow: false, ..TILES };
     let mut found = None;
     let id = list(&mut engine, None, |b| found = Some(sort::sort(b, buffers, 13, Count::Instances, "by tile", true)));
     let (keys_out, values_out) = found.expect("the sort was declared");

@@ -70,6 +70,46 @@ fn lists_equal_their_mirror(mut fixture: Fixture) {
     lists(&mut fixture, &sorted_keys, &slots, &splat_from_instance, &order);
 }
 
+/// Keys of 16 bits number 65,536 tiles of all layers; more have wide ones, and narrow ones again without the layers.
+#[test]
+fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
+    for (layers, narrow) in [(63, true), (64, false)] {
+        let Some(turn) = device().filter(|turn| turn.capabilities().has_narrow_storage()) else { return };
+        let own = KernelShape { narrow_keys: true, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(4);
+        let (width, height) = (32 * own.tile_width, 32 * own.tile_height);
+        let size = Shape {
+            gaussians: 40,
+            scales: (0.01, 0.05),
+            width,
+            height,
+            objects: layers,
+            sh_degree: 0,
+            ..Shape::default()
+        };
+        let mut scene = scene(84, &size);
+        // In every tile of the last layer.
+        scene.gaussians.scales[0] = [1.5; 3];
+        scene.gaussians.labels.as_mut().expect("labels")[0] = layers;
+        let mut fixture = Fixture::with_shape(turn, scene, true, own);
+        let pairs = fixture.train().counters.instance_count as usize;
+        let tiles = fixture.engine.capacity().virtual_tiles;
+        assert_eq!((tiles, own.has_narrow_keys(tiles)), (1024 * (u64::from(layers) + 1), narrow));
+        let (keys, slots) = fixture.sorted_pairs(pairs);
+        assert_eq!(keys.last().map(|&key| u64::from(key)), Some(tiles - 1));
+        let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
+        let order = DepthOrder::of(&mut fixture).expect("an order");
+        lists(&mut fixture, &keys, &slots, &owners, &order);
+        let splats = fixture.sorted_splats(pairs);
+        let of_scene = keys.iter().zip(&splats).filter(|(key, _)| **key < 1024);
+        let (keys, splats): (Vec<u32>, Vec<u32>) = of_scene.map(|(key, splat)| (*key, *splat)).unzip();
+        assert_eq!(fixture.render().counters.instance_count as usize, keys.len());
+        check("keys of the scene", exact(&fixture.sorted_pairs(keys.len()).0, &keys));
+        check("splats of the scene", exact(&fixture.sorted_splats(keys.len()), &splats));
+        let starts: Vec<u32> = tile_ranges(&keys, 1024).iter().map(|range| range[0]).collect();
+        check("tile_starts", exact(&fixture.get::<u32>(Buf::TILE_STARTS, 1024), &starts));
+    }
+}
+
 fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_instance: &[u32], order: &DepthOrder) {
     let (uniforms, counters) = (fixture.uniforms(), fixture.engine.report(0).expect("a report").counters);
     let virtual_tiles = (uniforms.tile_count * (uniforms.layer_count + 1)) as usize;

@@ -45,10 +45,12 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping = own.into_iter().chain(emulated).map(|shape| {
-        KernelShape { loss_tile: 16, narrow_labels: true, ..shape }
-            .with_sweeps_of(8)
-            .with_group_blend_of(GroupBlend::DEFAULT)
+    let sweeping = own.into_iter().chain(emulated).flat_map(|shape| {
+        [false, true].map(|narrow_keys| {
+            KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys, ..shape }
+                .with_sweeps_of(8)
+                .with_group_blend_of(GroupBlend::DEFAULT)
+        })
     });
     let one_by_one: Vec<KernelShape> = own.into_iter().chain(emulated).chain(antialiased).chain(sweeping).collect();
     let shared_out: Vec<_> = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape }).collect();

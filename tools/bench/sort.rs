@@ -20,8 +20,8 @@ use serde_json::json;
 use std::sync::Arc;
 
 /// The same buffers for keys of depths and of tiles; the sort starts in the first pair.
-const BUFFERS: SortBuffers =
-    SortBuffers { keys: [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B], values: [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B] };
+const KEYS: [Buf; 2] = [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B];
+const VALUES: [Buf; 2] = [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B];
 /// Has the keys of every run, which the sort overwrites.
 const SOURCE: Buf = Buf::SPLAT_FROM_INSTANCE;
 /// Has the digits that the pass which writes keys counts.
@@ -41,13 +41,16 @@ pub fn run(common: &Common) -> Result<()> {
     let lanes =
         KernelShape { sweep_items: 0, digit_bits: KernelShape::new(own.subgroup, gpu.is_cpu()).digit_bits, ..own };
     let sweep = own.with_sweeps(gpu.capabilities());
-    let forms = [("lanes", Some(lanes)), ("sweep", sweep)];
+    let narrow = sweep.filter(|_| gpu.capabilities().has_narrow_storage());
+    let forms = [("lanes", Some(lanes)), ("sweep", sweep), ("narrow", narrow)];
     println!("{}: sorts of random keys; positions are the values", gpu.capabilities().name);
     let mut rows = vec![["form", "bits", "items", "ms", "G items/s"].map(str::to_owned).to_vec()];
     let mut found = Vec::new();
     for (name, shape) in forms.into_iter().filter_map(|(name, shape)| Some((name, shape?))) {
-        for (&count, bits) in counts.iter().flat_map(|count| BITS.map(|bits| (count, bits))) {
-            let ms = timed(&gpu, shape, (count, bits), rounds)?;
+        let narrow = name == "narrow";
+        let fit = BITS.into_iter().filter(|&bits| !narrow || bits <= 16);
+        for (&count, bits) in counts.iter().flat_map(|count| fit.clone().map(move |bits| (count, bits))) {
+            let ms = timed(&gpu, shape, (count, bits, narrow), rounds)?;
             let rate = count as f64 / ms / 1e6;
             let cells =
                 [name.to_owned(), bits.to_string(), count.to_string(), format!("{ms:.3}"), format!("{rate:.3}")];
@@ -60,8 +63,8 @@ pub fn run(common: &Common) -> Result<()> {
     write_json(&common.output.join("sort.json"), &all)
 }
 
-/// Median ms of a sort, whose result is checked.
-fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits): (usize, u32), rounds: usize) -> Result<f64> {
+/// Median ms of a sort of so many keys by so many bits, which are narrow or not; its result is checked.
+fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32, bool), rounds: usize) -> Result<f64> {
     let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
     let shape = KernelShape { texel: false, ..shape };
@@ -72,6 +75,7 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits): (usize, u32), rounds
     let sort_cells = sort_lanes << shape.digit_bits;
     engine.set_capacity(Capacity {
         instances: items,
+        key_words: items,
         sort_lanes,
         sort_cells,
         sort_totals: sort_cells / u64::from(shape.subgroup),
@@ -80,17 +84,18 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits): (usize, u32), rounds
     })?;
     let capacity = *engine.capacity();
     let mut builder = Builder::new("sort", &shape, &capacity);
-    builder.list.copy(SOURCE, BUFFERS.keys[0], 0);
+    builder.list.copy(SOURCE, KEYS[0], 0);
     if shape.sweeps() {
         builder.list.fill(Buf::SWEEP, 0).copy(DIGITS, Buf::SWEEP, u64::from(SWEEP_WORDS) * 4);
     }
     let before = builder.list.work.len();
-    let (keys_out, _) = sort(&mut builder, BUFFERS, bits, Count::Instances, "alone", true);
+    let buffers = SortBuffers { keys: KEYS, values: VALUES, narrow };
+    let (keys_out, _) = sort(&mut builder, buffers, bits, Count::Instances, "alone", true);
     let list = builder.list;
     let id = engine.raw_mut().prepare(&list)?;
     let mut random = generator(9);
     let mut keys: Vec<u32> = (0..count).map(|_| random.random::<u32>() >> (32 - bits)).collect();
-    announce(&mut engine, &keys)?;
+    announce(&mut engine, &keys, narrow)?;
     let mut times = Vec::new();
     for round in 0..=rounds {
         engine.raw_mut().run(id, 0)?;
@@ -103,14 +108,27 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits): (usize, u32), rounds
         }
     }
     keys.sort_unstable();
-    if engine.raw_mut().download::<u32>(keys_out, 0, 0, count)? != keys {
+    if packed(&keys, narrow) != engine.raw_mut().download::<u32>(keys_out, 0, 0, words(count, narrow))? {
         return Err(Error::Check(format!("{count} keys of {bits} bits are not in order after the sort")));
     }
     Ok(median(times))
 }
 
+/// Words of so many keys.
+fn words(count: usize, narrow: bool) -> usize {
+    if narrow { count.div_ceil(2) } else { count }
+}
+
+/// The words of keys; of 16 bits each, the first is in the low half.
+fn packed(keys: &[u32], narrow: bool) -> Vec<u32> {
+    if !narrow {
+        return keys.to_vec();
+    }
+    keys.chunks(2).map(|two| two[0] | two.get(1).map_or(0, |key| key << 16)).collect()
+}
+
 /// Uploads the keys, their number, and what the pass that writes keys counts of them.
-fn announce(engine: &mut Engine, keys: &[u32]) -> Result<()> {
+fn announce(engine: &mut Engine, keys: &[u32], narrow: bool) -> Result<()> {
     let (bits, items) = (engine.shape().digit_bits, engine.shape().sweep_items);
     let mut digits = vec![0_u32; SWEEP_WORDS as usize];
     for pass in 0..32 / bits {
@@ -122,7 +140,7 @@ fn announce(engine: &mut Engine, keys: &[u32]) -> Result<()> {
     let count = keys.len() as u32;
     let sweeps = engine.shape().sweeps();
     let sched = engine.raw_mut();
-    sched.upload(SOURCE, 0, 0, keys)?;
+    sched.upload(SOURCE, 0, 0, &packed(keys, narrow))?;
     sched.upload(Buf::STEP, 0, 0, &[StepUniforms::zeroed()])?;
     sched.upload(Buf::COUNTERS, 0, 0, &[Counters { instance_count: count, ..Counters::zeroed() }])?;
     if sweeps {

@@ -85,6 +85,8 @@ domains! {
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     INSTANCES instances: "instances", cures::pairs,
         "(splat, tile) pairs.";
+    KEY_WORDS key_words: "instances", cures::pairs,
+        "Words of the keys of pairs: equal to Instances, or half of them where keys have 16 bits.";
     TRAINED_INSTANCES trained_instances: "trained instances", cures::pairs,
         "Pairs with a gradient record: equal to Instances, or 0 without training.";
     VIRTUAL_TILES virtual_tiles: "virtual tiles", cures::image,
@@ -144,6 +146,11 @@ domains! {
 }
 
 impl Capacity {
+    /// Tiles of the scene, without those of object layers.
+    pub fn tiles(&self) -> u64 {
+        self.virtual_tiles / self.layers.max(1)
+    }
+
     /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, on a card twice, because
     /// growth costs it more steps; and at least 1.1 times `needed`, so that slow growth does not overflow at every step.
     pub fn grown(current: u64, needed: u64, on_card: bool) -> u64 {

@@ -5,7 +5,7 @@ use super::scenes::Scene;
 use crate::engine::{Engine, EngineSize, Input, LabelSize, ListKey, Report, SharedRow, TrainInput};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::pass::{KernelShape, Update, Variant};
+use crate::pass::{KernelShape, TileSort, Update, Variant};
 use crate::reference::loss::ObjectPixel;
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::splat::{Splat, SplatGradient};
@@ -65,6 +65,8 @@ pub struct Fixture {
     pub fixed: SceneScale,
     /// Another camera with free space on the way to it, and the near plane there.
     pub free_space: Option<(Camera, f32)>,
+    /// The last list had object layers.
+    layered: bool,
     /// Shared rows of the step.
     pub(crate) shared: Vec<SharedRow>,
 }
@@ -180,7 +182,8 @@ impl Fixture {
         let input = StepInput { step: 1, part: 0, layers, labels, update: false, updates: 1 };
         let view = OwnView::new(&scene);
         let fixed = SceneScale { extent: 1.0 };
-        let mut fixture = Self { view, engine, scene, input, config, fixed, free_space: None, shared: Vec::new() };
+        let (free_space, layered, shared) = (None, false, Vec::new());
+        let mut fixture = Self { view, engine, scene, input, config, fixed, free_space, layered, shared };
         let weights = step_input::layer_weights(&fixture.input, fixture.view.of_step(&fixture.scene), &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
@@ -216,15 +219,16 @@ impl Fixture {
 
     /// Sorted pairs of the device: keys, and positions before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
-        let virtual_tiles = self.engine.capacity().virtual_tiles;
-        let bits = 64 - (virtual_tiles - 1).leading_zeros();
-        let passes = bits.div_ceil(self.engine.shape().digit_bits);
-        let (keys, values) = if passes.is_multiple_of(2) {
-            (Buf::TILE_KEYS_A, Buf::TILE_VALUES_A)
-        } else {
-            (Buf::TILE_KEYS_B, Buf::TILE_VALUES_B)
-        };
-        Ok((self.get(keys, count)?, self.get(values, count)?))
+        let (shape, capacity) = (*self.engine.shape(), *self.engine.capacity());
+        let TileSort { bits, buffers } = TileSort::new(&shape, &capacity, self.layered);
+        let (keys, values) = buffers.sorted(&shape, bits);
+        let places = self.get(values, count)?;
+        if !buffers.narrow {
+            return Ok((self.get(keys, count)?, places));
+        }
+        // Whole words are read.
+        let narrow = self.get::<u16>(keys, count.next_multiple_of(2))?;
+        Ok((narrow.into_iter().take(count).map(u32::from).collect(), places))
     }
 
     /// The splats of the sorted (splat, tile) pairs, by their place in the order of depth.
@@ -251,6 +255,7 @@ impl Fixture {
     /// Same as [`Fixture::train`], with another list.
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
+        self.layered = matches!(key, ListKey::Train(of) | ListKey::Extended(of, _) if of.supervision.has_layers());
         let data =
             step_input::train_input(&self.input, self.view.of_step(&self.scene), &self.config, uniforms, &self.engine);
         self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
@@ -267,6 +272,7 @@ impl Fixture {
     /// Runs the list of a render.
     pub fn render(&mut self) -> Result<Report> {
         let key = ListKey::Render { sh_degree: self.config.sh_degree, label_rounds: 0 };
+        self.layered = false;
         self.engine.run(key, &self.uniforms())
     }
 

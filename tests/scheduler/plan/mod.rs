@@ -97,6 +97,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
         trained: 10_000,
         labelled: 10_000,
         instances: 100_000,
+        key_words: 100_000,
         trained_instances: 100_000,
         virtual_tiles: 4096,
         layer_tiles: 1024,
