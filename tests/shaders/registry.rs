@@ -45,7 +45,7 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let own = [KernelShape::new(8, true), KernelShape::new(32, false)];
     let emulated = own.map(|shape| KernelShape { emulated: true, ..shape });
     let antialiased = own.map(|shape| KernelShape { antialiased: true, ..shape });
-    let sweeping = own.into_iter().chain(emulated).flat_map(|shape| {
+    let sweeping = own.into_iter().chain(emulated).chain(antialiased).flat_map(|shape| {
         [false, true].map(|narrow_keys| {
             KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys, ..shape }
                 .with_sweeps_of(8)
