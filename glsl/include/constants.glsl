@@ -91,4 +91,6 @@ const uint ARGS_SWEEP_SPLATS = 24u;
 const uint ARGS_SWEEP_INSTANCES = 27u;
 const uint ARGS_SWEEP_TILES = 30u;
 const uint ARGS_CHUNKS = 33u;                // chunks of the backward blend (group_tile.glsl)
-const uint ARGS_WORDS = 36u;                 // of all entries
+const uint ARGS_WALK = 36u;                  // lists, and chunks of long ones, of the forward blend
+const uint ARGS_PRODUCTS = 39u;              // these chunks alone
+const uint ARGS_WORDS = 42u;                 // of all entries

@@ -23,6 +23,9 @@
 #define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
 #define INOUT(number, T, name) STORAGE(number, ) name##_block { T name[]; }
 
+// Also what other workgroups of the dispatch wrote, after a memoryBarrierBuffer() of both.
+#define INOUT_SHARED(number, T, name) STORAGE(number, coherent) name##_block { T name[]; }
+
 #define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }
 #define WRITE1(number, T, name) STORAGE(number, writeonly) name##_block { T name; }
 #define INOUT1(number, T, name) STORAGE(number, ) name##_block { T name; }

@@ -19,6 +19,8 @@ void put_blend(uint layers) {
     put_groups(ARGS_BLEND, failure != 0u ? 0u : jobs);
     if (step.chunk_length > 0u) {
         put_groups(ARGS_CHUNKS, failure != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+        put_groups(ARGS_WALK, failure != 0u ? 0u : counters.long_chunk_count + counters.first_list_count + jobs);
+        put_groups(ARGS_PRODUCTS, failure != 0u ? 0u : counters.long_chunk_count);
     }
 }
 

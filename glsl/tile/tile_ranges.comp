@@ -10,7 +10,9 @@
 //          pairs, so a binary search per tile is cheaper than a test per pair.
 // Reads:   step, counters, failure; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
-//          order); variant labels: layer_occupied [layers * T] 0 or 1
+//          order); variant labels: layer_occupied [layers * T] 0 or 1; variant parts: of the scene's long lists
+//          (long_lists.glsl) long_chunks (tile, chunk), their chunks; first_lists, the tiles of those that come next; both in
+//          any order; counters.long_chunk_count, first_list_count
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
@@ -22,6 +24,12 @@ WRITE(4, uint, tile_starts);
 WRITE(5, uint, tile_ends);
 #ifdef LABELS
 WRITE(6, uint, layer_occupied);
+#endif
+#ifdef PARTS
+WRITE(7, uvec2, long_chunks);
+WRITE(8, uint, first_lists);
+layout(constant_id = 14) const uint CHUNK_LENGTH = 256;
+#include "long_lists.glsl"
 #endif
 
 // The first pair with a key of at least `key`.
@@ -52,4 +60,16 @@ void main() {
         layer_occupied[t] = t >= step.tile_count && end > start ? 1u : 0u;
 #endif
     }
+#ifdef PARTS
+    if (t < step.tile_count && is_first(end - start)) {
+        first_lists[atomicAdd(counters.first_list_count, 1u)] = t;
+    }
+    if (t < step.tile_count && is_long(end - start)) {
+        uint chunks = (end - start + CHUNK_LENGTH - 1u) / CHUNK_LENGTH;
+        uint first = atomicAdd(counters.long_chunk_count, chunks);
+        for (uint chunk = 0u; chunk < chunks; chunk++) {
+            long_chunks[first + chunk] = uvec2(t, chunk);
+        }
+    }
+#endif
 }

@@ -29,10 +29,11 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
 
 fn tile_ranges(b: &mut Builder, keys: Buf) {
     let groups = args(constants::ARGS_TILES);
-    pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
+    pass!(b, tile_ranges(labels: b.supervision.has_layers(), parts: b.long_list.is_some()) {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
-    } [], groups);
+        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
+    } [long_list: b.long_list.unwrap_or(u32::MAX)], groups);
     if !b.supervision.has_layers() {
         pass!(b, prepare_blend {
             step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,

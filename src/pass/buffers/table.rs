@@ -99,6 +99,8 @@ crate::buffers! { cures::whole;
     SEGMENT_REST "segment_rest": 16, Domain::SEGMENT_PIXELS, Class::Step, None, "State of each pixel of each job between two segments: last splat, main splat, its weight, depth.";
     SEGMENT_BACK "segment_back": 8, Domain::SEGMENT_PIXELS, Class::Step, None, "State between two segments of the backward walk: transmittance, light from behind.";
     CHUNK_JOBS "chunk_jobs": 4, Domain::CHUNKS, Class::Step, None, "Tile of each chunk with work for the backward walk, or NO_CHUNK (glsl/include/group_tile.glsl).";
+    LONG_CHUNKS "long_chunks": 8, Domain::CHUNKS, Class::Step, None, "Tile and chunk of each chunk of the lists that are walked forward in parts.";
+    FIRST_LISTS "first_lists": 4, Domain::CHUNKS, Class::Step, None, "Tiles of lists that are walked forward before the others.";
     CHUNK_STATES "chunk_states": 16, Domain::CHUNK_PIXELS, Class::Step, None, "State of each pixel of a tile at the end of a chunk of its list: light from behind, transmittance.";
     CHUNK_CHANNEL "chunk_channel": 4, Domain::CHUNK_CHANNELS, Class::Step, None, "Disagreement or depth error from behind, likewise.";
     MAIN_GAUSSIAN "main_gaussian": 4, Domain::PIXELS, Class::Step, None, "Gaussian with the largest weight, or NO_SPLAT, `[P]`.";
