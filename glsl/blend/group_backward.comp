@@ -23,7 +23,7 @@ FETCHU(6, last);
 FETCH4(7, v_image);
 WRITE(8, vec4, v_instances_a);
 WRITE(9, vec4, v_instances_b);
-WRITE(10, vec4, v_instances_c);
+WRITE(10, vec2, v_instances_c);
 READ1(16, Counters, counters);
 READ(17, uint, chunk_jobs);
 READ(18, vec4, chunk_states);

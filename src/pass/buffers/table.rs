@@ -6,6 +6,7 @@ use crate::shaders::constants::ARGS_WORDS;
 use crate::shaders::structs::{Counters, StepUniforms};
 
 const VEC4: Option<TexelFormat> = Some(TexelFormat::Rgba32Sfloat);
+const VEC2: Option<TexelFormat> = Some(TexelFormat::Rg32Sfloat);
 const WORD: Option<TexelFormat> = Some(TexelFormat::R32Uint);
 
 crate::buffers! { cures::whole;
@@ -62,7 +63,7 @@ crate::buffers! { cures::whole;
     FAILURE "failure": 4, Domain::ONE, Class::Persistent, None, "Sticky failure bits; while one is set, passes do not change the model.";
     V_INSTANCES_A "v_instances_a": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_mean2d, v_conic xy.";
     V_INSTANCES_B "v_instances_b": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_conic z, v_log_opacity, v_colour rg.";
-    V_INSTANCES_C "v_instances_c": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
+    V_INSTANCES_C "v_instances_c": 8, Domain::TRAINED_INSTANCES, Class::Persistent, VEC2, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::ONE, Class::Persistent, None, "Counts of this step (glsl/include/step.glsl).";
     DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(ARGS_WORDS), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
