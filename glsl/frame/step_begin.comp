@@ -22,7 +22,7 @@ void put(uint at, uvec3 groups) {
 }
 
 void main() {
-    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0.0, 0.0);
+    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0.0, 0.0, 0.0);
     uint n = step.gaussian_count;
     put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
     put(ARGS_SH1, folded_groups((n * 3u + 63u) / 64u));

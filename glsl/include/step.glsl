@@ -61,7 +61,7 @@ struct Counters {
     uint walked_first, walked_second; // splats walked by tiles in blend_forward, in the first and second half
                             // of its workgroups; times the pixels per tile: pairs
     uint contributing_pairs; // (pixel, splat) pairs with a weight; counted only on request
-    uint loss_groups;       // workgroups of loss_tile that are done
+    uint ranges_groups, loss_groups; // workgroups of tile_ranges and of loss_tile that are done
     uint undecided_tiles;   // tiles whose label map needs another walk
     uint cloned_count, split_count, pruned_count;
     float loss_l1, loss_ssim, loss_label; // sums without normalisation; the label loss minus that of empty layers

@@ -10,24 +10,28 @@
 //          pairs, so a binary search per tile is cheaper than a test per pair.
 // Reads:   step, counters, failure; tile_keys [I] sorted
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
-//          order); variant labels: layer_occupied [layers * T] 0 or 1; variant parts: of the scene's long lists
-//          (long_lists.glsl) long_chunks (tile, chunk), their chunks; first_lists, the tiles of those that come next; both in
-//          any order; counters.long_chunk_count, first_list_count
+//          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
+//          workgroup (blend_args.glsl): dispatch_args, failure; variant parts: of the scene's long lists (long_lists.glsl)
+//          long_chunks (tile, chunk), their chunks; first_lists, the tiles of those that come next; both in any order;
+//          counters.long_chunk_count, first_list_count
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
-READ1(1, uint, failure);
+INOUT1(1, uint, failure);
 INOUT1(2, Counters, counters);
 FETCHU(3, tile_keys);
 WRITE(4, uint, tile_starts);
 WRITE(5, uint, tile_ends);
 #ifdef LABELS
 WRITE(6, uint, layer_occupied);
+#else
+INOUT(7, uint, dispatch_args);
+#include "blend_args.glsl"
 #endif
 #ifdef PARTS
-WRITE(7, uvec2, long_chunks);
-WRITE(8, uint, first_lists);
+WRITE(8, uvec2, long_chunks);
+WRITE(9, uint, first_lists);
 layout(constant_id = 14) const uint CHUNK_LENGTH = 256;
 #include "long_lists.glsl"
 #endif
@@ -69,6 +73,17 @@ void main() {
         uint first = atomicAdd(counters.long_chunk_count, chunks);
         for (uint chunk = 0u; chunk < chunks; chunk++) {
             long_chunks[first + chunk] = uvec2(t, chunk);
+        }
+    }
+#endif
+#ifndef LABELS
+    memoryBarrierBuffer();
+    barrier();
+    if (gl_LocalInvocationID.x == 0u) {
+        uint done = atomicAdd(counters.ranges_groups, 1u) + 1u;
+        memoryBarrierBuffer();
+        if (done == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
+            put_blend(0u, atomicMax(counters.longest_list, 0u));
         }
     }
 #endif

@@ -1,6 +1,6 @@
 //! Bins splats: lists the splats of each tile, front to back, for the scene and for each object layer.
 
-use super::build::{Builder, Count, ONE, args, over_splats};
+use super::build::{Builder, Count, args, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
@@ -32,12 +32,9 @@ fn tile_ranges(b: &mut Builder, keys: Buf) {
     pass!(b, tile_ranges(labels: b.supervision.has_layers(), parts: b.long_list.is_some()) {
         step: Buf::STEP, failure: Buf::FAILURE, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
-        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
+        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS, dispatch_args: Buf::DISPATCH_ARGS,
     } [long_list: b.long_list.unwrap_or(u32::MAX)], groups);
     if !b.supervision.has_layers() {
-        pass!(b, prepare_blend {
-            step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, failure: Buf::FAILURE,
-        } [], ONE);
         return;
     }
     if b.shape.sweeps() {
