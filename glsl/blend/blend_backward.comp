@@ -32,7 +32,7 @@ FETCHU(6, last);
 FETCH4(7, v_image);
 WRITE(8, vec4, v_instances_a);
 WRITE(9, vec4, v_instances_b);
-WRITE(10, vec4, v_instances_c);
+WRITE(10, vec2, v_instances_c);
 #ifdef LABELS
 READ1(11, Counters, counters);
 FETCHU(12, layer_tiles);

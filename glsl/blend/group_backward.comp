@@ -7,7 +7,7 @@
 // group_backward — blend_backward on cards: walk one chunk of a tile's list back to front; write a gradient record per (splat, tile) pair.
 // Work:    one workgroup per chunk, a slot of chunk_jobs; a lane has TILE_PIXELS / GROUP_LANES pixels.
 // Reads:   as blend_backward; counters; chunk_jobs [slots]; chunk_states [states, pixels of a tile];
-//          variants disagreement, depth: chunk_channel [states, pixels of a tile]
+//          variants disagreement, depth: chunk_channel [slots, pixels of a tile]
 // Writes:  v_instances_a, _b, _c [I] as blend_backward; pairs that touch no pixel have no record
 // Math:    as blend_backward; a chunk starts with the transmittance and the light behind it.
 // Order:   fixed, bitwise reproducible: a subgroup's sums by a butterfly, those of subgroups in their order.
@@ -23,7 +23,7 @@ FETCHU(6, last);
 FETCH4(7, v_image);
 WRITE(8, vec4, v_instances_a);
 WRITE(9, vec4, v_instances_b);
-WRITE(10, vec4, v_instances_c);
+WRITE(10, vec2, v_instances_c);
 READ1(16, Counters, counters);
 READ(17, uint, chunk_jobs);
 READ(18, vec4, chunk_states);
@@ -138,7 +138,7 @@ void main() {
             behind[k] = dot(at_end.xyz, g) + back * (T[k] / at_end.w);
             T[k] = at_end.w;
 #ifdef CHANNEL
-            wrong[k] = chunk_channel[state + tile_pixel(t, k)];
+            wrong[k] = chunk_channel[slot * TILE_PIXELS + tile_pixel(t, k)];
 #endif
         }
         g0[k] = g.x;

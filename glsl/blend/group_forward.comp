@@ -4,16 +4,22 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 // group_forward — blend_forward on cards: alpha-blend one tile of one layer front to back.
-// Work:    one workgroup per tile, jobs as in blend_forward; a lane has TILE_PIXELS / GROUP_LANES pixels.
+// Work:    one workgroup per tile, jobs as in blend_forward; a lane has TILE_PIXELS / GROUP_LANES pixels. Of the scene's lists of more
+//          than LONG_LIST splats, one per chunk, and these come first; the last one that is here finishes the tile. Object layers,
+//          pictures (main) and steps that remember main splats (LIFT) have no such lists.
 // Reads:   as blend_forward; variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V];
-//          variant depth: depths [P]
+//          variant depth: depths [P]; but for variant main: long_chunks [counters.long_chunk_count], first_lists
+//          [counters.first_list_count]; chunk_states, w, what a chunk of a long list lets through (group_products)
 // Writes:  as blend_forward; but for variant main: chunk_jobs [slots], the job of each chunk with work for group_backward;
 //          chunk_states [states, pixels of a tile] at the end of each chunk but the last: the light from behind and the
-//          transmittance; variants disagreement, depth: chunk_channel [states, pixels of a tile], the channel from behind;
+//          transmittance; variants disagreement, depth: chunk_channel [slots, pixels of a tile], the channel from behind;
 //          variant disagreement: disagreement [T]
 // Math:    as blend_forward. The light behind a chunk is a sum of all that is behind it, over the transmittance there: no
 //          term is negative, so nothing cancels, as in differences between the front and the whole.
-// Order:   fixed, bitwise reproducible, whatever is skipped and whichever workgroup is first.
+//          T = (T at the chunk's start) (product within the chunk); a pixel stops where that would go below TRANSMITTANCE_MIN. Both
+//          are products in a fixed order that fall from splat to splat, so a pixel stops in the one chunk that starts above and
+//          ends below.
+// Order:   fixed, bitwise reproducible, whatever is skipped, whichever workgroup is first, and however many walk a list.
 // Mirror:  src/reference/blend.rs::blend_forward, disagreement.rs::disagreement
 
 READ1(0, StepUniforms, step);
@@ -23,18 +29,22 @@ FETCHU(3, tile_ends);
 FETCHU(4, instance_from_sorted);
 FETCH4(5, splats);
 FETCHU(19, splat_from_instance);
-WRITE(6, vec4, image);
-WRITE(7, uint, last);
 layout(constant_id = 15) const uint GROUP_LANES = 128;
 layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
 #ifdef MAIN
+WRITE(6, vec4, image);
+WRITE(7, uint, last);
 WRITE(8, uint, main_gaussian);
 WRITE(9, vec2, main_weight_depth);
 FETCHU(10, gaussian_from_splat);
 const bool REMEMBERS_MAIN = true;
 #else
-WRITE(20, uint, chunk_jobs);
-INOUT(21, vec4, chunk_states);
+INOUT_SHARED(6, vec4, image);
+INOUT_SHARED(7, uint, last);
+INOUT(20, uint, chunk_jobs);
+INOUT_SHARED(21, vec4, chunk_states);
+READ(23, uvec2, long_chunks);
+READ(24, uint, first_lists);
 #endif
 #ifdef LABELS
 FETCHU(8, layer_tiles);
@@ -61,7 +71,7 @@ READ(8, float, depths);
 #endif
 #if defined(DISAGREEMENT) || defined(DEPTH)
 #define CHANNEL
-INOUT(22, float, chunk_channel);
+INOUT_SHARED(22, float, chunk_channel);
 #endif
 #if defined(MAIN) || defined(LABELS)
 #define ONE_IS_MAIN
@@ -73,24 +83,21 @@ INOUT(22, float, chunk_channel);
 #include "label_state.glsl"
 #include "label_rules.glsl"
 #endif
-#include "chunks.glsl"
 shared uint staged_index[BATCH];
-shared uint live_subgroups, deepest;
+#include "live.glsl"
+#include "forward_work.glsl"
+#include "chunks.glsl"
 
 void main() {
     StepUniforms u = step;
-    uint jobs = job_count(u);
-    uint group = linear_group_id(), lane = gl_LocalInvocationID.x;
-    if (group >= jobs) {
+    uint lane = gl_LocalInvocationID.x;
+    Work work;
+    if (!find_work(u, work)) {
         return;
     }
-    uint job = TURNED != 0u ? jobs - 1u - group : group;
-    uint virtual_tile;
-    TileJob t = locate_job(job, u, virtual_tile);
-    uint start = fetchu(tile_starts, virtual_tile), end = fetchu(tile_ends, virtual_tile);
-
-    float T[ROWS];
-    vec3 light[ROWS], before[ROWS]; // of the chunk, and of those before it
+    TileJob t = work.t;
+    float p[ROWS], T[ROWS];         // product within the chunk, negative where the pixel takes no more; T at its start
+    vec3 light[ROWS], before[ROWS]; // of the chunk, over that T; and of those before it
     uint final_[ROWS];
 #ifdef ONE_IS_MAIN
     float best[ROWS];
@@ -105,11 +112,13 @@ void main() {
         begin_channel(inside ? (t.y0 + k) * u.width + t.x : 0u, inside, u, k, channel);
 #ifdef LABELS
         if (t.layer != 0u && inside) {
-            uint p = (t.y0 + k) * u.width + t.x;
-            inside = fetchc(target, p).w > 0.5 && !left_out(t.layer, view_label(p), u);
+            uint pixel = (t.y0 + k) * u.width + t.x;
+            inside = fetchc(target, pixel).w > 0.5 && !left_out(t.layer, view_label(pixel), u);
         }
 #endif
-        T[k] = inside ? 1.0 : -1.0; // positive while the pixel takes splats
+        p[k] = inside ? 1.0 : -1.0;
+        T[k] = 1.0;
+        start_part(work, k, p[k], T[k]);
         light[k] = before[k] = vec3(0.0);
         final_[k] = 0u;
 #ifdef ONE_IS_MAIN
@@ -122,27 +131,16 @@ void main() {
     }
     if (lane == 0u) {
         live_subgroups = SUBGROUPS;
-        deepest = 0u;
     }
     barrier();
 
     bool is_live = true;
-    uint walked = 0u, contributing = 0u, states = start / CHUNK_LENGTH, kept = 0u;
-    for (uint base = start; base < end; base += BATCH) {
-        float live = T[0];
-        [[unroll]] for (uint k = 1u; k < ROWS; k++) {
-            live = max(live, T[k]);
-        }
-        bool still = subgroup_max(live) > 0.0;
-        if (is_live && !still && subgroup_lane() == 0u) {
-            atomicAdd(live_subgroups, 0xffffffffu);
-        }
-        is_live = still;
-        barrier();
-        if (live_subgroups == 0u) {
+    uint walked = 0u, contributing = 0u, kept = 0u;
+    for (uint base = work.from; base < work.to; base += BATCH) {
+        if (!some_live(subgroup_max(most_of(p)) > 0.0, is_live)) {
             break;
         }
-        uint count = min(BATCH, end - base);
+        uint count = min(BATCH, work.to - base);
         walked += count;
         if (lane < count) {
             uint index = fetchu(splat_from_instance, fetchu(instance_from_sorted, base + lane));
@@ -157,7 +155,7 @@ void main() {
             uint own = min(c + subgroup_lane(), count - 1u);
             uvec2 hits = hits_of(is_live && touches(own), min(count - c, SUBGROUP_SIZE));
             while (some(hits)) {
-                uint j = c + take_first(hits), position = base - start + j + 1u;
+                uint j = c + take_first(hits), position = base - work.start + j + 1u;
                 vec4 r0 = staged_0[j], r1 = staged_1[j], r2 = staged_2[j];
                 float dx = r0.x - t.px;
                 float ax = r1.y + r0.z * dx * dx, bx = r0.w * dx;
@@ -167,20 +165,22 @@ void main() {
                     precise float e = ax + dy * (bx + r1.x * dy);
                     float alpha = min(ALPHA_MAX, exp2(max(e, -20.0)));
                     alpha = e < LOG2_ALPHA_MIN ? 0.0 : alpha;
-                    precise float next = T[k] * (1.0 - alpha);
+                    precise float q = p[k] * (1.0 - alpha);
+                    precise float next = T[k] * q;
                     bool takes = next >= TRANSMITTANCE_MIN;
-                    float w = takes ? alpha * T[k] : 0.0;
+                    float w = takes ? alpha * p[k] : 0.0;
                     light[k] += vec3(r1.zw, r2.x) * w;
-                    T[k] = takes ? next : -abs(T[k]);
+                    p[k] = takes ? q : -abs(p[k]);
                     final_[k] = w > 0.0 ? position : final_[k];
                     contributing += COUNTS != 0u && w > 0.0 ? 1u : 0u;
-#ifdef MAIN
-                    depth[k] += r2.y * w;
-#endif
 #ifdef ONE_IS_MAIN
-                    bool main_now = REMEMBERS_MAIN && w > best[k];
-                    best[k] = main_now ? w : best[k];
+                    float whole = T[k] * w;
+                    bool main_now = REMEMBERS_MAIN && whole > best[k];
+                    best[k] = main_now ? whole : best[k];
                     main_[k] = main_now ? staged_index[j] : main_[k];
+#endif
+#ifdef MAIN
+                    depth[k] += r2.y * whole;
 #endif
 #ifdef CHANNEL
                     channel.sum[k] += w * differs(channel.own[k], staged_channel[j], channel.weight[k]);
@@ -189,10 +189,11 @@ void main() {
             }
         }
         uint behind = base + BATCH;
-        if (behind < end && (behind - start) % CHUNK_LENGTH == 0u) {
+        if (behind < work.to && (behind - work.start) % CHUNK_LENGTH == 0u) {
             [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+                close_chunk(k, p[k], T[k], light[k], channel);
                 before[k] += light[k];
-                keep((states + kept) * TILE_PIXELS + tile_pixel(t, k), k, light[k], abs(T[k]), channel);
+                keep(work, kept, k, light[k], T[k], channel);
             }
             kept++;
         }
@@ -204,21 +205,18 @@ void main() {
         atomicAdd(counters.contributing_pairs, contributing);
     }
 
+    if (!finish_walk(work, kept, p, T, light, before, final_, u, channel)) {
+        return;
+    }
     uint furthest = 0u;
     vec3 background = t.layer == 0u ? u.background : vec3(0.0);
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         furthest = max(furthest, final_[k]);
         before[k] += light[k];
-        look_behind(t, states, kept, k, light[k] + abs(T[k]) * background, abs(T[k]), channel);
+        precise vec3 back = T[k] * background, behind = light[k] + back;
+        look_behind(work, kept, k, behind, T[k], channel);
     }
-#ifndef MAIN
-    furthest = subgroup_max(furthest);
-    if (subgroup_lane() == 0u) {
-        atomicMax(deepest, furthest);
-    }
-    barrier();
-    list_chunks(job, start, end, deepest);
-#endif
+    list_chunks(work, furthest);
 #ifdef LABELS
     if (t.layer != 0u) {
         finish_layer(t, T, before, final_, u);
@@ -230,17 +228,16 @@ void main() {
 #endif
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
         if (t.x < u.width && t.y0 + k < u.height) {
-            uint p = (t.y0 + k) * u.width + t.x;
-            float transmittance = abs(T[k]);
-            image[p] = vec4(before[k] + transmittance * background, transmittance);
-            last[p] = final_[k];
+            uint pixel = (t.y0 + k) * u.width + t.x;
+            image[pixel] = vec4(before[k] + T[k] * background, T[k]);
+            last[pixel] = final_[k];
 #ifdef MAIN
-            main_gaussian[p] = main_[k] == NO_SPLAT ? NO_SPLAT : fetchu(gaussian_from_splat, main_[k]);
-            main_weight_depth[p] = vec2(best[k], depth[k]);
+            main_gaussian[pixel] = main_[k] == NO_SPLAT ? NO_SPLAT : fetchu(gaussian_from_splat, main_[k]);
+            main_weight_depth[pixel] = vec2(best[k], depth[k]);
 #endif
 #ifdef LABELS
             if (REMEMBERS_MAIN && best[k] >= u.label_threshold) {
-                lift(p, main_[k], best[k], u);
+                lift(pixel, main_[k], best[k], u);
             }
 #endif
         }

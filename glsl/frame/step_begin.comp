@@ -48,7 +48,7 @@ void main() {
         return;
     }
 #endif
-    counters = Counters(0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
+    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
     uint n = step.gaussian_count;
     put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
     put(ARGS_SH1, folded_groups((n * 3u + 63u) / 64u));
@@ -63,4 +63,6 @@ void main() {
     put(ARGS_SWEEP_TILES, folded_groups(partitions(step.tile_count * (step.layer_count + 1u))));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
     put(ARGS_CHUNKS, uvec3(0u, 1u, 1u));
+    put(ARGS_WALK, uvec3(0u, 1u, 1u));
+    put(ARGS_PRODUCTS, uvec3(0u, 1u, 1u));
 }

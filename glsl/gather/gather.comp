@@ -21,7 +21,7 @@ FETCHU(3, tiles_touched);
 FETCHU(4, instance_offsets);
 FETCH4(5, v_instances_a);
 FETCH4(6, v_instances_b);
-FETCH4(7, v_instances_c);
+FETCH2(7, v_instances_c);
 WRITE(9, vec4, v_splats);
 FETCHU(8, gaussian_from_splat);
 INOUT(10, vec2, densify_stats);

@@ -20,7 +20,7 @@ FETCHU(3, tiles_touched);
 FETCHU(4, instance_offsets);
 FETCHU(5, gaussian_from_splat);
 FETCH4(6, v_instances_b);
-FETCH4(7, v_instances_c);
+FETCH2(7, v_instances_c);
 INOUT(8, vec2, densify_stats);
 
 void main() {
@@ -31,7 +31,7 @@ void main() {
     uint total = fetchu(tiles_touched, s), first = fetchu(instance_offsets, s);
     float weight = 0.0;
     for (uint at = first; at < first + total; at++) {
-        bool current = floatBitsToUint(fetch4(v_instances_c, at).y) == step.stamp;
+        bool current = floatBitsToUint(fetch2(v_instances_c, at).y) == step.stamp;
         weight += current ? fetch4(v_instances_b, at).z : 0.0;
     }
     uint i = fetchu(gaussian_from_splat, s);

@@ -1,4 +1,9 @@
-// What the forward walk of group_tile.glsl keeps of the chunks of a list, for the backward walk. Nothing in variant main.
+// What the forward walk of group_tile.glsl keeps of the chunks of a list, for the backward walk, and for the last of the workgroups
+// that walk its parts. Nothing in variant main.
+
+#ifndef MAIN
+shared uint parts_here, deepest;
+#endif
 
 #ifdef CHANNEL
 #include "channel.glsl"
@@ -22,13 +27,36 @@ void begin_channel(uint p, bool inside, StepUniforms u, uint k, inout Channel ch
 #endif
 }
 
+// Place of the state of pixel k at the end of a chunk; channels have one in each slot.
+uint state_of(Work work, uint chunk, uint k) {
+    return (work.start / CHUNK_LENGTH + chunk) * TILE_PIXELS + tile_pixel(work.t, k);
+}
+
+uint channel_state_of(Work work, uint chunk, uint k) {
+    return state_of(work, chunk, k) + work.job * TILE_PIXELS;
+}
+
+// Ends a chunk for pixel k: sums over the transmittance at its start become sums, and the next chunk starts with what this one lets
+// through. The products round here alone, whoever walks the next one.
+void close_chunk(uint k, inout float p, inout float transmittance, inout vec3 light, inout Channel channel) {
+    precise vec3 of_chunk = transmittance * light;
+    light = of_chunk;
+#ifdef CHANNEL
+    precise float sum = transmittance * channel.sum[k];
+    channel.sum[k] = sum;
+#endif
+    precise float next = transmittance * abs(p);
+    transmittance = next;
+    p = p < 0.0 ? -1.0 : 1.0;
+}
+
 // Keeps the light and the transmittance of pixel k at the end of a chunk, and begins the next.
-void keep(uint at, uint k, inout vec3 light, float transmittance, inout Channel channel) {
+void keep(Work work, uint chunk, uint k, inout vec3 light, float transmittance, inout Channel channel) {
 #ifndef MAIN
-    chunk_states[at] = vec4(light, transmittance);
+    chunk_states[state_of(work, chunk, k)] = vec4(light, transmittance);
 #endif
 #ifdef CHANNEL
-    chunk_channel[at] = channel.sum[k];
+    chunk_channel[channel_state_of(work, chunk, k)] = channel.sum[k];
     channel.sum[k] = 0.0;
 #endif
     light = vec3(0.0);
@@ -36,17 +64,19 @@ void keep(uint at, uint k, inout vec3 light, float transmittance, inout Channel 
 
 // Turns the light of each of the `kept` chunks into the light behind it, given that of the last one and of the background; and the
 // channel likewise, whose sum is then that of the whole list.
-void look_behind(TileJob t, uint states, uint kept, uint k, vec3 light, float transmittance, inout Channel channel) {
+void look_behind(Work work, uint kept, uint k, vec3 light, float transmittance, inout Channel channel) {
 #ifdef CHANNEL
-    channel.sum[k] += transmittance * channel.behind[k];
+    precise float back = transmittance * channel.behind[k], sum = channel.sum[k] + back;
+    channel.sum[k] = sum;
 #endif
 #ifndef MAIN
     for (uint e = kept; e-- > 0u;) {
-        uint at = (states + e) * TILE_PIXELS + tile_pixel(t, k);
+        uint at = state_of(work, e, k);
         vec4 state = chunk_states[at];
         chunk_states[at] = vec4(light / state.w, state.w);
         light += state.xyz;
 #ifdef CHANNEL
+        at = channel_state_of(work, e, k);
         float of_chunk = chunk_channel[at];
         chunk_channel[at] = channel.sum[k] / state.w;
         channel.sum[k] += of_chunk;
@@ -56,13 +86,127 @@ void look_behind(TileJob t, uint states, uint kept, uint k, vec3 light, float tr
 }
 
 #ifndef MAIN
-// Says in which chunks of job's list, up to its deepest splat that counts, the backward walk has work.
-void list_chunks(uint job, uint start, uint end, uint deepest) {
-    uint first = start / CHUNK_LENGTH + job, next = end / CHUNK_LENGTH + job + 1u;
+// Leaves pixel k of a part. What has no state, because nothing is behind, waits in the picture: the light of the last chunk, and the
+// transmittance at the end from the one chunk that knows it, in which the pixel stops or the list ends. By components, because
+// other workgroups write the others, or read them.
+void put_part(Work work, uint k, vec3 light, float transmittance, bool stops, uint final_, StepUniforms u, Channel channel) {
+    TileJob t = work.t;
+    uint at = state_of(work, work.chunk, k), pixel = (t.y0 + k) * u.width + t.x;
+    bool inside = t.x < u.width && t.y0 + k < u.height, ends = work.to == work.end;
+    if (!ends) {
+        chunk_states[at].x = light.x;
+        chunk_states[at].y = light.y;
+        chunk_states[at].z = light.z;
+    } else if (inside) {
+        image[pixel].x = light.x;
+        image[pixel].y = light.y;
+        image[pixel].z = light.z;
+    }
+    if (inside && (stops || ends && transmittance >= TRANSMITTANCE_MIN)) {
+        image[pixel].w = transmittance;
+    }
+    if (inside && final_ > 0u) {
+        atomicMax(last[pixel], final_);
+    }
+#ifdef CHANNEL
+    chunk_channel[channel_state_of(work, work.chunk, k)] = channel.sum[k];
+#endif
+}
+
+// True in the last workgroup of a list that asks, which then sees what all wrote.
+bool all_are_here(uint first_slot, uint chunks) {
+    memoryBarrierBuffer();
+    barrier();
+    if (gl_LocalInvocationID.x == 0u) {
+        parts_here = atomicAdd(chunk_jobs[first_slot], 1u) + 1u;
+    }
+    barrier();
+    memoryBarrierBuffer();
+    return parts_here == chunks;
+}
+
+// Takes what the parts left of pixel k, as if this workgroup had walked them all: the states between them, the light before the last
+// chunk and that of it, the transmittance at the end, the last splat.
+void take_parts(Work work, uint kept, uint k, inout vec3 before, inout vec3 light, inout float at_end, inout uint final_,
+    StepUniforms u, inout Channel channel) {
+    TileJob t = work.t;
+    bool inside = t.x < u.width && t.y0 + k < u.height;
+    uint pixel = inside ? (t.y0 + k) * u.width + t.x : 0u;
+    vec4 of_last = image[pixel];
+    light = inside ? of_last.xyz : vec3(0.0);
+    at_end = inside ? of_last.w : 1.0;
+    final_ = inside ? last[pixel] : 0u;
+    float transmittance = 1.0;
+    for (uint e = 0u; e < kept; e++) {
+        uint at = state_of(work, e, k);
+        vec4 state = chunk_states[at];
+        before += state.xyz;
+        precise float next = transmittance * state.w;
+        transmittance = next;
+        chunk_states[at].w = next < TRANSMITTANCE_MIN ? at_end : next;
+    }
+#ifdef CHANNEL
+    channel.sum[k] = chunk_channel[channel_state_of(work, kept, k)];
+#endif
+}
+#endif
+
+// Gives pixel k of a part the transmittance at its start: the product of those that the chunks before it let through
+// (group_products.comp). It falls from chunk to chunk, so the pixel has stopped before if it is too low.
+void start_part(Work work, uint k, inout float p, inout float transmittance) {
+#ifndef MAIN
+    for (uint e = 0u; e < work.chunk; e++) {
+        precise float next = transmittance * chunk_states[state_of(work, e, k)].w;
+        transmittance = next;
+    }
+    p = transmittance < TRANSMITTANCE_MIN ? -1.0 : p;
+#endif
+}
+
+// Ends the last chunk of a walk. A part is left to the last workgroup of its list; there, as for a whole list, returns true and what
+// the walk of the whole list has.
+bool finish_walk(Work work, inout uint kept, inout float p[ROWS], inout float T[ROWS], inout vec3 light[ROWS],
+    inout vec3 before[ROWS], inout uint final_[ROWS], StepUniforms u, inout Channel channel) {
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        bool stops = p[k] < 0.0 && T[k] >= TRANSMITTANCE_MIN;
+        close_chunk(k, p[k], T[k], light[k], channel);
+#ifndef MAIN
+        if (work.is_part) {
+            put_part(work, k, light[k], T[k], stops, final_[k], u, channel);
+        }
+#endif
+    }
+#ifndef MAIN
+    if (work.is_part) {
+        kept = (work.end - work.start - 1u) / CHUNK_LENGTH;
+        if (!all_are_here(work.start / CHUNK_LENGTH + work.job, kept + 1u)) {
+            return false;
+        }
+        [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+            take_parts(work, kept, k, before[k], light[k], T[k], final_[k], u, channel);
+        }
+    }
+#endif
+    return true;
+}
+
+// Says in which chunks of a list, up to the furthest splat that counts in any lane, the backward walk has work.
+void list_chunks(Work work, uint furthest) {
+#ifndef MAIN
+    if (gl_LocalInvocationID.x == 0u) {
+        deepest = 0u;
+    }
+    barrier();
+    furthest = subgroup_max(furthest);
+    if (subgroup_lane() == 0u) {
+        atomicMax(deepest, furthest);
+    }
+    barrier();
+    uint first = work.start / CHUNK_LENGTH + work.job, next = work.end / CHUNK_LENGTH + work.job + 1u;
     uint walked = (deepest + CHUNK_LENGTH - 1u) / CHUNK_LENGTH;
     for (uint slot = first + gl_LocalInvocationID.x; slot < next; slot += GROUP_LANES) {
         uint chunk = slot - first;
-        chunk_jobs[slot] = chunk >= walked ? NO_CHUNK : job | (chunk + 1u == walked ? LAST_CHUNK : 0u);
+        chunk_jobs[slot] = chunk >= walked ? NO_CHUNK : work.job | (chunk + 1u == walked ? LAST_CHUNK : 0u);
     }
-}
 #endif
+}

@@ -98,4 +98,6 @@ const uint ARGS_SWEEP_INSTANCES = 27u;
 const uint ARGS_SWEEP_TILES = 30u;
 const uint ARGS_CHUNKS = 33u;                // chunks of the backward blend (group_tile.glsl)
 const uint ARGS_VISIBLE = 36u;               // partitions of project_visible
-const uint ARGS_WORDS = 39u;                 // of all entries
+const uint ARGS_WALK = 39u;                  // lists, and chunks of long ones, of the forward blend
+const uint ARGS_PRODUCTS = 42u;              // these chunks alone
+const uint ARGS_WORDS = 45u;                 // of all entries

@@ -35,5 +35,9 @@ void put_blend(uint layers, uint longest) {
     put_groups(ARGS_BLEND, counters.failure != 0u ? 0u : jobs);
     if (step.chunk_length > 0u) {
         put_groups(ARGS_CHUNKS, counters.failure != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+        // Other workgroups of this dispatch may have counted them.
+        uint parts = atomicAdd(counters.long_chunk_count, 0u), firsts = atomicAdd(counters.first_list_count, 0u);
+        put_groups(ARGS_WALK, counters.failure != 0u ? 0u : parts + firsts + jobs);
+        put_groups(ARGS_PRODUCTS, counters.failure != 0u ? 0u : parts);
     }
 }

@@ -6,6 +6,10 @@
 // a chunk, so that the backward walk has a workgroup for each chunk, and no tile is waited for. Chunks are numbered without a
 // scan: those of job j, whose list starts at pair s, have the slots from s / CHUNK_LENGTH + j on, because lists ascend with
 // their jobs; there are always enough. States between chunks are numbered from s / CHUNK_LENGTH on.
+//
+// The forward walk of a list is a walk of its chunks. The transmittance is that at the chunk's start, which is the product of those
+// that the chunks before let through, times that within the chunk; so long lists can be walked by a workgroup for each chunk
+// (group_products.comp), with the same bits.
 
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 16;

@@ -4,6 +4,7 @@
 //   READ(0, vec4, means)       readonly array       WRITE, INOUT likewise
 //   READ1(1, Counters, counts) one readonly struct  WRITE1, INOUT1 likewise
 //   FETCH4(2, quats)           array of vec4 that is only read by fetch4(quats, i); a texel buffer if TEXEL is defined
+//   FETCH2(3, records)         array of vec2, likewise with fetch2(records, i)
 //   FETCHU(3, labels)          array of uint, likewise with fetchu(labels, i)
 //   FETCHC(3, target)          array of RGBA8 colours, read by fetchc(target, i) as vec4 in 0 to 1
 #ifndef LAYOUT_GLSL
@@ -22,6 +23,9 @@
 #define READ(number, T, name) STORAGE(number, readonly) name##_block { T name[]; }
 #define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
 #define INOUT(number, T, name) STORAGE(number, ) name##_block { T name[]; }
+
+// Also what other workgroups of the dispatch wrote, after a memoryBarrierBuffer() of both.
+#define INOUT_SHARED(number, T, name) STORAGE(number, coherent) name##_block { T name[]; }
 
 #define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }
 #define WRITE1(number, T, name) STORAGE(number, writeonly) name##_block { T name; }
@@ -50,13 +54,17 @@ layout(push_constant, scalar) uniform PassWords {
 
 #ifdef TEXEL
 #define FETCH4(number, name) layout(set = 0, binding = number) uniform textureBuffer name
+#define FETCH2(number, name) FETCH4(number, name)
 #define FETCHU(number, name) layout(set = 0, binding = number) uniform utextureBuffer name
 #define fetch4(name, i) texelFetch(name, int(i))
+#define fetch2(name, i) texelFetch(name, int(i)).xy
 #define fetchu(name, i) texelFetch(name, int(i)).x
 #else
 #define FETCH4(number, name) READ(number, vec4, name)
+#define FETCH2(number, name) READ(number, vec2, name)
 #define FETCHU(number, name) READ(number, uint, name)
 #define fetch4(name, i) name[i]
+#define fetch2(name, i) name[i]
 #define fetchu(name, i) name[i]
 #endif
 // The shader unpacks the bytes, not the texel unit: the same bits on every device.

@@ -14,5 +14,5 @@ void write_record(uint instance, vec2 mean, vec3 q, float sums[SUMS], uint stamp
 #endif
     v_instances_a[instance] = vec4(-(conic.x * Sx + conic.y * Sy), -(conic.y * Sx + conic.z * Sy), -0.5 * Sxx, -Sxy);
     v_instances_b[instance] = vec4(-0.5 * Syy, o0, sums[6], sums[7]);
-    v_instances_c[instance] = vec4(sums[8], uintBitsToFloat(stamp), 0.0, 0.0);
+    v_instances_c[instance] = vec2(sums[8], uintBitsToFloat(stamp));
 }

@@ -37,7 +37,8 @@ Sums sum_records(Records r, uint from, uint stride) {
     Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
     for (uint k = from; k < r.total; k += stride) {
         uint at = r.first + k;
-        vec4 ra = fetch4(v_instances_a, at), rb = fetch4(v_instances_b, at), rc = fetch4(v_instances_c, at);
+        vec4 ra = fetch4(v_instances_a, at), rb = fetch4(v_instances_b, at);
+        vec2 rc = fetch2(v_instances_c, at);
         bool current = floatBitsToUint(rc.y) == stamp;
         sums.a += current ? ra : vec4(0.0);
         sums.b += current ? rb : vec4(0.0);

@@ -52,6 +52,8 @@ struct Counters {
     uint instance_count;    // (splat, tile) pairs over all layers; the need, even beyond capacity
     uint layer_tile_count;  // tiles of object layers with a splat
     uint longest_list;      // splats in the fullest tile
+    uint long_chunk_count;  // chunks of lists that are walked forward in parts (long_lists.glsl),
+    uint first_list_count;  // and lists that come after them, before the others
     uint nonfinite_count, nonfinite_first; // Gaussians with a dropped, nonfinite gradient; lowest index
     uint broken_count, broken_first; // Gaussians with a nonfinite position, opacity or scale (cull); lowest index
     uint unprojected_count, unprojected_first; // Gaussians with a nonfinite splat (project_forward); lowest index

@@ -29,7 +29,7 @@ FETCHU(3, splat_from_gaussian);
 FETCHU(4, instance_offsets);
 FETCH4(5, v_instances_a);
 FETCH4(6, v_instances_b);
-FETCH4(7, v_instances_c);
+FETCH2(7, v_instances_c);
 INOUT(8, vec2, densify_stats);
 INOUT(9, uint, touched_at);
 READ(10, uvec4, missed);

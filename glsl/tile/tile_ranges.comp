@@ -11,7 +11,9 @@
 // Reads:   step, counters; tile_keys [I] sorted (KEYS_PER_WORD 2: of 16 bits)
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
 //          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
-//          workgroup (count_args.glsl): dispatch_args, counters.failure
+//          workgroup (count_args.glsl): dispatch_args, counters.failure; variant parts: of the scene's long lists (long_lists.glsl)
+//          long_chunks (tile, chunk), their chunks; first_lists, the tiles of those that come next; both in any order;
+//          counters.long_chunk_count, first_list_count
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(constant_id = 23) const uint KEYS_PER_WORD = 1;
@@ -26,6 +28,12 @@ WRITE(6, uint, layer_occupied);
 #else
 INOUT(7, uint, dispatch_args);
 #include "count_args.glsl"
+#endif
+#ifdef PARTS
+WRITE(8, uvec2, long_chunks);
+WRITE(9, uint, first_lists);
+layout(constant_id = 14) const uint CHUNK_LENGTH = 256;
+#include "long_lists.glsl"
 #endif
 
 uint key_at(uint i) {
@@ -63,6 +71,18 @@ void main() {
         layer_occupied[t] = t >= step.tile_count && end > start ? 1u : 0u;
 #endif
     }
+#ifdef PARTS
+    if (t < step.tile_count && is_first(end - start)) {
+        first_lists[atomicAdd(counters.first_list_count, 1u)] = t;
+    }
+    if (t < step.tile_count && is_long(end - start)) {
+        uint chunks = (end - start + CHUNK_LENGTH - 1u) / CHUNK_LENGTH;
+        uint first = atomicAdd(counters.long_chunk_count, chunks);
+        for (uint chunk = 0u; chunk < chunks; chunk++) {
+            long_chunks[first + chunk] = uvec2(t, chunk);
+        }
+    }
+#endif
 #ifndef LABELS
     memoryBarrierBuffer();
     barrier();

@@ -82,12 +82,14 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     capacity.key_words = if shape.has_narrow_keys(capacity.virtual_tiles) { instances.div_ceil(2) } else { instances };
     capacity.trained_instances = if trained { instances } else { 0 };
     capacity.layer_pixels = capacity.layer_tiles * u64::from(shape.tile_pixels());
-    let jobs = capacity.tiles() + capacity.layer_tiles;
+    let tiles = capacity.tiles();
+    let jobs = tiles + capacity.layer_tiles;
     capacity.segment_pixels = if capacity.segments > 1 { jobs * u64::from(shape.tile_pixels()) } else { 0 };
     let trained = |chunks: u64| if trained { chunks } else { 0 };
     capacity.chunks = trained(shape.chunks(instances, jobs));
     capacity.chunk_pixels = trained(shape.chunks(instances, 1) * u64::from(shape.tile_pixels()));
-    capacity.chunk_channels = if capacity.labelled + capacity.known_depths > 0 { capacity.chunk_pixels } else { 0 };
+    let channels = trained(shape.chunks(instances, tiles) * u64::from(shape.tile_pixels()));
+    capacity.chunk_channels = if capacity.labelled + capacity.known_depths > 0 { channels } else { 0 };
     capacity.sweep_cells = shape.sweep_cells(instances.max(capacity.gaussians).max(capacity.virtual_tiles));
     capacity.look_cells = shape.look_cells(capacity.gaussians);
     if shape.sweeps() {

@@ -17,12 +17,29 @@ pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
     forward(b, pairs, true);
 }
 
+/// Returns the length beyond which the lists of a step are walked forward in parts, if the walk has parts; [`u32::MAX`] where no
+/// list is longer, or where a lift needs the main splat of each pixel, which parts do not remember.
+pub(super) fn long_list(b: &Builder) -> Option<u32> {
+    let length = b.shape.group_blend?.long_list;
+    let has_some = !b.supervision.lifts() && b.capacity.gaussians > u64::from(length);
+    Some(if has_some { length } else { u32::MAX })
+}
+
 fn forward(b: &mut Builder, pairs: Buf, main: bool) {
     let (segments, counts) = (b.segments(), b.counts);
     let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
     b.list.stage = Stage::BLEND_FORWARD;
     if let Some(blend) = b.shape.group_blend {
         let (disagreement, depth) = channels(b.supervision);
+        let group_lanes = b.shape.tile_pixels() / blend.forward_rows;
+        if b.long_list.is_some_and(|length| length < u32::MAX) {
+            pass!(b, group_products {
+                step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+                instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+                long_chunks: Buf::LONG_CHUNKS, last: Buf::LAST, chunk_jobs: Buf::CHUNK_JOBS,
+                chunk_states: Buf::CHUNK_STATES,
+            } [group_lanes: group_lanes], args(constants::ARGS_PRODUCTS));
+        }
         pass!(b, group_forward(labels: labels, main: main, disagreement: disagreement, depth: depth) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
@@ -33,8 +50,9 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
             label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
             labels: Buf::LABELS, disagreement: Buf::DISAGREEMENT, depths: Buf::DEPTHS,
             chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES, chunk_channel: Buf::CHUNK_CHANNEL,
-        } [lift: lift.into(), counts: counts.into(), group_lanes: b.shape.tile_pixels() / blend.forward_rows],
-            args(constants::ARGS_BLEND));
+            long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
+        } [lift: lift.into(), counts: counts.into(), group_lanes: group_lanes,
+            long_list: b.long_list.unwrap_or(u32::MAX)], args(constants::ARGS_WALK));
         return;
     }
     for segment in 0..segments {

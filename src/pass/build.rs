@@ -23,6 +23,8 @@ pub struct Builder<'a> {
     pub loss_partials: u32,
     /// Gaussians may have missed updates, which what reads them adds.
     pub late: bool,
+    /// Lists of more splats are walked forward by a workgroup for each chunk; `None` if the blends have no such form.
+    pub long_list: Option<u32>,
     /// Passes of sorts, and scans, so far in this list that look back.
     pub sweeps: Sweeps,
     /// The list so far.
@@ -76,6 +78,7 @@ impl<'a> Builder<'a> {
             exposure: None,
             loss_partials: 0,
             late: false,
+            long_list: None,
             sweeps: Sweeps::default(),
             list,
         }

@@ -161,6 +161,7 @@ pub fn extended_step(
 ) -> PassList {
     let mut b = begin("training step", shape, capacity, variant.sh_degree);
     (b.supervision, b.counts) = (variant.supervision, variant.counts);
+    b.long_list = blend::long_list(&b);
     b.late = is_fused(shape, (extension, passes));
     if variant.catch_up {
         update::catch_up(&mut b);
@@ -231,6 +232,7 @@ pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32, alone: b
 /// Adds the blending weights of one view to the x of the densification statistic.
 pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
     let mut b = begin("weights", shape, capacity, 0);
+    b.long_list = blend::long_list(&b);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, pairs);

@@ -59,6 +59,9 @@ pub struct GroupBlend {
     pub backward_rows: u32,
     /// Splats of a chunk, a power of 2.
     pub chunk_length: u32,
+    /// Splats of a list of a training step that one workgroup walks forward in any case; longer ones may have one for each chunk
+    /// (glsl/include/long_lists.glsl).
+    pub long_list: u32,
     /// A subgroup skips splats that its pixels do not see; `false` for tests.
     pub culls: bool,
     /// Workgroups take their work in the opposite order, for tests.
@@ -67,7 +70,8 @@ pub struct GroupBlend {
 
 impl GroupBlend {
     /// What cards use.
-    pub const DEFAULT: Self = Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, culls: true, turned: false };
+    pub const DEFAULT: Self =
+        Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, long_list: 1024, culls: true, turned: false };
 }
 
 /// How a step updates the parameters.

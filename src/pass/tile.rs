@@ -64,11 +64,11 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
 
 fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
     let groups = args(constants::ARGS_TILES);
-    pass!(b, tile_ranges(labels: b.supervision.has_layers()) {
+    pass!(b, tile_ranges(labels: b.supervision.has_layers(), parts: b.long_list.is_some()) {
         step: Buf::STEP, counters: Buf::COUNTERS, tile_keys: keys,
         tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
-        dispatch_args: Buf::DISPATCH_ARGS,
-    } [keys_per_word: keys_per_word], groups);
+        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS, dispatch_args: Buf::DISPATCH_ARGS,
+    } [keys_per_word: keys_per_word, long_list: b.long_list.unwrap_or(u32::MAX)], groups);
     if !b.supervision.has_layers() {
         return;
     }

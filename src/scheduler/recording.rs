@@ -155,6 +155,7 @@ fn views(gpu: &Arc<Gpu>, plan: &Plan, storage: &Storage, frame: usize) -> Result
 fn vulkan_format(format: TexelFormat) -> vk::Format {
     match format {
         TexelFormat::Rgba32Sfloat => vk::Format::R32G32B32A32_SFLOAT,
+        TexelFormat::Rg32Sfloat => vk::Format::R32G32_SFLOAT,
         TexelFormat::R32Uint => vk::Format::R32_UINT,
         TexelFormat::R32Sfloat => vk::Format::R32_SFLOAT,
     }

@@ -203,7 +203,7 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         let turn = Turn::with(gpu);
         let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) };
         // The kernels of a card, but for the smallest size.
-        let short = GroupBlend { chunk_length: 32, ..GroupBlend::DEFAULT };
+        let short = GroupBlend { chunk_length: 32, long_list: 64, ..GroupBlend::DEFAULT };
         let loss_tile = if size > 32 { 8 } else { 16 };
         let narrow_keys = turn.capabilities().has_narrow_storage();
         let shape = if size > 4 {

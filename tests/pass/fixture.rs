@@ -38,8 +38,9 @@ impl DerefMut for Fixture {
     }
 }
 
-/// Both forms of the blends; chunks are short, so that lists have several.
-pub const BLENDS: [Option<GroupBlend>; 2] = [None, Some(GroupBlend { chunk_length: 16, ..GroupBlend::DEFAULT })];
+/// Both forms of the blends; chunks are short, so that lists have several, and some are walked in parts.
+pub const BLENDS: [Option<GroupBlend>; 2] =
+    [None, Some(GroupBlend { chunk_length: 16, long_list: 48, ..GroupBlend::DEFAULT })];
 
 impl Fixture {
     /// The scene on the shared device, with or without labels, with the device's kernel shape.

@@ -59,10 +59,10 @@ const SUM: Tolerance = Tolerance { absolute: 9.4e-7, relative: 0.0 };
 /// Compares the sums of the records of each splat, and the statistic, with those in f64, relative to the magnitudes.
 fn gathered(fixture: &mut Fixture, order: &DepthOrder, touched: &[u32]) {
     let pairs = touched.iter().sum::<u32>() as usize;
-    let records: Vec<[f32; 12]> = {
-        let [a, b, c] =
-            [Buf::V_INSTANCES_A, Buf::V_INSTANCES_B, Buf::V_INSTANCES_C].map(|buf| fixture.get::<[f32; 4]>(buf, pairs));
-        (0..pairs).map(|i| [a[i], b[i], c[i]].concat().try_into().expect("three times four")).collect()
+    let records: Vec<[f32; 10]> = {
+        let [a, b] = [Buf::V_INSTANCES_A, Buf::V_INSTANCES_B].map(|buf| fixture.get::<[f32; 4]>(buf, pairs));
+        let c = fixture.get::<[f32; 2]>(Buf::V_INSTANCES_C, pairs);
+        (0..pairs).map(|i| [&a[i][..], &b[i], &c[i]].concat().try_into().expect("ten numbers")).collect()
     };
     let uniforms = fixture.get::<StepUniforms>(Buf::STEP, 1)[0];
     let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, fixture.scene.gaussians.len());
@@ -75,7 +75,7 @@ fn gathered(fixture: &mut Fixture, order: &DepthOrder, touched: &[u32]) {
         for (rank, &count) in touched.iter().enumerate() {
             let (splat, gaussian) = (order.splats[rank] as usize, order.gaussians[rank] as usize);
             let scene = if has_layer(gaussian) { count / 2 } else { count } as usize;
-            let current = |&(_, record): &(usize, &[f32; 12])| record[9].to_bits() == uniforms.stamp;
+            let current = |&(_, record): &(usize, &[f32; 10])| record[9].to_bits() == uniforms.stamp;
             let mut own: Vec<_> = records[first..][..count as usize].iter().enumerate().filter(current).collect();
             first += count as usize;
             if leave_out && count > WALKERS {

@@ -134,7 +134,7 @@ domains! {
     CHUNK_PIXELS chunk_pixels: "chunk pixels", cures::pairs,
         "Pixels between two chunks of a list, or 0 where it walks tiles.", optional;
     CHUNK_CHANNELS chunk_channels: "chunk channels", cures::pairs,
-        "As chunk pixels, or 0 in a training without labels and known depths.", optional;
+        "Pixels of all chunks of the scene's lists, or 0 in a training without labels and known depths.", optional;
     LATE_GAUSSIANS late_gaussians: "late gaussians", cures::model,
         "Trained Gaussians that may miss updates: all of them, or none where each step updates all.", optional;
     MISSED_ROWS missed_rows: "missed rows", cures::none,

@@ -6,6 +6,7 @@ use crate::shaders::constants::ARGS_WORDS;
 use crate::shaders::structs::{Counters, StepUniforms};
 
 const VEC4: Option<TexelFormat> = Some(TexelFormat::Rgba32Sfloat);
+const VEC2: Option<TexelFormat> = Some(TexelFormat::Rg32Sfloat);
 const WORD: Option<TexelFormat> = Some(TexelFormat::R32Uint);
 
 crate::buffers! { cures::whole;
@@ -60,7 +61,7 @@ crate::buffers! { cures::whole;
     NONFINITE_ROWS "nonfinite_rows": 4, Domain::fixed(64), Class::Persistent, None, "First row of each plane of the state with a NaN or infinity.";
     V_INSTANCES_A "v_instances_a": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_mean2d, v_conic xy.";
     V_INSTANCES_B "v_instances_b": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_conic z, v_log_opacity, v_colour rg.";
-    V_INSTANCES_C "v_instances_c": 16, Domain::TRAINED_INSTANCES, Class::Persistent, VEC4, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
+    V_INSTANCES_C "v_instances_c": 8, Domain::TRAINED_INSTANCES, Class::Persistent, VEC2, "Gradient record of each (splat, tile) pair, `[I]`: v_colour b, stamp; valid if the stamp is the step's.";
 
     COUNTERS "counters": size_of::<Counters>() as u32, Domain::ONE, Class::Persistent, None, "Counts of this step (glsl/include/step.glsl).";
     DISPATCH_ARGS "dispatch_args": 4, Domain::fixed(ARGS_WORDS), Class::Step, None, "Indirect dispatch arguments (ARGS_ words of constants.glsl).";
@@ -99,6 +100,8 @@ crate::buffers! { cures::whole;
     SEGMENT_REST "segment_rest": 16, Domain::SEGMENT_PIXELS, Class::Step, None, "State of each pixel of each job between two segments: last splat, main splat, its weight, depth.";
     SEGMENT_BACK "segment_back": 8, Domain::SEGMENT_PIXELS, Class::Step, None, "State between two segments of the backward walk: transmittance, light from behind.";
     CHUNK_JOBS "chunk_jobs": 4, Domain::CHUNKS, Class::Step, None, "Tile of each chunk with work for the backward walk, or NO_CHUNK (glsl/include/group_tile.glsl).";
+    LONG_CHUNKS "long_chunks": 8, Domain::CHUNKS, Class::Step, None, "Tile and chunk of each chunk of the lists that are walked forward in parts.";
+    FIRST_LISTS "first_lists": 4, Domain::CHUNKS, Class::Step, None, "Tiles of lists that are walked forward before the others.";
     CHUNK_STATES "chunk_states": 16, Domain::CHUNK_PIXELS, Class::Step, None, "State of each pixel of a tile at the end of a chunk of its list: light from behind, transmittance.";
     CHUNK_CHANNEL "chunk_channel": 4, Domain::CHUNK_CHANNELS, Class::Step, None, "Disagreement or depth error from behind, likewise.";
     MAIN_GAUSSIAN "main_gaussian": 4, Domain::PIXELS, Class::Step, None, "Gaussian with the largest weight, or NO_SPLAT, `[P]`.";

@@ -65,6 +65,8 @@ impl Class {
 pub enum TexelFormat {
     /// Four f32.
     Rgba32Sfloat,
+    /// Two f32.
+    Rg32Sfloat,
     /// One u32.
     R32Uint,
     /// One f32.
@@ -76,6 +78,7 @@ impl TexelFormat {
     pub fn bytes(self) -> u32 {
         match self {
             Self::Rgba32Sfloat => 16,
+            Self::Rg32Sfloat => 8,
             Self::R32Uint | Self::R32Sfloat => 4,
         }
     }

@@ -10,6 +10,7 @@ mod errors;
 mod measure;
 mod mirror;
 mod modes;
+mod pairs;
 mod report;
 mod scenes;
 
@@ -64,11 +65,12 @@ pub fn run(args: &KernelArgs) -> Result<()> {
         failures.extend(faults(&scene, plan.kind));
         scenes.push(scene);
     }
+    let pairs = pairs::run(&gpu, if args.common.small { 2 } else { 40 })?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     write_json(
         &args.common.output.join("kernels.json"),
         &json!({ "schema_version": 3, "small": args.common.small, "device": capabilities.name, "driver": driver,
-            "threads": threads, "load_before": load_before, "scenes": scenes }),
+            "threads": threads, "load_before": load_before, "scenes": scenes, "pairs": pairs }),
     )?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
 }

@@ -1,0 +1,53 @@
+// What a workgroup of the forward walk of cards works on: a list, or a chunk of a long one. Chunks of long lists come first, then
+// the next longest lists (long_lists.glsl), then the others in their order.
+
+#ifdef MAIN
+const bool HAS_PARTS = false;
+#else
+#include "long_lists.glsl"
+const bool HAS_PARTS = LONG_LIST != 0xffffffffu;
+#endif
+
+struct Work {
+    TileJob t;
+    uint job;
+    uint start, end; // the list,
+    uint from, to;   // and what is walked of it
+    uint chunk;      // of a part
+    bool is_part;
+};
+
+// False for a workgroup without work.
+bool find_work(StepUniforms u, out Work work) {
+    uint parts = HAS_PARTS ? counters.long_chunk_count : 0u;
+    uint before_others = HAS_PARTS ? parts + counters.first_list_count : 0u;
+    uint groups = before_others + job_count(u), group = linear_group_id();
+    if (group >= groups) {
+        return false;
+    }
+    group = TURNED != 0u ? groups - 1u - group : group;
+    work.is_part = group < parts;
+    work.job = group - before_others;
+    work.chunk = 0u;
+#ifndef MAIN
+    if (work.is_part) {
+        uvec2 part = long_chunks[group];
+        work.job = part.x;
+        work.chunk = part.y;
+    } else if (group < before_others) {
+        work.job = first_lists[group - parts];
+    }
+#endif
+    uint virtual_tile;
+    work.t = locate_job(work.job, u, virtual_tile);
+    work.start = fetchu(tile_starts, virtual_tile);
+    work.end = fetchu(tile_ends, virtual_tile);
+    work.from = work.start + work.chunk * CHUNK_LENGTH;
+    work.to = work.is_part ? min(work.from + CHUNK_LENGTH, work.end) : work.end;
+    bool is_taken = false;
+#ifndef MAIN
+    uint length = work.end - work.start;
+    is_taken = HAS_PARTS && group >= before_others && work.t.layer == 0u && (is_long(length) || is_first(length));
+#endif
+    return !is_taken;
+}
