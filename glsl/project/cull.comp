@@ -4,6 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
+#include "moments_store.glsl"
 // cull — drop Gaussians that count at no pixel: behind the near plane, too transparent, or certainly outside the image.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln); variant lazy: moments of both, touched_at [N], missed
@@ -21,10 +22,8 @@ WRITE(3, uint, depth_keys);
 WRITE(4, uint, splat_from_gaussian);
 INOUT1(5, Counters, counters);
 #ifdef LAZY
-FETCH4(6, m_means);
-FETCH4(7, m_scales);
-FETCH4(8, u_means);
-FETCH4(9, u_scales);
+READ_MOMENTS(6, 8, means);
+READ_MOMENTS(7, 9, scales);
 FETCHU(10, touched_at);
 READ(11, uvec4, missed);
 #endif

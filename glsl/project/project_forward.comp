@@ -8,6 +8,7 @@
 #include "sh.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
+#include "moments_store.glsl"
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
 // Work:    64 splats per workgroup, splats in depth order; variant group: the rows of their tiles are shared out.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
@@ -39,20 +40,13 @@ FETCHU(14, layer_from_label);
 #endif
 
 #ifdef LAZY
-FETCH4(15, m_means);
-FETCH4(16, m_scales);
-FETCH4(17, m_quats);
-FETCH4(18, m_sh0);
-FETCH4(19, m_sh1);
-FETCH4(20, m_sh2);
-FETCH4(21, m_sh3);
-FETCH4(22, u_means);
-FETCH4(23, u_scales);
-FETCH4(24, u_quats);
-FETCH4(25, u_sh0);
-FETCH4(26, u_sh1);
-FETCH4(27, u_sh2);
-FETCH4(28, u_sh3);
+READ_MOMENTS(15, 22, means);
+READ_MOMENTS(16, 23, scales);
+READ_MOMENTS(17, 24, quats);
+READ_MOMENTS(18, 25, sh0);
+READ_MOMENTS(19, 26, sh1);
+READ_MOMENTS(20, 27, sh2);
+READ_MOMENTS(21, 28, sh3);
 FETCHU(29, touched_at);
 READ(30, uvec4, missed);
 #endif

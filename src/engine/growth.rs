@@ -46,6 +46,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let mut capacity = Capacity {
         gaussians,
         trained,
+        second_moments: if size.half_moments { 0 } else { trained },
         labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },

@@ -14,6 +14,7 @@ mod label_ids;
 mod late;
 mod missed;
 pub(crate) mod model;
+mod moments;
 pub mod run;
 mod size;
 pub(crate) mod state;

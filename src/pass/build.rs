@@ -23,6 +23,8 @@ pub struct Builder<'a> {
     pub loss_partials: u32,
     /// Gaussians may have missed updates, which what reads them adds.
     pub late: bool,
+    /// Both moments of a parameter are packed in one word.
+    pub half: bool,
     /// Passes of sorts, and scans, so far in this list that look back.
     pub sweeps: Sweeps,
     /// The list so far.
@@ -76,6 +78,7 @@ impl<'a> Builder<'a> {
             exposure: None,
             loss_partials: 0,
             late: false,
+            half: capacity.packs_moments(),
             sweeps: Sweeps::default(),
             list,
         }

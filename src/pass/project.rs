@@ -15,7 +15,7 @@ const DEPTH_BITS: u32 = 32;
 /// Lists the visible Gaussians in depth order and projects them.
 pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::PROJECT;
-    pass!(b, cull(lazy: b.late) {
+    pass!(b, cull(lazy: b.late, half: b.late && b.half) {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
         splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS, m_means: Buf::M_MEANS,
         m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, touched_at: Buf::TOUCHED_AT,
@@ -42,7 +42,8 @@ pub(super) fn visible_splats(b: &mut Builder) {
 
 fn project_forward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks, lazy: b.late) {
+    pass!(b, project_forward(labels: b.supervision.has_layers(), group: b.shape.group_walks, lazy: b.late,
+        half: b.late && b.half) {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,

@@ -55,8 +55,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let split: Vec<KernelShape> = one_by_one.iter().copied().chain(shared_out).collect();
     let late = split.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
     for shape in split.iter().copied().chain(late) {
-        for segments in [1, 3] {
-            let mut capacity = capacity(&shape, &ROOM);
+        for (segments, half) in [(1, true), (1, false), (3, false)] {
+            let mut capacity = capacity(&shape, &ROOM.with_half_moments(half));
             capacity.segments = segments;
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.image;

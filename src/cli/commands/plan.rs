@@ -8,6 +8,7 @@ use crate::gpu;
 use crate::pass::buffers::{Capacity, TABLE};
 use crate::pass::{KernelShape, Supervision, Variant, training_step};
 use crate::scheduler::plan::{Limits, MemoryReport, PassList, Plan, PlanOptions};
+use crate::train::Moments;
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -29,6 +30,9 @@ pub struct PlanArgs {
     /// Degree of the spherical harmonics.
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
     pub sh_degree: u32,
+    /// What the optimiser remembers of each parameter, as the setting `moments` of a training.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub moments: Moments,
     /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
@@ -45,6 +49,15 @@ struct Subject {
     room: EngineSize,
     capacity: Capacity,
     list: PassList,
+}
+
+impl Subject {
+    /// Returns the memory with packed moments, if full ones do not fit and these do.
+    fn half_fits(&self, full: &MemoryReport) -> Option<u64> {
+        let half = self.room.with_half_moments(true);
+        let is_tried = full.total > self.limits.max_memory && !self.room.half_moments;
+        predict_for(&self.shape, &self.limits, &half).ok().filter(|_| is_tried).map(|half| half.total)
+    }
 }
 
 /// Prints the plan of a step. Fails afterwards if the plan exceeds the device.
@@ -73,6 +86,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     });
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
+    let room = room.with_half_moments(args.moments == Moments::Half);
     let capacity = capacity(&shape, &room);
     let supervision = labels.map_or(Supervision::Photo, |_| Supervision::Layers { lift: false });
     let variant = Variant { supervision, sh_degree: args.sh_degree, ..Variant::plain(size) };
@@ -114,7 +128,7 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<S
     let (room, capacity) = (&subject.room, &subject.capacity);
     let objects = room.labels.map_or(0, |labels| labels.layers);
     Ok(format!(
-        "Training {} on pictures of {} x {} px with {} per step\n\
+        "Training {} on pictures of {} x {} px with {} per step{}\n\
          device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
          MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
@@ -123,6 +137,7 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<S
         room.image.0,
         room.image.1,
         counted(objects, "object"),
+        if room.half_moments { ", moments of 16 bits" } else { "" },
         subject.device.as_deref().unwrap_or("none found, limits assumed"),
         shape_text(&subject.shape),
         capacity.instances,
@@ -145,6 +160,10 @@ fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
         0 => "fits:    no Gaussian on such pictures\n".to_owned(),
         most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
     };
+    if let Some(total) = subject.half_fits(memory) {
+        let needed = total as f64 / MIB;
+        text += &format!("moments: it fits with --set moments=half, here --moments half: {needed:.0} MiB\n");
+    }
     let kept = subject.limits.kept_max(memory.total);
     if kept > 0 {
         let views = kept / (6 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
@@ -155,6 +174,7 @@ fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
     let labels = room.labels.map(|labels| LabelSize { layers: half(labels.layers), ..labels });
     let smaller = [
         ("half of --gaussians", EngineSize { gaussians: (room.gaussians / 2).max(1), ..*room }),
+        ("--moments half", room.with_half_moments(true)),
         ("half of both sides of --size", EngineSize { image, ..*room }),
         ("half of --label-samples", EngineSize { labels, ..*room }),
     ];
@@ -210,6 +230,8 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "kernels": shape_json(&subject.shape),
         "gaussians": room.gaussians,
         "size": [room.image.0, room.image.1],
+        "moments": if room.half_moments { Moments::Half } else { Moments::Full },
+        "fits_with_half_moments": room.half_moments && problem.is_none() || subject.half_fits(memory).is_some(),
         "label_samples": room.labels.map_or(0, |labels| labels.layers),
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,

@@ -81,6 +81,8 @@ domains! {
         "Rows of the model; also the maximum number of visible splats.";
     TRAINED trained: "trained", cures::model,
         "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
+    SECOND_MOMENTS second_moments: "second moments", cures::model,
+        "Rows with second moments of their own: equal to Trained, or 0 where those are packed with the first ones.", optional;
     LABELLED labelled: "labelled", cures::model,
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     INSTANCES instances: "instances", cures::pairs,
@@ -141,7 +143,19 @@ domains! {
     segments: "Maximum number of dispatches for one walk of a tile's list.";
 }
 
+impl Domain {
+    /// True if its elements are rows of trained Gaussians.
+    pub(crate) fn is_trained(&self) -> bool {
+        [Self::TRAINED.count, Self::SECOND_MOMENTS.count].contains(&self.count)
+    }
+}
+
 impl Capacity {
+    /// True if first and second moments share a plane of words (glsl/include/moments_store.glsl).
+    pub fn packs_moments(&self) -> bool {
+        self.second_moments < self.trained
+    }
+
     /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, on a card twice, because
     /// growth costs it more steps; and at least 1.1 times `needed`, so that slow growth does not overflow at every step.
     pub fn grown(current: u64, needed: u64, on_card: bool) -> u64 {
