@@ -56,7 +56,7 @@ crate::buffers! { cures::whole;
     LABEL_MAP "label_map": 4, Domain::LABELLED_PIXELS, Class::Persistent, None, "Label of each pixel, `[P]`: the one with the largest sum of weights.";
     LABEL_WEIGHTS "label_weights": 4, Domain::LABELLED_PIXELS, Class::Step, None, "Sum of the weights of that label, `[P]`.";
     LABEL_TABLES "label_tables": 16, Domain::LABEL_TABLES, Class::Step, None, "Labels that each walk of a tile sums, `[T, rounds]`.";
-    VOTES_LOW "votes_low": 4, Domain::VOTE_CELLS, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words.";
+    VOTES_LOW "votes_low": 4, Domain::VOTE_CELLS, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: low words; in a training only during the sweep.";
     VOTES_HIGH "votes_high": 4, Domain::VOTE_CELLS, Class::Model, None, "Votes of a sweep by Gaussian and label, `[N, columns]`: high words.";
     NONFINITE_ROWS "nonfinite_rows": 4, Domain::fixed(64), Class::Persistent, None, "First row of each plane of the state with a NaN or infinity.";
     FAILURE "failure": 4, Domain::ONE, Class::Persistent, None, "Sticky failure bits; while one is set, passes do not change the model.";
