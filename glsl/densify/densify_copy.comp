@@ -8,17 +8,25 @@
 // Work:    one vec4 of one old Gaussian per invocation; STRIDE vec4 per Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
 // Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned
-//          parents; frozen ones have none.
+//          parents; frozen ones have none. HALF: words of packed moments (moments_store.glsl), which no float may stand for.
 // Mirror:  src/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;
 layout(constant_id = 16) const uint MOMENTS = 0;
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
+#ifdef HALF
+#define VALUE uvec4
+READ(1, uvec4, old_values);
+#define old_value(e) old_values[e]
+#else
+#define VALUE vec4
 FETCH4(1, old_values);
+#define old_value(e) fetch4(old_values, e)
+#endif
 FETCHU(2, densify_actions);
 FETCHU(3, child_offsets);
-WRITE(4, vec4, values);
+WRITE(4, VALUE, values);
 
 void main() {
     uint e = linear_group_id() * 64u + gl_LocalInvocationID.x;
@@ -27,9 +35,9 @@ void main() {
         return;
     }
     uint action = fetchu(densify_actions, i), to = fetchu(child_offsets, i) * STRIDE + (e - i * STRIDE);
-    vec4 v = fetch4(old_values, e);
+    VALUE v = old_value(e);
     bool kept = action == ACTION_KEEP || action == ACTION_CLONE;
     for (uint child = 0u; child < children(action); child++) {
-        values[to + child * STRIDE] = MOMENTS == 0u || (kept && child == 0u) ? v : vec4(0.0);
+        values[to + child * STRIDE] = MOMENTS == 0u || (kept && child == 0u) ? v : VALUE(0);
     }
 }

@@ -4,6 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
+#include "moments_store.glsl"
 // mark_near — mark the Gaussians that fog the camera of the step or one on the way to another camera: before its near
 //             plane, or so large that they engulf the camera of the step. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
@@ -21,10 +22,8 @@ FETCH4(2, scales);
 INOUT(3, vec2, densify_stats);
 READ1(4, Counters, counters);
 #ifdef LAZY
-FETCH4(5, m_means);
-FETCH4(6, m_scales);
-FETCH4(7, u_means);
-FETCH4(8, u_scales);
+READ_MOMENTS(5, 7, means);
+READ_MOMENTS(6, 8, scales);
 FETCHU(9, touched_at);
 READ(10, uvec4, missed);
 #endif

@@ -1,6 +1,6 @@
 // Parameters of a Gaussian with the updates that it has missed: those of the steps since its last one, in which its gradient
-// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP; plane4 is an
-// element of one of them. LAZY: else nothing is missed.
+// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP with their moments
+// (moments_store.glsl); plane4 is an element of one of them. LAZY: else nothing is missed.
 //
 // Without a gradient the moments shrink by beta1 and beta2, so that the k-th missed update moves a parameter by
 // r^k m / sqrt(v) times w, with r = beta1 / sqrt(beta2) and w the rate of that update with its corrections. The sums of r^k w
@@ -66,7 +66,9 @@ vec4 late_direction(vec4 m, vec4 v) {
     vec4 name##_now(uint e) { \
         vec4 value = plane4(name, e); \
         if (is_late) { \
-            value -= (sums) * late_direction(plane4(m_##name, e), plane4(u_##name, e)); \
+            vec4 m, v; \
+            load_moments(name, e, m, v); \
+            value -= (sums) * late_direction(m, v); \
         } \
         return value; \
     }

@@ -3,16 +3,17 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "moments_store.glsl"
 // adam — one Adam update of one attribute of all trained Gaussians. An invisible Gaussian has gradient 0; with SEEN_ONLY it
 //        stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other rows stay
-//        unchanged, and the number of updates of each row corrects its moments.
+//        unchanged, and the number of updates of each row corrects its moments. HALF: the moments are packed.
 // Work:    one vec4 of one Gaussian per invocation; STRIDE vec4 per Gaussian. SHARED: one row of the step.
-// Reads:   step, counters; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in, first_moments_in,
-//          second_moments_in [N,STRIDE]. SHARED: counters; step_rows, step_rates, gradients, weights and the rest [S]
-// Writes:  parameters, first_moments, second_moments [N,STRIDE], the same buffers. SHARED: also weights [S]
+// Reads:   step, counters; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in and their moments
+//          [N,STRIDE]. SHARED: counters; step_rows, step_rates, gradients, weights and the rest [S]
+// Writes:  parameters and their moments [N,STRIDE], the same buffers. SHARED: also weights [S]
 // Math:    Kingma and Ba; beta 0.9 / 0.999, epsilon 1e-15, no weight decay; rates by RATE. SHARED: 1 - beta^t is
 //          kept as the moment of a gradient of 1, without a power or a count of updates.
-// Mirror:  src/reference/adam.rs::adam, adam.rs::adam_value
+// Mirror:  src/reference/adam.rs::adam, adam.rs::adam_value, moments.rs::pack
 
 layout(local_size_x = 64) in;
 #ifdef SHARED
@@ -32,11 +33,10 @@ FETCH4(3, gradients);
 // Two bindings for one buffer: texel reads where they are fast, storage writes. An invocation reads only its own
 // elements, before it writes them.
 FETCH4(4, parameters_in);
-FETCH4(5, first_moments_in);
-FETCH4(6, second_moments_in);
+READ_MOMENTS(5, 6, parameters_in);
 WRITE(7, vec4, parameters);
-WRITE(8, vec4, first_moments);
-WRITE(9, vec4, second_moments);
+WRITE_MOMENTS(8, 9, parameters);
+#define plane4(name, e) fetch4(name, e)
 
 void main() {
 #ifdef SHARED
@@ -71,10 +71,11 @@ void main() {
         : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : RATE == 3u ? u.rate_sh0 : u.rate_sh_rest);
     float correction1 = u.adam_correction1, correction2 = u.adam_correction2;
 #endif
-    vec4 m = ADAM_BETA1 * fetch4(first_moments_in, e) + (1.0 - ADAM_BETA1) * g;
-    vec4 v = ADAM_BETA2 * fetch4(second_moments_in, e) + (1.0 - ADAM_BETA2) * g * g;
+    vec4 m, v;
+    load_moments(parameters_in, e, m, v);
+    m = ADAM_BETA1 * m + (1.0 - ADAM_BETA1) * g;
+    v = ADAM_BETA2 * v + (1.0 - ADAM_BETA2) * g * g;
     vec4 update = rate * (m * correction1) / (sqrt(v * correction2) + ADAM_EPSILON);
     parameters[e] = fetch4(parameters_in, e) - update;
-    first_moments[e] = m;
-    second_moments[e] = v;
+    store_moments(parameters, e, m, v, u.seed, RATE < 4u ? RATE : 3u + STRIDE / 2u);
 }

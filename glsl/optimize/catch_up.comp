@@ -3,6 +3,7 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
+#include "moments_store.glsl"
 // catch_up — give all Gaussians the updates of Adam that they have missed.
 // Work:    64 Gaussians per workgroup; their vec4 are shared out.
 // Reads:   step, counters; missed
@@ -23,20 +24,13 @@ INOUT(7, vec4, sh0);
 INOUT(8, vec4, sh1);
 INOUT(9, vec4, sh2);
 INOUT(10, vec4, sh3);
-INOUT(11, vec4, m_means);
-INOUT(12, vec4, m_scales);
-INOUT(13, vec4, m_quats);
-INOUT(14, vec4, m_sh0);
-INOUT(15, vec4, m_sh1);
-INOUT(16, vec4, m_sh2);
-INOUT(17, vec4, m_sh3);
-INOUT(18, vec4, u_means);
-INOUT(19, vec4, u_scales);
-INOUT(20, vec4, u_quats);
-INOUT(21, vec4, u_sh0);
-INOUT(22, vec4, u_sh1);
-INOUT(23, vec4, u_sh2);
-INOUT(24, vec4, u_sh3);
+MOMENTS(11, 18, means);
+MOMENTS(12, 19, scales);
+MOMENTS(13, 20, quats);
+MOMENTS(14, 21, sh0);
+MOMENTS(15, 22, sh1);
+MOMENTS(16, 23, sh2);
+MOMENTS(17, 24, sh3);
 
 #define LAZY
 #define plane4(name, e) name[e]

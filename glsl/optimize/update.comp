@@ -6,6 +6,7 @@
 #include "gaussian.glsl"
 #include "projection.glsl"
 #include "sh.glsl"
+#include "moments_store.glsl"
 // update — what a step changes of the Gaussians that it touched: sums the gradient records of each, carries them back to its
 //          parameters, and applies the updates of Adam that it has missed, then that of the step.
 // Work:    64 Gaussians of the model per workgroup, one an invocation; colours by vec4, shared out. A splat with many records is
@@ -40,20 +41,13 @@ INOUT(14, vec4, sh0);
 INOUT(15, vec4, sh1);
 INOUT(16, vec4, sh2);
 INOUT(17, vec4, sh3);
-INOUT(18, vec4, m_means);
-INOUT(19, vec4, m_scales);
-INOUT(20, vec4, m_quats);
-INOUT(21, vec4, m_sh0);
-INOUT(22, vec4, m_sh1);
-INOUT(23, vec4, m_sh2);
-INOUT(24, vec4, m_sh3);
-INOUT(25, vec4, u_means);
-INOUT(26, vec4, u_scales);
-INOUT(27, vec4, u_quats);
-INOUT(28, vec4, u_sh0);
-INOUT(29, vec4, u_sh1);
-INOUT(30, vec4, u_sh2);
-INOUT(31, vec4, u_sh3);
+MOMENTS(18, 25, means);
+MOMENTS(19, 26, scales);
+MOMENTS(20, 27, quats);
+MOMENTS(21, 28, sh0);
+MOMENTS(22, 29, sh1);
+MOMENTS(23, 30, sh2);
+MOMENTS(24, 31, sh3);
 #ifdef LABELS
 FETCHU(32, labels);
 FETCHU(33, layer_from_label);

@@ -9,6 +9,7 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 #include "cull.glsl"
+#include "moments_store.glsl"
 // project_visible — cull, and then project_forward, on cards: list, project and colour the visible Gaussians in the order of the
 //                   model, and count the tiles of each.
 // Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible ones are shared out again, so that
@@ -41,20 +42,13 @@ FETCHU(13, labels);
 FETCHU(14, layer_from_label);
 #endif
 #ifdef LAZY
-FETCH4(15, m_means);
-FETCH4(16, m_scales);
-FETCH4(17, m_quats);
-FETCH4(18, m_sh0);
-FETCH4(19, m_sh1);
-FETCH4(20, m_sh2);
-FETCH4(21, m_sh3);
-FETCH4(22, u_means);
-FETCH4(23, u_scales);
-FETCH4(24, u_quats);
-FETCH4(25, u_sh0);
-FETCH4(26, u_sh1);
-FETCH4(27, u_sh2);
-FETCH4(28, u_sh3);
+READ_MOMENTS(15, 22, means);
+READ_MOMENTS(16, 23, scales);
+READ_MOMENTS(17, 24, quats);
+READ_MOMENTS(18, 25, sh0);
+READ_MOMENTS(19, 26, sh1);
+READ_MOMENTS(20, 27, sh2);
+READ_MOMENTS(21, 28, sh3);
 FETCHU(29, touched_at);
 READ(30, uvec4, missed);
 #endif

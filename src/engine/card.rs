@@ -1,5 +1,6 @@
 //! Predictions of memory for a device that is not here.
 
+use super::growth::of_votes;
 use super::{Engine, EngineSize, capacity};
 use crate::error::Result;
 use crate::gpu::limits::PlanLimits;
@@ -30,5 +31,18 @@ pub(crate) fn predict_for(shape: &KernelShape, limits: &PlanLimits, size: &Engin
     let size = &size.in_bands(shape);
     let capacity = capacity(shape, size);
     let lists = Engine::lists_of(shape, &capacity, size);
-    MemoryReport::predict(TABLE, &capacity.counts(), &lists, limits, PlanOptions::default())
+    let steps = MemoryReport::predict(TABLE, &capacity.counts(), &lists, limits, PlanOptions::default())?;
+    let votes = predict_votes(shape, limits, size)?.filter(|votes| votes.total > steps.total);
+    Ok(votes.unwrap_or(steps))
+}
+
+/// Predicts the memory of a training while it counts votes; `None` if it never needs other memory than its steps.
+pub(crate) fn predict_votes(
+    shape: &KernelShape,
+    limits: &PlanLimits,
+    size: &EngineSize,
+) -> Result<Option<MemoryReport>> {
+    let size = &size.in_bands(shape);
+    let Some((counting, list)) = of_votes(shape, &capacity(shape, size), size) else { return Ok(None) };
+    MemoryReport::predict(TABLE, &counting.counts(), &[list], limits, PlanOptions::default()).map(Some)
 }

@@ -46,6 +46,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let mut capacity = Capacity {
         gaussians,
         trained,
+        second_moments: if size.half_moments { 0 } else { trained },
         labelled: if labels > 0 { gaussians } else { 0 },
         virtual_tiles: tiles * (layers + 1),
         layer_tiles: if layers > 0 { tiles } else { 0 },
@@ -56,7 +57,7 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
         label_tables: if labels > 0 { tiles * u64::from(LABEL_ROUNDS) } else { 0 },
         labels,
         vote_columns: vote_columns(size),
-        vote_cells: vote_columns(size) * gaussians,
+        vote_cells: if size.trained { 0 } else { vote_columns(size) * gaussians },
         layers: if labels > 0 { layers + 1 } else { 0 },
         occluder_words: label_words,
         loss_partials: u64::from(loss::partials(shape, width, height)),
@@ -68,6 +69,15 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     };
     derive(shape, &mut capacity, instances, size.trained);
     capacity
+}
+
+/// Returns the capacities of a training that counts votes, and the list that does so; `None` where nothing changes.
+pub(super) fn of_votes(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Option<(Capacity, PassList)> {
+    let mut counting = Capacity { vote_cells: vote_columns(size) * capacity.gaussians, ..*capacity };
+    // Nor is there a gradient.
+    derive(shape, &mut counting, capacity.instances, false);
+    let list = || pass::vote_view(shape, &counting, 1, false);
+    (size.trained && counting.vote_cells > 0).then(|| (counting, list()))
 }
 
 /// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].
@@ -225,11 +235,38 @@ impl Engine {
             let variant = widest(&self.size);
             lists.push(pass::extended_step(&self.shape, capacity, variant, (&*self.extension, self.passes)));
         }
-        match self.sched.predict_here(&capacity.counts(), &lists) {
+        let fit = |capacity: &Capacity, lists: &[PassList]| match self.sched.predict_here(&capacity.counts(), lists) {
             Ok(_) => Ok(true),
             Err(Error::OutOfMemory { .. }) => Ok(false),
             Err(other) => Err(other),
+        };
+        let counting = of_votes(&self.shape, capacity, &self.size);
+        Ok(fit(capacity, &lists)? && counting.map_or(Ok(true), |(counting, list)| fit(&counting, &[list]))?)
+    }
+
+    /// Begins a sweep of votes, all of which are 0. A training has memory for them only until [`Engine::end_votes`], where
+    /// gradients and scratch of its steps were. No list may be in flight.
+    pub(crate) fn begin_votes(&mut self) -> Result<()> {
+        self.check_idle()?;
+        match of_votes(&self.shape, &self.capacity, &self.size) {
+            Some((counting, _)) => self.set_capacity(counting),
+            None => Ok(()),
         }
+    }
+
+    /// Ends a sweep of votes.
+    pub(crate) fn end_votes(&mut self) -> Result<()> {
+        if !self.trades_votes() {
+            return Ok(());
+        }
+        let mut steps = Capacity { vote_cells: 0, ..self.capacity };
+        derive(&self.shape, &mut steps, self.capacity.instances, true);
+        self.set_capacity(steps)
+    }
+
+    /// True while a training has votes instead of gradients.
+    fn trades_votes(&self) -> bool {
+        self.size.trained && self.capacity.vote_cells > 0
     }
 
     /// Grows the buffers that were too small for a failed list, and clears the failure. Returns true if a buffer grew;
@@ -277,7 +314,7 @@ impl Engine {
         follow(&mut new.layer_tiles, needed.layer_tile_count);
         new.segments = new.segments.max(u64::from(needed.longest_list.div_ceil(self.shape.segment_length)));
         let instances = new.instances;
-        derive(&self.shape, &mut new, instances, self.size.trained);
+        derive(&self.shape, &mut new, instances, self.size.trained && !self.trades_votes());
         new
     }
 

@@ -3,6 +3,7 @@
 
 use super::Engine;
 use super::missed::{Missed, Weights};
+use super::moments::{pack_all, unpack_all};
 use crate::error::Result;
 use crate::pass::ATTRIBUTES;
 use crate::pass::buffers::TABLE;
@@ -22,12 +23,14 @@ pub(super) struct Late {
     ages: Vec<usize>,
     /// By number of updates: sums for the eight rates, factors of first and second moments.
     sums: Vec<(Weights, [f32; 2])>,
+    /// The moments are packed.
+    half: bool,
 }
 
 impl Late {
-    fn new(missed: &Missed, touched_at: &[u32]) -> Self {
+    fn new(missed: &Missed, touched_at: &[u32], half: bool) -> Self {
         let ages = touched_at.iter().map(|&at| missed.age(at) as usize).collect();
-        Self { ages, sums: missed.sums() }
+        Self { ages, sums: missed.sums(), half }
     }
 
     /// Catches up the values of a plane of parameters, given with its moments, which it catches up too.
@@ -52,8 +55,10 @@ pub(super) fn read(sched: &mut Scheduler, late: Option<&Late>, plane: Buf, float
     let attribute = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane);
     if let (Some(late), Some(attribute)) = (late, attribute) {
         let trained = late.ages.len() * 4 * attribute.stride as usize;
-        let mut m = sched.download::<f32>(attribute.planes[1], 0, 0, trained)?;
-        let mut u = sched.download::<f32>(attribute.planes[2], 0, 0, trained)?;
+        let (mut m, mut u) = match attribute.moments(late.half) {
+            [packed] => unpack_all(&sched.download(*packed, 0, 0, trained)?),
+            both => (sched.download(both[0], 0, 0, trained)?, sched.download(both[1], 0, 0, trained)?),
+        };
         late.settle(plane, [&mut values[..trained], &mut m, &mut u]);
     }
     Ok(values)
@@ -63,18 +68,23 @@ pub(super) fn read(sched: &mut Scheduler, late: Option<&Late>, plane: Buf, float
 pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
     let find = |name: &str| planes.iter().find(|plane| plane.name == name);
     let (missed, touched_at) = (find(MISSED)?, find(TABLE[Buf::TOUCHED_AT.index()].name)?);
-    let late = Late::new(&Missed::of_words(&missed.data), &touched_at.data);
+    let late = Late::new(&Missed::of_words(&missed.data), &touched_at.data, false);
     let mut all: Vec<Plane> = planes.to_vec();
+    let floats = |plane: &Plane| plane.data.iter().map(|&word| f32::from_bits(word)).collect::<Vec<f32>>();
+    let words = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<u32>>();
     for attribute in &ATTRIBUTES {
-        let names = attribute.planes.map(|buf| TABLE[buf.index()].name);
-        let floats = |plane: &&mut Plane| plane.data.iter().map(|&word| f32::from_bits(word)).collect::<Vec<f32>>();
-        let mut of = names.map(|name| all.iter_mut().find(|plane| plane.name == name).as_ref().map(floats));
-        let [Some(values), Some(m), Some(u)] = &mut of else { continue };
-        late.settle(attribute.planes[0], [values, m, u]);
-        for (name, values) in names.iter().zip(of.iter().flatten()) {
-            if let Some(plane) = all.iter_mut().find(|plane| plane.name == *name) {
-                plane.data = values.iter().map(|value| value.to_bits()).collect();
-            }
+        let named = |buf: Buf| all.iter().position(|plane| plane.name == TABLE[buf.index()].name);
+        let [Some(values), Some(first), second] = attribute.planes.map(named) else { continue };
+        let mut row = floats(&all[values]);
+        let (mut m, mut u) = match second {
+            Some(second) => (floats(&all[first]), floats(&all[second])),
+            None => unpack_all(&all[first].data),
+        };
+        late.settle(attribute.planes[0], [&mut row, &mut m, &mut u]);
+        all[values].data = words(row);
+        match second {
+            Some(second) => (all[first].data, all[second].data) = (words(m), words(u)),
+            None => all[first].data = pack_all(&m, &u),
         }
     }
     all.retain(|plane| plane.name != missed.name && plane.name != touched_at.name);
@@ -117,6 +127,6 @@ impl Engine {
             return Ok(None);
         }
         let touched_at = self.sched.download::<u32>(Buf::TOUCHED_AT, 0, 0, self.trained_count() as usize)?;
-        Ok(Some(Late::new(&self.missed, &touched_at)))
+        Ok(Some(Late::new(&self.missed, &touched_at, self.size.half_moments)))
     }
 }

@@ -207,7 +207,9 @@ impl Engine {
         }
         self.check_idle()?;
         let list = self.list(ListKey::CatchUp)?;
-        self.write(0, Input::Uniforms(&StepUniforms::zeroed()))?;
+        // Packed moments are rounded by what the seed draws.
+        let seed = self.missed.mark.now;
+        self.write(0, Input::Uniforms(&StepUniforms { seed, ..StepUniforms::zeroed() }))?;
         self.sched.upload(Buf::MISSED, 0, 0, &self.missed.table([0.0; 8], true))?;
         self.sched.run(list, 0)?;
         self.missed.mark.whole = self.missed.mark.now;

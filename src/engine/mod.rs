@@ -14,13 +14,14 @@ mod label_ids;
 mod late;
 mod missed;
 pub(crate) mod model;
+mod moments;
 pub mod run;
 mod size;
 pub(crate) mod state;
 pub(crate) mod uniforms;
 
 pub(crate) use bands::Band;
-pub(crate) use card::{card, predict_for};
+pub(crate) use card::{card, predict_for, predict_votes};
 pub(crate) use growth::{GrownSizes, capacity};
 pub(crate) use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use label_ids::tell_apart;

@@ -33,8 +33,8 @@ pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize
         }
         sched.upload(plane, 0, 0, &words)?;
     }
-    for plane in ATTRIBUTES.iter().flat_map(|a| [a.planes[1], a.planes[2]]).chain([Buf::DENSIFY_STATS]) {
-        sched.fill(plane, 0)?;
+    for plane in ATTRIBUTES.iter().flat_map(|a| a.moments(size.half_moments)).chain([&Buf::DENSIFY_STATS]) {
+        sched.fill(*plane, 0)?;
     }
     match (size.labels, &model.labels) {
         (None, _) => Ok(LabelIds::default()),

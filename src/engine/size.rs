@@ -33,12 +33,23 @@ pub struct EngineSize {
     pub frozen: u32,
     /// True with room for depths that photos are known to have.
     pub depths: bool,
+    /// True with both moments of a parameter in one word, 16 bits each (glsl/include/moments_store.glsl).
+    pub half_moments: bool,
 }
 
 impl EngineSize {
     /// Sizes for rendering this many Gaussians in images of up to `image` px.
     pub const fn new(gaussians: u64, image: (u32, u32)) -> Self {
-        Self { gaussians, image, trained: false, labels: None, shared_rows: 0, frozen: 0, depths: false }
+        Self {
+            gaussians,
+            image,
+            trained: false,
+            labels: None,
+            shared_rows: 0,
+            frozen: 0,
+            depths: false,
+            half_moments: false,
+        }
     }
 
     /// Sizes for rendering a model, and its labels if it has some, in images of up to the largest of `sizes`, px.
@@ -73,6 +84,12 @@ impl EngineSize {
     /// Sets whether there is room for known depths.
     pub(crate) const fn with_depths(self, depths: bool) -> Self {
         Self { depths, ..self }
+    }
+
+    /// Sets whether both moments of a parameter share a word.
+    #[doc(hidden)]
+    pub const fn with_half_moments(self, half_moments: bool) -> Self {
+        Self { half_moments, ..self }
     }
 
     /// Returns the most tiles and rows of tiles that the kernels of the device can walk; `None` without a limit.

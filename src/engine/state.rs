@@ -2,10 +2,10 @@
 //! zero, both in a new and in a continued training.
 
 use super::missed::Missed;
-use super::{Engine, ListKey, late};
+use super::{Engine, EngineSize, ListKey, late};
 use crate::error::Result;
 use crate::pass::buffers::TABLE;
-use crate::pass::{ATTRIBUTES, SHARED_PLANES};
+use crate::pass::{ATTRIBUTES, Attribute, SHARED_PLANES};
 use crate::records::checkpoint::Plane;
 use crate::scheduler::Snapshot;
 use crate::scheduler::plan::{Buf, Domain};
@@ -14,6 +14,7 @@ use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// Numbers of rows of a training's state.
 #[derive(Clone, Copy, Debug)]
@@ -24,14 +25,16 @@ pub(crate) struct Counts {
     pub frozen: u32,
     /// Shared rows.
     pub shared: u32,
+    /// Both moments of a parameter are packed in one plane.
+    pub half_moments: bool,
 }
 
 impl Counts {
     fn of(&self, buf: Buf) -> u32 {
-        let count = TABLE[buf.index()].domain.count;
-        if count == Domain::TRAINED.count {
+        let domain = &TABLE[buf.index()].domain;
+        if domain.is_trained() {
             self.gaussians.saturating_sub(self.frozen)
-        } else if count == Domain::SHARED_ROWS.count {
+        } else if domain.count == Domain::SHARED_ROWS.count {
             self.shared
         } else {
             self.gaussians
@@ -41,7 +44,8 @@ impl Counts {
 
 /// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
 fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], counts: Counts) -> Vec<(Buf, u32)> {
-    let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(|a| a.planes);
+    let planes = |a: &'static Attribute| iter::once(a.planes[0]).chain(a.moments(counts.half_moments).iter().copied());
+    let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(planes);
     let labels = labels.then_some(Buf::LABELS);
     let shared = SHARED_PLANES.into_iter().filter(|_| counts.shared > 0);
     let all = attributes.chain(kept.iter().copied()).chain(labels).chain(shared);
@@ -120,7 +124,7 @@ impl Engine {
     pub(crate) fn copy_state(&mut self, kept: &[Buf]) -> Result<Copied> {
         self.check_idle()?;
         let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
-        let counts = Counts { gaussians, frozen, shared: self.size.shared_rows };
+        let counts = Counts { gaussians, frozen, ..self.no_gaussians() };
         let buffers = buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter();
         let late = self.missed.is_late().then(|| (Buf::TOUCHED_AT, counts.of(Buf::DENSIFY_STATS)));
         let missed = late.map(|_| self.missed.plane());
@@ -140,10 +144,16 @@ impl Engine {
         Ok(Copied { shapes, words, missed })
     }
 
-    /// Planes of floats of the state.
+    fn no_gaussians(&self) -> Counts {
+        let EngineSize { shared_rows: shared, half_moments, .. } = self.size;
+        Counts { gaussians: 0, frozen: 0, shared, half_moments }
+    }
+
+    /// Planes of floats of the state. Packed moments are none: all words stand for finite numbers.
     pub(super) fn floats(&self, kept: &[Buf]) -> Vec<Buf> {
-        let counts = Counts { gaussians: 0, frozen: 0, shared: self.size.shared_rows };
-        buffers(self.sh_degree, false, kept, counts).into_iter().map(|(buf, _)| buf).collect()
+        let all = buffers(self.sh_degree, false, kept, self.no_gaussians()).into_iter().map(|(buf, _)| buf);
+        let is_packed = |buf: &Buf| self.size.half_moments && ATTRIBUTES.iter().any(|a| a.planes[1] == *buf);
+        all.filter(|buf| !is_packed(buf)).collect()
     }
 
     /// Returns the name and the row of a number of the state that is not finite, and whether the row is a shared one; `None`

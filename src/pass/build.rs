@@ -25,6 +25,8 @@ pub struct Builder<'a> {
     pub late: bool,
     /// Lists of more splats are walked forward by a workgroup for each chunk; `None` if the blends have no such form.
     pub long_list: Option<u32>,
+    /// Both moments of a parameter are packed in one word.
+    pub half: bool,
     /// Passes of sorts, and scans, so far in this list that look back.
     pub sweeps: Sweeps,
     /// The list so far.
@@ -79,6 +81,7 @@ impl<'a> Builder<'a> {
             loss_partials: 0,
             late: false,
             long_list: None,
+            half: capacity.packs_moments(),
             sweeps: Sweeps::default(),
             list,
         }

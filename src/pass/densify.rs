@@ -9,8 +9,9 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, mark_near(lazy: b.late) {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, counters: Buf::COUNTERS, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
+    pass!(b, mark_near(lazy: b.late, half: b.late && b.half) {
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, counters: Buf::COUNTERS,
+        m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
         touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
     } [], over_gaussians());
 }
@@ -57,12 +58,14 @@ pub(super) fn apply(b: &mut Builder, labels: bool) {
     } [], over_gaussians());
     for a in &ATTRIBUTES {
         let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);
-        for (index, &plane) in a.planes.iter().enumerate().skip(usize::from(geometry)) {
+        let moments = a.moments(b.half).iter().map(|&plane| (plane, true));
+        let planes = [(a.planes[0], false)].into_iter().skip(usize::from(geometry)).chain(moments);
+        for (plane, are_moments) in planes {
             b.list.copy(plane, Buf::OLD_VALUES, 0);
-            pass!(b, densify_copy {
+            pass!(b, densify_copy(half: b.half && are_moments) {
                 step: Buf::STEP, old_values: Buf::OLD_VALUES, densify_actions: Buf::DENSIFY_ACTIONS,
                 child_offsets: Buf::CHILD_OFFSETS, values: plane,
-            } [stride: a.stride, moments: u32::from(index > 0)], args(a.args));
+            } [stride: a.stride, moments: u32::from(are_moments)], args(a.args));
         }
     }
     if labels {

@@ -22,7 +22,7 @@ mod update;
 
 pub use build::Builder;
 pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
-pub(crate) use optimize::{ATTRIBUTES, SHARED_PLANES};
+pub(crate) use optimize::{ATTRIBUTES, Attribute, SHARED_PLANES};
 pub use shape::{GroupBlend, KernelShape, Update};
 pub(crate) use tile::TileSort;
 pub(crate) use update::is_fused;

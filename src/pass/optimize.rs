@@ -34,6 +34,13 @@ pub(crate) const ATTRIBUTES: [Attribute; 7] = [
     attribute([Buf::SH3, Buf::M_SH3, Buf::U_SH3], Buf::V_SH3, 6, 4, 3, constants::ARGS_SH3),
 ];
 
+impl Attribute {
+    /// Planes with its moments; `half`: packed in one.
+    pub(crate) fn moments(&self, half: bool) -> &[Buf] {
+        if half { &self.planes[1..2] } else { &self.planes[1..] }
+    }
+}
+
 const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from_degree: u32, args: u32) -> Attribute {
     Attribute { planes, gradient, stride, rate, from_degree, args }
 }
@@ -76,10 +83,10 @@ fn update(
 ) {
     let rows = b.capacity.shared_rows as u32;
     let [parameters, first, second] = planes;
-    pass!(b, adam(shared: shared) {
+    pass!(b, adam(shared: shared, half: b.half && !shared) {
         step: Buf::STEP, counters: Buf::COUNTERS, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, gradients: gradients,
-        parameters_in: parameters, first_moments_in: first, second_moments_in: second, parameters: parameters,
-        first_moments: first, second_moments: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
+        parameters_in: parameters, m_parameters_in: first, u_parameters_in: second, parameters: parameters,
+        m_parameters: first, u_parameters: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
         weights: Buf::W_SHARED,
     } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
@@ -112,6 +119,6 @@ pub(crate) fn explore(b: &mut Builder) {
 /// Limits opacities to 0.01 and zeroes their moments.
 pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, opacity_reset { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
+    pass!(b, opacity_reset(half: b.half) { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
         over_gaussians());
 }

@@ -58,7 +58,7 @@ fn project_forward(b: &mut Builder) {
 fn project_visible(b: &mut Builder, keys: Buf) {
     let (sh_degree, sort_slot) = (b.sh_degree, b.sweeps.sorts);
     let labels = b.supervision.has_layers();
-    pass!(b, project_visible(labels: labels, lazy: b.late, sweep: b.shape.sweeps()) {
+    pass!(b, project_visible(labels: labels, lazy: b.late, half: b.late && b.half, sweep: b.shape.sweeps()) {
         step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales: Buf::SCALES,
         quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,

@@ -14,6 +14,7 @@ pub mod lazy;
 pub mod lift;
 pub mod loss;
 pub mod model;
+pub mod moments;
 pub mod pose;
 pub mod project;
 pub mod random;

@@ -1,4 +1,4 @@
-//! Random numbers of densification; they depend only on the seed, the Gaussian and the index of the draw.
+//! Random numbers of densification and of packed moments; they depend only on the seed, the Gaussian and the index of the draw.
 
 fn pcg_hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -6,10 +6,14 @@ fn pcg_hash(v: u32) -> u32 {
     (word >> 22) ^ word
 }
 
+/// All bits of a draw.
+pub fn hash(seed: u32, index: u32, draw: u32) -> u32 {
+    pcg_hash(pcg_hash(pcg_hash(seed).wrapping_add(index)).wrapping_add(draw))
+}
+
 /// A number in 0 to 1, both excluded.
 pub fn uniform_draw(seed: u32, index: u32, draw: u32) -> f64 {
-    let hash = pcg_hash(pcg_hash(pcg_hash(seed).wrapping_add(index)).wrapping_add(draw));
-    (f64::from(hash >> 8) + 0.5) / 16_777_216.0
+    (f64::from(hash(seed, index, draw) >> 8) + 0.5) / 16_777_216.0
 }
 
 /// A standard normal number (Box and Muller; glsl/include/random.glsl).

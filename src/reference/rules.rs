@@ -86,6 +86,12 @@ rules! {
     adam_beta2: f64 = 0.999,
     /// Added to Adam's denominator.
     adam_eps: f64 = wide(1e-15),
+    /// Steps of packed moments: of m / sqrt(v),
+    moment_ratio: f64 = 4096.0,
+    /// of an octave of sqrt(v),
+    moment_log: f64 = 1024.0,
+    /// and octaves of it below 1.
+    moment_floor: f64 = 50.0,
     /// Mean 2-D gradient (NDC units) at which a Gaussian is cloned or split.
     densify_gradient: f64 = wide(2e-4),
     /// Largest scale that is cloned, in units of the scene extent; larger Gaussians are split.

@@ -34,7 +34,7 @@ pub use crate::scheduler::plan::Buf;
 pub use crate::shaders::structs::StepUniforms;
 pub use objective::{Loss, Objective, Parameter};
 pub use report::{LabelWork, StepKind, StepReport};
-pub use settings::{ExposureMode, LabelRule, Occlusion, Preset, StrategyKind, TrainConfig};
+pub use settings::{ExposureMode, LabelRule, Moments, Occlusion, Preset, StrategyKind, TrainConfig};
 pub use setup::TrainerOptions;
 pub use setup::first_model::first_model;
 pub use shared::exposure::Exposure;

@@ -3,9 +3,9 @@
 //! The file leaves out derived values: learning rates and degrees follow from the step, the order of views and the
 //! sampled objects from seed and step, gradients and votes from the passes of the next step.
 
-use super::TrainConfig;
 use super::shared::SharedState;
 use super::strategy::StrategyState;
+use super::{Moments, TrainConfig};
 use crate::engine::GrownSizes;
 use crate::engine::state::{self, Counts};
 use crate::error::{Error, Result, Setting};
@@ -124,7 +124,8 @@ impl TrainState {
         // Masks may be given and show no object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
         let shared = state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()));
-        let counts = Counts { gaussians: state.gaussians, frozen: state.frozen, shared };
+        let half_moments = state.config.moments == Moments::Half;
+        let counts = Counts { gaussians: state.gaussians, frozen: state.frozen, shared, half_moments };
         state::check(&state.planes, counts, state.config.sh_degree, labels, &state.strategy.planes).map_err(odd)?;
         Ok(state)
     }

@@ -72,7 +72,9 @@ fn the_sizes_of_a_plan_add_up_to_its_total() {
     let pages =
         plan["memory"]["scratch_pages"].as_array().expect("pages").iter().filter_map(Value::as_u64).sum::<u64>();
     let staging = plan["memory"]["staging"].as_u64().expect("staging");
-    assert_eq!(plan["memory"]["total"], sum("bytes") + pages + staging);
+    let votes = plan["memory"]["total_while_counting_votes"].as_u64().expect("bytes");
+    assert_eq!(plan["memory"]["total"], (sum("bytes") + pages + staging).max(votes));
+    assert!(table.contains("a count of votes, between steps: votes 4 MiB"), "8 bytes for each of 256 labels\n{table}");
     let names: Vec<&str> =
         plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
     assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("layer_list")), "{names:?}");
@@ -97,6 +99,12 @@ fn a_plan_for_a_card_needs_no_card() {
     succeeds(&["plan", "--gaussians", most, "--card", "8G"]);
     let more = format!("{}", most.parse::<u64>().expect("a number") * 101 / 100);
     assert_eq!(labelgs(&["plan", "--gaussians", &more, "--card", "8G"]).status.code(), Some(5));
+    // Where full moments do not fit and packed ones do, it says so.
+    let many = ["plan", "--gaussians", "10M", "--card", "8G", "--label-samples", "0"];
+    let output = labelgs(&many);
+    assert!(output.status.code() == Some(5) && text(&output.stdout).contains("it fits with --set moments=half"));
+    let half = succeeds(&[&many[..], &["--moments", "half"]].concat());
+    assert!(half.contains("moments of 16 bits") && !half.contains("u_means"), "{half}");
 }
 
 /// A scene of `labelgs synth`, 96 x 72 px.

@@ -182,6 +182,11 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     };
     refused(&["--seed", "4"], 2, &["--seed: 0 in the checkpoint, now 4"]);
     refused(&["--set", "sh_degree=1"], 2, &["--set sh_degree: 3 in the checkpoint, now 1"]);
+    refused(
+        &["--set", "moments=half"],
+        2,
+        &["--set moments: full in the checkpoint, now half; it cannot change within a run"],
+    );
     refused(&["--set", "label_rule=main"], 2, &["--set label_rule"]);
     refused(&["--test-every", "0"], 2, &["--test-every: 8 in the checkpoint, now 0"]);
     refused(&["--iterations", "5"], 2, &["--iterations", "6 steps"]);

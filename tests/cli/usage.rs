@@ -214,7 +214,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 58] = [
+const TYPED: [(&str, &str); 59] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--set", "start_size=0.7"),
@@ -239,6 +239,7 @@ const TYPED: [(&str, &str); 58] = [
     ("--background", "0.1,0.2,1"),
     ("--set", "near=0.1"),
     ("--set", "label_from=3"),
+    ("--set", "moments=half"),
     ("--set", "label_rule=main"),
     ("--set", "vote_every=70"),
     ("--mask-border", "3"),

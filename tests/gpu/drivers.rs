@@ -53,7 +53,7 @@ fn the_selftest_passes_on_other_drivers() {
         let found: serde_json::Value = serde_json::from_str(&said).expect("JSON");
         assert_eq!(found["kernels"]["emulated"], true, "{driver:?}: {found}");
         assert_eq!(found["kernels"]["subgroup_size"], 4, "{driver:?}: {found}");
-        assert_eq!(found["checks"].as_array().map(Vec::len), Some(43), "{driver:?}: {found}");
+        assert_eq!(found["checks"].as_array().map(Vec::len), Some(44), "{driver:?}: {found}");
     }
 }
 

@@ -7,6 +7,7 @@ use crate::support::device::Turn;
 use crate::support::mutants::mutants;
 use crate::support::scenes::Scene;
 use bytemuck::Pod;
+use labelgs::engine::EngineSize;
 use labelgs::engine::run::{ListKey, Report};
 use labelgs::pass::{GroupBlend, KernelShape};
 use labelgs::scheduler::SchedulerOptions;
@@ -69,7 +70,13 @@ impl Fixture {
 
     /// As `with_shape`, with updates of the shape.
     pub fn with_update(turn: Turn, scene: Scene, labels: bool, shape: KernelShape) -> Self {
-        let inner = fixture::Fixture::with_rows(turn.gpu(), scene, labels, (shape, readable()), 0);
+        Self::with_moments(turn, scene, labels, shape, false)
+    }
+
+    /// As `with_update`, with full or packed moments.
+    pub fn with_moments(turn: Turn, scene: Scene, labels: bool, shape: KernelShape, half: bool) -> Self {
+        let with = |room: EngineSize| room.with_half_moments(half);
+        let inner = fixture::Fixture::with_room(turn.gpu(), scene, labels, (shape, readable()), with);
         Self { inner: inner.expect("the engine starts"), _turn: turn }
     }
 

@@ -16,6 +16,7 @@ mod group_blend;
 mod label_map;
 mod labels;
 mod loss;
+mod moments;
 mod optimize;
 mod orders;
 mod project;

@@ -1,14 +1,16 @@
 //! Votes for labels: the sums of a sweep against the mirror, for any number of columns and walks.
 
-use super::fixture::{Fixture, VOTE_COLUMNS, prove};
+use super::fixture::{Fixture, PARAMETERS, VOTE_COLUMNS, prove};
 use crate::reference::Rules;
 use crate::reference::lift::{vote, vote_alone};
 use crate::support::compare::{Tolerance, check, close};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
+use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::label::vote::ballot::{Sweep, Voter, sweep};
 use labelgs::label::vote_engine;
 use labelgs::scene::{LabelMap, Photo, View};
+use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::strategy::weights::weights;
 use std::collections::BTreeMap;
 
@@ -145,4 +147,34 @@ fn one_sweep_of_many_labels_equals_many_sweeps() {
     assert!(many.labels.len() > 150, "{} labels", many.labels.len());
     assert!((0..many.len()).any(|row| many.row(row).len() > 64), "a Gaussian meets many labels");
     assert!(few == many, "the votes differ");
+}
+
+/// Votes of a training come and go with a sweep, and give room to the gradients and the scratch memory of its steps.
+#[test]
+fn a_training_has_memory_for_votes_only_while_it_counts_them() {
+    let Some(turn) = device() else { return };
+    let gpu = turn.gpu();
+    let mut fixture = Fixture::new(turn, patches(145), true);
+    let state = |fixture: &mut Fixture| fixture.rows(PARAMETERS, 50);
+    fixture.train();
+    let (before, capacity) = (state(&mut fixture), *fixture.engine.capacity());
+    let votes = |fixture: &Fixture| fixture.engine.raw().memory().iter().any(|(name, _)| name.starts_with("votes_"));
+    assert!(!votes(&fixture), "none before");
+    let (mask, camera) = (mask_of(&fixture.scene).into(), fixture.scene.camera.clone());
+    let voter = Voter { camera: &camera, mask: &mask, photo: None, trust: None };
+    let how = Sweep::new(fixture.config.near, 0);
+    let ballot = sweep(&mut fixture.engine, &[voter], how).expect("votes");
+    assert!((0..ballot.len()).any(|row| !ballot.row(row).is_empty()) && !votes(&fixture), "none after");
+    assert_eq!((state(&mut fixture), *fixture.engine.capacity()), (before, capacity));
+    fixture.train();
+
+    // The larger of both counts: votes of 8 bytes for each of 100 labels, or what a step has besides them.
+    let labels = |vote_columns| Some(LabelSize { max_label: 100, layers: 0, vote_columns });
+    let total = |gaussians: u64, columns: u32| {
+        let size = EngineSize::new(gaussians, (64, 48)).for_training().with_labels(labels(columns));
+        Engine::predict(&gpu, &size, SchedulerOptions::default()).expect("it fits").total
+    };
+    let (with, without) = (total(100_000, 100), total(100_000, 0));
+    assert!(with > without && with - without < 8 * 100 * 100_000 / 2, "{with} {without}");
+    assert!(total(100_000, 10) - without < 100_000, "few votes fit where the scratch memory of a step was");
 }

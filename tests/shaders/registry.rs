@@ -56,8 +56,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let shared_out: Vec<_> = one_by_one.iter().map(|shape| KernelShape { group_walks: true, ..*shape }).collect();
     let late = shared_out.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
     for shape in one_by_one.iter().chain(&shared_out).copied().chain(late) {
-        for segments in [1, 3] {
-            let mut capacity = capacity(&shape, &ROOM);
+        for (segments, half) in [(1, true), (1, false), (3, false)] {
+            let mut capacity = capacity(&shape, &ROOM.with_half_moments(half));
             capacity.segments = segments;
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
             let size = ROOM.image;

@@ -17,6 +17,8 @@ pub enum Family {
     Loss,
     /// Optimiser.
     Adam,
+    /// Packed moments.
+    Moments,
     /// Cloning, splitting, removing.
     Densify,
     /// Marks of Gaussians that fog a camera.
@@ -47,10 +49,10 @@ pub struct Mutant {
 /// One mutant for each constant; most change it by a few per cent.
 pub fn mutants() -> Vec<Mutant> {
     use Family::{
-        Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Project, Relocate, Reset, Sh, Smooth,
+        Adam, Blend, Densify, Explore, FreeSpace, LabelMap, Lift, Loss, Moments, Project, Relocate, Reset, Sh, Smooth,
     };
     type Change = fn(&mut Rules);
-    let changes: [(&'static str, Family, Change); 43] = [
+    let changes: [(&'static str, Family, Change); 46] = [
         ("near", Project, |r| r.near = 3.8),
         ("dilation", Project, |r| r.dilation *= 1.03),
         ("antialiased", Project, |r| r.antialiased = true),
@@ -77,6 +79,9 @@ pub fn mutants() -> Vec<Mutant> {
         ("adam_beta1", Adam, |r| r.adam_beta1 *= 0.97),
         ("adam_beta2", Adam, |r| r.adam_beta2 *= 0.97),
         ("adam_eps", Adam, |r| r.adam_eps = 1e-8),
+        ("moment_ratio", Moments, |r| r.moment_ratio *= 1.03),
+        ("moment_log", Moments, |r| r.moment_log *= 1.03),
+        ("moment_floor", Moments, |r| r.moment_floor += 1.0),
         ("densify_gradient", Densify, |r| r.densify_gradient *= 1.5),
         ("percent_dense", Densify, |r| r.percent_dense *= 1.5),
         ("split_shrink", Densify, |r| r.split_shrink *= 1.03),

@@ -17,7 +17,7 @@ use labelgs::train::setup::TrainerOptions;
 use labelgs::train::state::TrainState;
 
 /// Photos of small parts of the scene, so that most show little of it.
-fn parts() -> Dataset {
+pub(super) fn parts() -> Dataset {
     let mut dataset = small();
     for view in &mut dataset.train {
         view.mask = None;
@@ -27,7 +27,7 @@ fn parts() -> Dataset {
 }
 
 /// Steps of the default strategy with a few densifications, and marks of fog in each.
-fn settings(iterations: u32) -> TrainConfig {
+pub(super) fn settings(iterations: u32) -> TrainConfig {
     TrainConfig {
         iterations,
         densify_from: Some(10),
@@ -39,18 +39,18 @@ fn settings(iterations: u32) -> TrainConfig {
     }
 }
 
-fn options(turn: &Turn, update: Update, scheduler: SchedulerOptions) -> TrainerOptions {
+pub(super) fn options(turn: &Turn, update: Update, scheduler: SchedulerOptions) -> TrainerOptions {
     let shape = KernelShape { update, group_walks: true, ..KernelShape::of(turn.capabilities()) };
     TrainerOptions { shape: Some(shape), scheduler, ..TrainerOptions::default() }
 }
 
-fn fresh(turn: &Turn, iterations: u32, options: TrainerOptions) -> Trainer {
-    let (dataset, config) = (parts(), settings(iterations));
+pub(super) fn fresh(turn: &Turn, config: TrainConfig, options: TrainerOptions) -> Trainer {
+    let dataset = parts();
     let start = initial_gaussians(&dataset, config.seed, 100).expect("points");
     Trainer::new(turn.gpu(), config, &dataset, &start, options).expect("a trainer")
 }
 
-fn go_on(trainer: &mut Trainer, until: u32) {
+pub(super) fn go_on(trainer: &mut Trainer, until: u32) {
     while trainer.steps_done() < until {
         trainer.step().expect("a step");
     }
@@ -116,8 +116,8 @@ fn late_gaussians_are_where_every_step_moves_them() {
     let Some(turn) = device() else { return };
     let fixed =
         |update| TrainerOptions { strategy: Some(Box::new(())), ..options(&turn, update, SchedulerOptions::default()) };
-    let mut every = fresh(&turn, 600, fixed(Update::Fused));
-    let mut late = fresh(&turn, 600, fixed(Update::Lazy));
+    let mut every = fresh(&turn, settings(600), fixed(Update::Fused));
+    let mut late = fresh(&turn, settings(600), fixed(Update::Lazy));
     let mut oldest = 0;
     for until in [5, 6, 15, 60, 300, 565] {
         every.engine_mut().catch_up().expect("it catches up");
@@ -168,7 +168,7 @@ fn late_gaussians_are_where_every_step_moves_them() {
 
 /// Bits of a training: losses, and the state in the end.
 fn train(turn: &Turn, scheduler: SchedulerOptions, mut between: impl FnMut(&mut Trainer)) -> (Vec<u64>, Vec<Plane>) {
-    let mut trainer = fresh(turn, 300, options(turn, Update::Lazy, scheduler));
+    let mut trainer = fresh(turn, settings(300), options(turn, Update::Lazy, scheduler));
     let mut losses = Vec::new();
     while trainer.steps_done() < 300 {
         between(&mut trainer);
@@ -203,8 +203,8 @@ fn a_late_training_goes_on_to_the_same_bits() {
         go_on(trainer, 300);
         trainer.state().expect("a state").planes
     };
-    let first = end(&mut fresh(&turn, 300, lazy()));
-    let mut looked = fresh(&turn, 300, lazy());
+    let first = end(&mut fresh(&turn, settings(300), lazy()));
+    let mut looked = fresh(&turn, settings(300), lazy());
     let folder = tempfile::tempdir().expect("a folder");
     let stops = [3, 140, 257];
     for stop in stops {

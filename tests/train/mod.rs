@@ -7,6 +7,7 @@ mod config; // schedules and ranges of the settings
 pub mod exposure; // exposures of photos are trained, found and resumed
 mod first_model; // how many Gaussians a training starts with, and where
 mod free_space; // rules against fog spare things that are near
+mod half; // packed moments: resumed trainings, memory, states
 mod known_depths; // depths of points and maps in the loss, resumed trainings
 mod late; // Gaussians that miss updates are where every step moves them
 mod overflow; // a buffer that is too small costs a step and no bit

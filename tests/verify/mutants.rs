@@ -4,6 +4,7 @@ use crate::reference::adam::{Optimised, Rates, adam};
 use crate::reference::densify::{densify, is_near, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, label_map, lift};
 use crate::reference::model::ROW_FLOATS;
+use crate::reference::moments::pack;
 use crate::reference::relocate::{explored, relocate};
 use crate::reference::smooth::smooth;
 use crate::reference::step::{splats_of, step};
@@ -41,6 +42,7 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
             let first = adam(rules, &Rates([1.0; 8]), 3, &Optimised::default(), &gradient);
             all(&[first.row, adam(rules, &Rates([1.0; 8]), 4, &first, &Row::default()).row])
         }
+        Family::Moments => vec![f64::from(pack(rules, (1.5e-4, 1e-7), 0x7fff_7fff))],
         Family::Densify => {
             let noise = |row: usize, child: u32, axis: usize| ((row * 6 + axis) as f64 + 3.0 * f64::from(child)).sin();
             let densified = |(step, splits_long)| {

@@ -3,11 +3,12 @@
 use crate::cli::commands::devices::{shape_json, shape_text};
 use crate::cli::support::Context;
 use crate::cli::support::parsers::{Size, bytes, count, size};
-use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for};
+use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for, predict_votes};
 use crate::gpu;
 use crate::pass::buffers::{Capacity, TABLE};
 use crate::pass::{KernelShape, Supervision, Variant, training_step};
 use crate::scheduler::plan::{Limits, MemoryReport, PassList, Plan, PlanOptions};
+use crate::train::Moments;
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -29,6 +30,9 @@ pub struct PlanArgs {
     /// Degree of the spherical harmonics.
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
     pub sh_degree: u32,
+    /// What the optimiser remembers of each parameter, as the setting `moments` of a training.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub moments: Moments,
     /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
@@ -45,6 +49,28 @@ struct Subject {
     room: EngineSize,
     capacity: Capacity,
     list: PassList,
+}
+
+/// The memory of a training.
+struct Memory {
+    steps: MemoryReport,
+    /// While it counts votes.
+    votes: Option<MemoryReport>,
+}
+
+impl Memory {
+    fn total(&self) -> u64 {
+        self.votes.iter().map(|votes| votes.total).fold(self.steps.total, u64::max)
+    }
+}
+
+impl Subject {
+    /// Returns the memory with packed moments, if full ones do not fit and these do.
+    fn half_fits(&self, full: &Memory) -> Option<u64> {
+        let half = self.room.with_half_moments(true);
+        let is_tried = full.total() > self.limits.max_memory && !self.room.half_moments;
+        predict_for(&self.shape, &self.limits, &half).ok().filter(|_| is_tried).map(|half| half.total)
+    }
 }
 
 /// Prints the plan of a step. Fails afterwards if the plan exceeds the device.
@@ -73,6 +99,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     });
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
+    let room = room.with_half_moments(args.moments == Moments::Half);
     let capacity = capacity(&shape, &room);
     let supervision = labels.map_or(Supervision::Photo, |_| Supervision::Layers { lift: false });
     let variant = Variant { supervision, sh_degree: args.sh_degree, ..Variant::plain(size) };
@@ -97,11 +124,12 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     }
 }
 
-fn planned(subject: &Subject, limits: &Limits) -> Result<(MemoryReport, Plan)> {
+fn planned(subject: &Subject, limits: &Limits) -> Result<(Memory, Plan)> {
     let lists = Engine::lists_of(&subject.shape, &subject.capacity, &subject.room);
     let options = PlanOptions::default();
-    let memory = MemoryReport::predict(TABLE, &subject.capacity.counts(), &lists, limits, options)?;
-    Ok((memory, Plan::new(TABLE, &subject.capacity.counts(), &subject.list, limits, options)?))
+    let steps = MemoryReport::predict(TABLE, &subject.capacity.counts(), &lists, limits, options)?;
+    let votes = predict_votes(&subject.shape, limits, &subject.room)?;
+    Ok((Memory { steps, votes }, Plan::new(TABLE, &subject.capacity.counts(), &subject.list, limits, options)?))
 }
 
 /// Returns the limits with unlimited memory, for a report of the needed memory.
@@ -110,24 +138,26 @@ fn without_sizes(limits: &Limits) -> Limits {
     Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
 }
 
-fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<String> {
+fn to_text(subject: &Subject, (memory, plan): &(Memory, Plan)) -> Result<String> {
     let (room, capacity) = (&subject.room, &subject.capacity);
     let objects = room.labels.map_or(0, |labels| labels.layers);
     Ok(format!(
-        "Training {} on pictures of {} x {} px with {} per step\n\
+        "Training {} on pictures of {} x {} px with {} per step{}\n\
          device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
-         MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}\n\
+         MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}{}\n\
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
          PASSES\n{}\n{}",
         counted(room.gaussians, "Gaussian"),
         room.image.0,
         room.image.1,
         counted(objects, "object"),
+        if room.half_moments { ", moments of 16 bits" } else { "" },
         subject.device.as_deref().unwrap_or("none found, limits assumed"),
         shape_text(&subject.shape),
         capacity.instances,
         capacity.layer_tiles,
-        memory.report(),
+        memory.steps.report(),
+        memory.votes.as_ref().map_or(String::new(), votes_text),
         plan.arena_report(),
         plan.report(),
         summary(subject, memory)?
@@ -136,16 +166,30 @@ fn to_text(subject: &Subject, (memory, plan): &(MemoryReport, Plan)) -> Result<S
 
 const MIB: f64 = 1_048_576.0;
 
+/// Returns what a count of votes needs: their memory comes and goes with it.
+fn votes_text(votes: &MemoryReport) -> String {
+    let rows = votes.rows.iter().filter(|row| row.name.starts_with("votes_"));
+    let (own, scratch) = (rows.map(|row| row.bytes).sum::<u64>() as f64 / MIB, votes.step_pages.iter().sum::<u64>());
+    let (scratch, total) = (scratch as f64 / MIB, votes.total as f64 / MIB);
+    format!(
+        "\na count of votes, between steps: votes {own:.0} MiB, scratch arena {scratch:.0} MiB, total {total:.0} MiB\n"
+    )
+}
+
 /// Returns what to take from the plan: the memory, the Gaussians that fit, and what smaller values save.
-fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
+fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
     let room = &subject.room;
-    let (needed, limit) = (memory.total as f64 / MIB, subject.limits.max_memory as f64 / MIB);
+    let (needed, limit) = (memory.total() as f64 / MIB, subject.limits.max_memory as f64 / MIB);
     let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB that may be used\n");
     text += &match most_gaussians(subject) {
         0 => "fits:    no Gaussian on such pictures\n".to_owned(),
         most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
     };
-    let kept = subject.limits.kept_max(memory.total);
+    if let Some(total) = subject.half_fits(memory) {
+        let needed = total as f64 / MIB;
+        text += &format!("moments: it fits with --set moments=half, here --moments half: {needed:.0} MiB\n");
+    }
+    let kept = subject.limits.kept_max(memory.total());
     if kept > 0 {
         let views = kept / (6 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
         text += &format!("photos:  {views} with masks stay there besides, in {:.0} MiB\n", kept as f64 / MIB);
@@ -155,13 +199,14 @@ fn summary(subject: &Subject, memory: &MemoryReport) -> Result<String> {
     let labels = room.labels.map(|labels| LabelSize { layers: half(labels.layers), ..labels });
     let smaller = [
         ("half of --gaussians", EngineSize { gaussians: (room.gaussians / 2).max(1), ..*room }),
+        ("--moments half", room.with_half_moments(true)),
         ("half of both sides of --size", EngineSize { image, ..*room }),
         ("half of --label-samples", EngineSize { labels, ..*room }),
     ];
     let mut savings = Vec::new();
     for (what, room) in smaller.into_iter().filter(|(_, smaller)| smaller != room) {
         let total = predict_for(&subject.shape, &without_sizes(&subject.limits), &room)?.total;
-        savings.push((memory.total.saturating_sub(total), what));
+        savings.push((memory.total().saturating_sub(total), what));
     }
     savings.sort_by(|a, b| b.cmp(a));
     let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB);
@@ -188,9 +233,9 @@ fn most_gaussians(subject: &Subject) -> u64 {
     fitting
 }
 
-fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Option<&Error>) -> Value {
+fn to_json(subject: &Subject, (memory, plan): &(Memory, Plan), problem: Option<&Error>) -> Value {
     let room = &subject.room;
-    let buffers = memory.rows.iter().map(|row| {
+    let buffers = memory.steps.rows.iter().map(|row| {
         json!({
             "name": row.name, "class": row.class.name(), "elements": row.count, "element_bytes": row.element_bytes,
             "bytes": row.bytes,
@@ -210,6 +255,8 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "kernels": shape_json(&subject.shape),
         "gaussians": room.gaussians,
         "size": [room.image.0, room.image.1],
+        "moments": if room.half_moments { Moments::Half } else { Moments::Full },
+        "fits_with_half_moments": room.half_moments && problem.is_none() || subject.half_fits(memory).is_some(),
         "label_samples": room.labels.map_or(0, |labels| labels.layers),
         "instances": subject.capacity.instances,
         "layer_tiles": subject.capacity.layer_tiles,
@@ -217,11 +264,12 @@ fn to_json(subject: &Subject, (memory, plan): &(MemoryReport, Plan), problem: Op
         "problem": problem.map(Error::to_string),
         "memory": {
             "buffers": buffers.collect::<Vec<_>>(),
-            "scratch_pages": memory.step_pages,
-            "scratch_without_sharing": memory.step_unaliased,
-            "staging": memory.staging,
-            "total": memory.total,
-            "kept_max": subject.limits.kept_max(memory.total),
+            "scratch_pages": memory.steps.step_pages,
+            "scratch_without_sharing": memory.steps.step_unaliased,
+            "staging": memory.steps.staging,
+            "total_while_counting_votes": memory.votes.as_ref().map(|votes| votes.total),
+            "total": memory.total(),
+            "kept_max": subject.limits.kept_max(memory.total()),
         },
         "barriers": plan.barrier_count(),
         "passes": passes.collect::<Vec<_>>(),

@@ -137,8 +137,23 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
     }
     let objects: BTreeSet<u16> = voters.iter().flat_map(|voter| voter.mask.objects()).collect();
     let labels: Vec<u16> = std::iter::once(UNLABELLED as u16).chain(objects).collect();
-    let count = engine.gaussian_count() as usize;
+    let rows = engine.gaussian_count() as usize;
     let stage = Stage::new("counting votes", voters.len() * labels.len().div_ceil(room));
+    engine.begin_votes()?;
+    let counted = count(engine, voters, &labels, (how, &stage));
+    let ended = engine.end_votes();
+    let votes = counted?;
+    ended.map(|()| Ballot::new(labels, rows, votes))
+}
+
+/// Returns (row, column, votes) of all views, in as many sweeps as needed.
+fn count(
+    engine: &mut Engine,
+    voters: &[Voter],
+    labels: &[u16],
+    (how, stage): (Sweep, &Stage),
+) -> Result<Vec<(u32, u16, u64)>> {
+    let room = engine.vote_columns();
     let mut votes = Vec::new();
     for first in (0..labels.len()).step_by(room) {
         let columns = room.min(labels.len() - first);
@@ -150,7 +165,7 @@ pub fn sweep(engine: &mut Engine, voters: &[Voter], how: Sweep) -> Result<Ballot
         let cells = engine.votes(columns)?.into_iter().enumerate().filter(|(_, sum)| *sum > 0);
         votes.extend(cells.map(|(cell, sum)| ((cell / columns) as u32, (first + cell % columns) as u16, sum)));
     }
-    Ok(Ballot::new(labels, count, votes))
+    Ok(votes)
 }
 
 /// Adds the votes of one view for the labels in `chunk`.

@@ -81,6 +81,8 @@ domains! {
         "Rows of the model; also the maximum number of visible splats.";
     TRAINED trained: "trained", cures::model,
         "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
+    SECOND_MOMENTS second_moments: "second moments", cures::model,
+        "Rows with second moments of their own: equal to Trained, or 0 where those are packed with the first ones.", optional;
     LABELLED labelled: "labelled", cures::model,
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     INSTANCES instances: "instances", cures::pairs,
@@ -145,10 +147,22 @@ domains! {
     segments: "Maximum number of dispatches for one walk of a tile's list.";
 }
 
+impl Domain {
+    /// True if its elements are rows of trained Gaussians.
+    pub(crate) fn is_trained(&self) -> bool {
+        [Self::TRAINED.count, Self::SECOND_MOMENTS.count].contains(&self.count)
+    }
+}
+
 impl Capacity {
     /// Tiles of the scene, without those of object layers.
     pub fn tiles(&self) -> u64 {
         self.virtual_tiles / self.layers.max(1)
+    }
+
+    /// True if first and second moments share a plane of words (glsl/include/moments_store.glsl).
+    pub fn packs_moments(&self) -> bool {
+        self.second_moments < self.trained
     }
 
     /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, on a card twice, because

@@ -59,3 +59,15 @@ pub enum LabelRule {
     #[default]
     Votes,
 }
+
+/// How both moments of Adam of a parameter are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Moments {
+    /// As two numbers of 32 bits.
+    #[default]
+    Full,
+    /// As two numbers of 16 bits: their ratio, and the logarithm of the second one.
+    Half,
+}

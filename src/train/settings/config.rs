@@ -3,7 +3,7 @@
 //! Most defaults are those of LabelGS and 3DGS, from the paper or the code. "LabelGS" below is the paper (arXiv
 //! 2508.19699) with its authors' code, "3DGS" is Kerbl et al. 2023 with its code.
 
-use super::choices::{ExposureMode, LabelRule, Occlusion, StrategyKind};
+use super::choices::{ExposureMode, LabelRule, Moments, Occlusion, StrategyKind};
 use crate::options::Options;
 #[cfg(feature = "cli")]
 use crate::options::parse::{colour, corners, count, samples};
@@ -64,6 +64,12 @@ crate::options! {
             ///
             /// 3 (3DGS). Lower degrees save memory and lose highlights.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed, setting;
+
+            /// What the optimiser remembers of each parameter: two numbers of 32 bits, or two of 16.
+            ///
+            /// With `half` a model takes 8 bytes a parameter on the device and in checkpoints, not 12, for as good a picture;
+            /// numbers are rounded at random, the same for the same seed. For scenes that do not fit otherwise.
+            moments <"KIND">: Moments = Moments::Full, fixed, setting;
 
             /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
             ///

@@ -5,6 +5,6 @@ mod config;
 mod presets;
 mod schedule;
 
-pub use choices::{ExposureMode, LabelRule, Occlusion, StrategyKind};
+pub use choices::{ExposureMode, LabelRule, Moments, Occlusion, StrategyKind};
 pub use config::TrainConfig;
 pub use presets::Preset;

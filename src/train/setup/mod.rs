@@ -5,7 +5,7 @@ pub(crate) mod near_plane;
 pub mod region;
 
 use crate::engine::{Engine, EngineSize, LabelSize};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::KernelShape;
@@ -17,7 +17,7 @@ use crate::train::input::part::Part;
 use crate::train::input::step_input::{self, TrainView};
 use crate::train::shared::Shared;
 use crate::train::strategy::Strategy;
-use crate::train::{LabelRule, Objective, TrainConfig};
+use crate::train::{LabelRule, Moments, Objective, TrainConfig};
 use region::Region;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -64,7 +64,8 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
             LabelRule::Main => 0,
         },
     });
-    Ok(EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.has_depths()))
+    let size = EngineSize::new(gaussians, image).for_training().with_labels(labels).with_depths(config.has_depths());
+    Ok(size.with_half_moments(config.moments == Moments::Half))
 }
 
 /// Sets what the settings leave to the photos.
@@ -86,8 +87,24 @@ pub(crate) fn start_size(
     let roomy =
         engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?.with_frozen(Region::frozen(region));
     match Engine::predict(gpu, &roomy, options) {
-        Err(Error::OutOfMemory { .. }) => Ok(EngineSize { gaussians, ..roomy }),
+        Err(Error::OutOfMemory { .. }) => {
+            let least = EngineSize { gaussians, ..roomy };
+            propose_half(gpu, &least, options).map_or(Ok(least), Err)
+        }
         other => other.map(|_| roomy),
+    }
+}
+
+/// Returns the error of sizes that do not fit, if they do with packed moments.
+fn propose_half(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Option<Error> {
+    let error = Engine::predict(gpu, size, options).err()?;
+    let fits = !size.half_moments && Engine::predict(gpu, &size.with_half_moments(true), options).is_ok();
+    match error {
+        Error::OutOfMemory { what, needed, limit_name, limit, cure } if fits => {
+            let cure = format!("it fits with {}; or {cure}", Setting("moments").to("half"));
+            Some(Error::OutOfMemory { what, needed, limit_name, limit, cure })
+        }
+        _ => None,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The Gaussians between two steps, as a strategy changes them, with a limit on their number.
 
 use crate::engine::{Engine, ListKey};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::shaders::constants::STAT_NEAR;
 use crate::shaders::structs::{Counters, StepUniforms};
 use crate::train::input::views::Views;
@@ -131,12 +131,19 @@ impl Population<'_> {
         let room = self.engine.size().gaussians;
         match self.engine.make_room_for_gaussians(count) {
             Err(error) if error.is_out_of_memory() && most > room => {
-                tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed");
+                let hint = self.hint();
+                tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed{hint}");
                 *self.bound = Bound { most: room, by_memory: true };
                 Ok(Some(room))
             }
             made => made.map(|()| None),
         }
+    }
+
+    /// Returns what to do for more Gaussians, if anything.
+    fn hint(&self) -> String {
+        let half = Setting("moments").to("half");
+        if self.engine.size().half_moments { String::new() } else { format!("; a run with {half} has room for more") }
     }
 
     /// Lowers all opacities to at most 0.01.
@@ -154,7 +161,10 @@ impl Population<'_> {
         let fits = self.engine.most_gaussians(wanted)?;
         if fits < wanted && !self.bound.by_memory {
             self.bound.by_memory = true;
-            tracing::warn!("memory holds {fits} Gaussians, {wanted} are wanted; from here on only the best may grow");
+            let hint = self.hint();
+            tracing::warn!(
+                "memory holds {fits} Gaussians, {wanted} are wanted; from here on only the best may grow{hint}"
+            );
         }
         Ok(fits.min(self.bound.most))
     }

@@ -40,7 +40,9 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let mut scene = scene(91, &shape);
     scene.target.photo.colours.iter_mut().step_by(5).for_each(|colour| *colour = [1.0; 3]);
     let options = (KernelShape { update: Update::Split, ..rig.kernels }, readable());
-    let mut fixture = Fixture::with_rows(Arc::clone(rig.gpu), scene, false, options, ROWS.len() as u32)?;
+    let mut fixture = Fixture::with_room(Arc::clone(rig.gpu), scene, false, options, |room| {
+        room.with_shared_rows(ROWS.len() as u32)
+    })?;
     let pixels = fixture.pixels();
     // The picture of a step without exposure.
     fixture.train()?;

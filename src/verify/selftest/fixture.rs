@@ -36,7 +36,7 @@ pub const GRADIENTS: [Buf; 7] =
     [Buf::V_MEANS, Buf::V_SCALES, Buf::V_QUATS, Buf::V_SH0, Buf::V_SH1, Buf::V_SH2, Buf::V_SH3];
 
 /// Floats of each plane, and their positions in `Row::floats`: (floats, runs of (from, to, length)).
-const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
+pub(super) const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (4, &[(0, 0, 3), (3, 10, 1)]),
     (4, &[(0, 7, 3)]),
     (4, &[(0, 3, 4)]),
@@ -141,16 +141,16 @@ impl Fixture {
         options: SchedulerOptions,
     ) -> Result<Self> {
         let shape = KernelShape { update: Update::Split, ..shape };
-        Self::with_rows(gpu, scene, labels, (shape, options), 0)
+        Self::with_room(gpu, scene, labels, (shape, options), |room| room)
     }
 
-    /// Same as [`Fixture::new`], with updates of the shape, and with a number of shared rows.
-    pub fn with_rows(
+    /// Same as [`Fixture::new`], with updates of the shape, and with room for other things too.
+    pub fn with_room(
         gpu: Arc<Gpu>,
         scene: Scene,
         labels: bool,
         (shape, options): (KernelShape, SchedulerOptions),
-        rows: u32,
+        with: impl Fn(EngineSize) -> EngineSize,
     ) -> Result<Self> {
         let labels_size = labels.then(|| LabelSize {
             max_label: scene.target.label_map.iter().copied().max().unwrap_or(0).max(1),
@@ -158,12 +158,8 @@ impl Fixture {
             vote_columns: VOTE_COLUMNS,
         });
         let room = EngineSize::new(scene.gaussians.len().max(1) as u64, (scene.camera.width, scene.camera.height));
-        let room = room
-            .for_training()
-            .with_labels(labels_size)
-            .with_shared_rows(rows)
-            .with_frozen(scene.frozen)
-            .with_depths(true);
+        let room = room.for_training().with_labels(labels_size).with_frozen(scene.frozen).with_depths(true);
+        let room = with(room);
         let mut engine = Engine::with_shape(gpu, shape, room, options)?;
         engine.upload_model(&scene.gaussians)?;
         let config = TrainConfig {
@@ -357,7 +353,8 @@ impl Fixture {
 
     /// Parameters of `count` Gaussians, and both moments of `trained` ones.
     pub fn planes(&mut self, count: usize, trained: usize) -> Result<[Vec<Row>; 3]> {
-        Ok([self.rows(PARAMETERS, count)?, self.rows(MOMENTS_1, trained)?, self.rows(MOMENTS_2, trained)?])
+        let (rows, [m, u]) = (self.rows(PARAMETERS, count)?, self.moments(trained)?);
+        Ok([rows, m, u])
     }
 
     /// Gradients of the last step by Gaussian; 0 without a splat.

@@ -7,6 +7,7 @@ mod exposure;
 pub mod fixture;
 pub mod judge;
 pub mod model;
+pub mod moments;
 pub mod order;
 mod pose;
 pub mod relocation;
@@ -14,6 +15,7 @@ pub mod scenes;
 mod training;
 pub mod update;
 
+use crate::engine::EngineSize;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
@@ -137,10 +139,11 @@ impl Rig<'_> {
         Fixture::new(Arc::clone(self.gpu), scene, true, self.kernels, readable())
     }
 
-    /// With the update in one kernel, if the device can run it.
-    fn lazy(&self, scene: Scene) -> Result<Option<Fixture>> {
+    /// With the update in one kernel, if the device can run it, and full or packed moments.
+    fn lazy(&self, scene: Scene, half: bool) -> Result<Option<Fixture>> {
         let Some(kernels) = self.kernels.with_lazy_updates(self.gpu.capabilities()) else { return Ok(None) };
-        Fixture::with_rows(Arc::clone(self.gpu), scene, true, (kernels, readable()), 0).map(Some)
+        let with = |room: EngineSize| room.with_half_moments(half);
+        Fixture::with_room(Arc::clone(self.gpu), scene, true, (kernels, readable()), with).map(Some)
     }
 }
 
@@ -153,13 +156,17 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
         model::densification(&mut rig.fixture(scene_of(&before))?, before, (600, splits_long), tolerance)
     }
     type Change = fn(&Rig) -> Result<Judge>;
-    let changes: [(&str, Change); 13] = [
-        ("update in one kernel", |rig| match rig.lazy(update::partly_frozen(104))? {
+    let changes: [(&str, Change); 14] = [
+        ("update in one kernel", |rig| match rig.lazy(update::partly_frozen(104), false)? {
             Some(mut fused) => update::step(&mut fused, &mut rig.fixture(update::partly_frozen(104))?),
             None => Ok(Box::new(|_| Ok(Summary::default()))),
         }),
-        ("late Gaussians", |rig| match rig.lazy(update::partly_frozen(105))? {
+        ("late Gaussians", |rig| match rig.lazy(update::partly_frozen(105), false)? {
             Some(mut fixture) => update::late(&mut fixture),
+            None => Ok(Box::new(|_| Ok(Summary::default()))),
+        }),
+        ("packed moments", |rig| match rig.lazy(moments::away(106), true)? {
+            Some(mut fused) => moments::packed(&mut fused, Some(&mut rig.fixture(moments::away(106))?)),
             None => Ok(Box::new(|_| Ok(Summary::default()))),
         }),
         ("densification", |rig| densified(rig, false)),

@@ -2,7 +2,7 @@
 
 use super::Judge;
 use super::compare::{Tolerance, Verdict, close, exact, pick, sure};
-use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS};
+use super::fixture::{Fixture, PARAMETERS};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
 use crate::engine::ListKey;
@@ -76,8 +76,7 @@ pub(super) fn holding(
     (splits_long, grow_box): (bool, Option<&Zone>),
 ) -> Result<StepUniforms> {
     let trained = before.model.rows.len() - before.frozen;
-    fixture.put_rows(MOMENTS_1, &before.m[..trained])?;
-    fixture.put_rows(MOMENTS_2, &before.u[..trained])?;
+    fixture.put_moments(&before.m[..trained], &before.u[..trained])?;
     let stats = before.gradient_sum.iter().zip(&before.gradient_count).map(|(&s, &n)| [s as f32, n as f32]);
     let stats: Vec<[f32; 2]> = stats.take(trained).collect();
     fixture.engine.raw_mut().upload(Buf::DENSIFY_STATS, 0, 0, &stats)?;

@@ -35,7 +35,9 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let (scene, rows) = (scene(92, &shape), rows());
     let options = (KernelShape { update: Update::Split, ..rig.kernels }, readable());
-    let mut fixture = Fixture::with_rows(Arc::clone(rig.gpu), scene, false, options, rows.len() as u32)?;
+    let mut fixture = Fixture::with_room(Arc::clone(rig.gpu), scene, false, options, |room| {
+        room.with_shared_rows(rows.len() as u32)
+    })?;
     let place = Place { all: SharedLayout { scene: 0, photo: FIRST as u32 }, ..Place::default() };
     fixture.engine.set_extension(Poses::default().extension(place), 1);
     fixture.engine.set_shared(&rows)?;

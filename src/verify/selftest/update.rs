@@ -1,6 +1,6 @@
 //! The update of a step in one kernel, and late Gaussians, against the reference.
 
-use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS};
+use super::fixture::{Fixture, PARAMETERS};
 use super::model::{rates_of, states};
 use super::scenes::{Scene, Shape, scene};
 use super::{Judge, judge};
@@ -55,8 +55,7 @@ pub fn late(fixture: &mut Fixture) -> Result<Judge> {
         let values = |row| std::array::from_fn(|at| f64::from(of(moment(row, at)) as f32));
         (0..count).map(|row| Row::from_floats(&values(row))).collect()
     };
-    fixture.put_rows(MOMENTS_1, &rows(&|m| m))?;
-    fixture.put_rows(MOMENTS_2, &rows(&|m| 3.0 * m * m))?;
+    fixture.put_moments(&rows(&|m| m), &rows(&|m| 3.0 * m * m))?;
     let before = states(fixture)?;
     let mut missed = Vec::new();
     for step in 1..=MISSED {

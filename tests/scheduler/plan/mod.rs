@@ -95,6 +95,7 @@ pub fn engine_lists(shape: KernelShape) -> (Capacity, Vec<PassList>) {
     let capacity = Capacity {
         gaussians: 10_000,
         trained: 10_000,
+        second_moments: 10_000,
         labelled: 10_000,
         instances: 100_000,
         key_words: 100_000,
