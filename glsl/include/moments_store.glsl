@@ -22,12 +22,6 @@ vec4 root_of(uvec4 code) {
     return octave * exp2(vec4(code % MOMENT_LOG) * (1.0 / float(MOMENT_LOG)));
 }
 
-// 1 / sqrt(v) of such codes: a division costs more.
-vec4 inverse_root_of(uvec4 code) {
-    vec4 octave = uintBitsToFloat((127u + MOMENT_FLOOR - code / MOMENT_LOG) << 23);
-    return octave * exp2(vec4(code % MOMENT_LOG) * (-1.0 / float(MOMENT_LOG)));
-}
-
 void unpack_moments(uvec4 words, out vec4 m, out vec4 v) {
     uvec4 code = words & 0xffffu;
     vec4 root = mix(root_of(code), vec4(0.0), equal(code, uvec4(0u)));
@@ -49,7 +43,7 @@ uvec4 pack_moments(vec4 m, vec4 v, uint seed, uint e, uint plane) {
     vec4 part = log2(uintBitsToFloat((bits & 0x7fffffu) | 0x3f000000u)) * float(MOMENT_LOG / 2u);
     ivec4 octave = ivec4(bits >> 23) - 126 + 2 * int(MOMENT_FLOOR);
     uvec4 code = uvec4(clamp(octave * int(MOMENT_LOG / 2u) + round_at_random(part, draw & 0xffffu), 1, 0xffff));
-    vec4 ratio = clamp(m * inverse_root_of(code) * MOMENT_RATIO, -32767.0, 32767.0);
+    vec4 ratio = clamp(m / root_of(code) * MOMENT_RATIO, -32767.0, 32767.0);
     uvec4 words = uvec4(round_at_random(ratio, draw >> 16)) << 16 | code;
     return mix(words, uvec4(0u), lessThan(bits, uvec4(0x800000u)));
 }
