@@ -5,8 +5,8 @@
 #include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 
-// Writes the record of a splat. Returns where its tiles are.
-Ellipse project_splat(StepUniforms u, uint s, uint i) {
+// Writes the record of a splat. Returns where its tiles are, and its depth.
+Ellipse project_splat(StepUniforms u, uint s, uint i, out float z) {
     look_up_trained(u, i);
     vec4 mean = value4(means, i);
     Projection p = project_gaussian(u, mean.xyz, value4(scales, i).xyz, value4(quats, i));
@@ -32,6 +32,7 @@ Ellipse project_splat(StepUniforms u, uint s, uint i) {
     splats[3u * s + 1u] = vec4(q.z, log2_o, colour.x, colour.y);
     splats[3u * s + 2u] = vec4(colour.z, p.view.z, extent);
     splat_from_gaussian[i] = s;
+    z = p.view.z;
     Ellipse e = ellipse(u, centre, extent, q, log2_o);
     e.rows = sane ? e.rows : 0u;
     return e;

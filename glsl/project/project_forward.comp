@@ -48,7 +48,8 @@ void main() {
         return;
     }
     uint i = fetchu(gaussian_from_splat, s), touched = 0u;
-    Ellipse e = project_splat(u, s, i);
+    float z;
+    Ellipse e = project_splat(u, s, i, z);
     for (uint row = 0u; row < e.rows; row++) {
         touched += tiles_of_row(u, e, row).y;
     }

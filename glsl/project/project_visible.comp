@@ -152,29 +152,24 @@ uint count_tiles(StepUniforms u, Ellipse e) {
 }
 
 void main() {
-    StepUniforms u = step;
-    uint lane = gl_LocalInvocationIndex, n = u.gaussian_count, items = visible_items(n), flags = 0u;
+    uint lane = gl_LocalInvocationIndex, n = step.gaussian_count, items = visible_items(n), flags = 0u;
     bool has_failed;
     uint part = look_partition(0u, counters.failure, has_failed), base = part * items * VISIBLE_LANES;
     if (base >= n || has_failed) {
         return;
     }
-    uint keys[VISIBLE_ITEMS_MOST];
-    [[unroll]] for (uint k = 0u; k < VISIBLE_ITEMS_MOST; k++) {
+    for (uint k = 0u; k < items; k++) {
         uint i = base + k * VISIBLE_LANES + lane;
-        keys[k] = KEY_INVISIBLE;
-        if (k < items && i < n) {
-            bool broken;
-            keys[k] = key_of(u, i, broken);
-            if (broken) {
-                atomicAdd(counters.broken_count, 1u);
-                atomicMin(counters.broken_first, i);
-            }
-            if (keys[k] == KEY_INVISIBLE) {
-                splat_from_gaussian[i] = NO_SPLAT;
-            } else {
-                flags |= 1u << k;
-            }
+        bool broken = false;
+        uint key = i < n ? key_of(step, i, broken) : KEY_INVISIBLE;
+        if (broken) {
+            atomicAdd(counters.broken_count, 1u);
+            atomicMin(counters.broken_first, i);
+        }
+        if (key != KEY_INVISIBLE) {
+            flags |= 1u << k;
+        } else if (i < n) {
+            splat_from_gaussian[i] = NO_SPLAT;
         }
     }
     uint own = count_visible(flags, items), first = look_before(LOOK_VISIBLE, part, own);
@@ -187,35 +182,31 @@ void main() {
     clear_bins(lane, VISIBLE_LANES);
     barrier();
 #endif
-    [[unroll]] for (uint k = 0u; k < VISIBLE_ITEMS_MOST; k++) {
-        if ((flags >> k & 1u) != 0u) {
-            uint at = k * VISIBLE_LANES + lane;
-            uint s = first + visible_before[at / 32u] + bitCount(is_visible[at / 32u] & ((1u << (at & 31u)) - 1u));
-            keys_out[s] = keys[k];
-            gaussian_from_splat[s] = base + at;
-#ifdef SWEEP
-            count_digits(keys[k]);
-#endif
-        }
-    }
-#ifdef SWEEP
-    barrier();
-    add_bins(lane, VISIBLE_LANES);
-#endif
     for (uint from = 0u; from < own; from += VISIBLE_LANES) {
-        uint r = from + lane, i = 0u;
+        StepUniforms u = step; // anew, or they take up registers from the beginning
+        uint r = from + lane, s = first + r, i = 0u;
         Ellipse e;
         e.rows = 0u;
         if (r < own) {
             i = base + nth_visible(r);
-            e = project_splat(u, first + r, i);
+            float z;
+            e = project_splat(u, s, i, z);
+            keys_out[s] = floatBitsToUint(z);
+            gaussian_from_splat[s] = i;
+#ifdef SWEEP
+            count_digits(floatBitsToUint(z));
+#endif
         }
         uint touched = count_tiles(u, e);
         if (r < own) {
 #ifdef LABELS
             touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
 #endif
-            tiles_touched[first + r] = touched;
+            tiles_touched[s] = touched;
         }
     }
+#ifdef SWEEP
+    barrier();
+    add_bins(lane, VISIBLE_LANES);
+#endif
 }
