@@ -99,8 +99,8 @@ uint count_visible(uint flags, uint items) {
     barrier();
     for (uint w = lane; w < WORDS; w += VISIBLE_LANES) {
         uint sum = 0u;
-        for (uint before = 0u; before < w; before++) {
-            sum += bitCount(is_visible[before]);
+        for (uint before = 0u; before < WORDS; before++) {
+            sum += before < w ? bitCount(is_visible[before]) : 0u;
         }
         visible_before[w] = sum;
     }
@@ -109,12 +109,11 @@ uint count_visible(uint flags, uint items) {
 }
 
 uint look_recount(uint part) {
-    StepUniforms u = step;
-    uint items = visible_items(u.gaussian_count), flags = 0u;
+    uint items = visible_items(step.gaussian_count), flags = 0u;
     for (uint k = 0u; k < items; k++) {
         uint i = (part * items + k) * VISIBLE_LANES + gl_LocalInvocationIndex;
         bool broken;
-        flags |= i < u.gaussian_count && key_of(u, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
+        flags |= i < step.gaussian_count && key_of(step, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
     }
     uint own = count_visible(flags, items);
     barrier();
@@ -139,13 +138,13 @@ uint nth_visible(uint n) {
 }
 
 // Counts the tiles of the splat of this invocation, which may have no rows.
-uint count_tiles(StepUniforms u, Ellipse e) {
+uint count_tiles(Ellipse e) {
     uint lane = gl_LocalInvocationIndex, unused;
     tiles[lane] = 0u;
     uint rows = share_rows(e, 0u, unused);
     for (uint row = lane; row < rows; row += WALKERS) {
         uint splat = entry_at(0u, row);
-        atomicAdd(tiles[splat], tiles_of_row(u, ellipse_of(splat), row - starts[splat]).y);
+        atomicAdd(tiles[splat], tiles_of_row(step, ellipse_of(splat), row - starts[splat]).y);
     }
     barrier();
     return tiles[lane];
@@ -183,21 +182,20 @@ void main() {
     barrier();
 #endif
     for (uint from = 0u; from < own; from += VISIBLE_LANES) {
-        StepUniforms u = step; // anew, or they take up registers from the beginning
         uint r = from + lane, s = first + r, i = 0u;
         Ellipse e;
         e.rows = 0u;
         if (r < own) {
             i = base + nth_visible(r);
             float z;
-            e = project_splat(u, s, i, z);
+            e = project_splat(step, s, i, z);
             keys_out[s] = floatBitsToUint(z);
             gaussian_from_splat[s] = i;
 #ifdef SWEEP
             count_digits(floatBitsToUint(z));
 #endif
         }
-        uint touched = count_tiles(u, e);
+        uint touched = count_tiles(e);
         if (r < own) {
 #ifdef LABELS
             touched *= fetchu(layer_from_label, fetchu(labels, i)) != 0u ? 2u : 1u;
