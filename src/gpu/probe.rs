@@ -5,7 +5,7 @@ use super::capabilities::{Capabilities, DeviceKind, Features, MEMORY, Need, SUBG
 use super::hidden::Hidden;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
-use crate::shaders::{self, BindingKind, ShaderDesc};
+use crate::shaders::{self, ShaderDesc};
 use ash::vk;
 
 /// Least memory of a device: one block of the allocator. A driver that only compiles has none at all.
@@ -221,11 +221,13 @@ fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
     let least = |what, needed: u32, found: u32, reason| {
         need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
-    // Where the update does not have its buffers, other passes make it (`KernelShape::update`).
+    // Where these do not have their buffers, other passes do their work (`KernelShape`).
+    const REPLACEABLE: [&str; 6] =
+        ["update", "catch_up", "project_visible", "emit_ordered", "group_forward", "group_backward"];
     let is_needed = |shader: &&&ShaderDesc| {
-        !shader.stem.starts_with("update") && shader.stem != "catch_up" && !shader.macros.contains(&"LAZY")
+        !REPLACEABLE.iter().any(|stem| shader.stem.starts_with(stem)) && !shader.macros.contains(&"LAZY")
     };
-    let bindings = shaders::ALL.iter().filter(is_needed).map(|shader| storage_bindings(shader)).max().unwrap_or(0);
+    let bindings = shaders::ALL.iter().filter(is_needed).map(|shader| shader.storage_buffers()).max().unwrap_or(0);
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
@@ -259,10 +261,6 @@ fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
 
 fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &'static str) -> Need {
     Need { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
-}
-
-fn storage_bindings(shader: &ShaderDesc) -> u32 {
-    shader.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
 }
 
 fn text<E>(name: std::result::Result<&std::ffi::CStr, E>) -> String {

@@ -6,7 +6,7 @@ use crate::lab;
 use crate::shaders::constants::{
     LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_LANES,
 };
-use crate::shaders::{BindingKind, project_visible, update};
+use crate::shaders::{ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -114,7 +114,7 @@ impl KernelShape {
         let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);
         let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
         let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
-        let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card);
+        let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card) && shape.can_look_back(device);
         let narrow_keys = device.has_narrow_storage() && chosen("LABELGS_KEYS", ["wide", "narrow"]).unwrap_or(is_card);
         let shape = Self { narrow_labels, group_walks, narrow_keys, ..shape };
         let has_groups = chosen("LABELGS_BLEND", ["lane", "group"]).unwrap_or(is_card && !shape.emulated);
@@ -153,6 +153,7 @@ impl KernelShape {
         let fits = lanes <= limits.max_invocations.min(limits.max_group_size[0])
             && lanes / self.subgroup <= subgroup.max_per_group
             && GROUP_BLEND_SHARED <= limits.max_shared
+            && self.binds([&group_forward::VARIANTS, &group_backward::VARIANTS], false, device)
             && (self.emulated || subgroup.has_ballots());
         fits.then_some(shape)
     }
@@ -170,17 +171,25 @@ impl KernelShape {
         self.group_blend.map_or(0, |blend| instances / u64::from(blend.chunk_length) + jobs)
     }
 
-    /// Returns this shape with an update in one kernel; `None` if that cannot have its buffers.
+    /// Returns this shape with an update in one kernel; `None` if that, or a projection of late Gaussians, cannot have its buffers.
     pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
-        let own = update::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
-        let storage = |kind: &BindingKind| *kind == BindingKind::Storage;
-        let projections =
-            project_visible::VARIANTS.iter().filter(|variant| variant.macros.contains(&"TEXEL") == self.texel);
-        let bindings = own
-            .chain(projections)
-            .map(|variant| variant.bindings.iter().filter(|binding| storage(&binding.kind)).count());
-        let fits = bindings.max().unwrap_or(0) <= device.limits.plan.max_storage_buffers as usize;
+        let fits = self.binds([&update::VARIANTS, &project_visible::VARIANTS, &emit_ordered::VARIANTS], true, device);
         fits.then_some(Self { update: Update::Lazy, group_walks: true, ..self })
+    }
+
+    /// True if the device can run passes that list splats and look back.
+    fn can_look_back(&self, device: &Capabilities) -> bool {
+        self.binds([&project_visible::VARIANTS, &emit_ordered::VARIANTS], false, device)
+    }
+
+    /// True if these kernels, with the reads of this shape, bind no more storage buffers than the device has places for; `late`:
+    /// also for Gaussians that are late.
+    fn binds<const N: usize>(&self, kernels: [&[ShaderDesc]; N], late: bool, device: &Capabilities) -> bool {
+        let own = |shader: &&ShaderDesc| {
+            shader.macros.contains(&"TEXEL") == self.texel && (late || !shader.macros.contains(&"LAZY"))
+        };
+        let most = kernels.into_iter().flatten().filter(own).map(ShaderDesc::storage_buffers).max();
+        most.unwrap_or(0) <= device.limits.plan.max_storage_buffers
     }
 
     /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
@@ -188,6 +197,7 @@ impl KernelShape {
         let (limits, subgroup) = (&device.limits, &device.subgroup);
         let fits = limits.max_invocations.min(limits.max_group_size[0]) >= SWEEP_LANES
             && SWEEP_LANES / self.subgroup <= subgroup.max_per_group
+            && self.can_look_back(device)
             && (self.emulated || subgroup.has_ballots());
         let shape = self.with_sweeps_of(16);
         let most = limits.max_shared.checked_sub(shape.sweep_bytes(0))? / (4 * SWEEP_LANES);

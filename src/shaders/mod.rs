@@ -85,6 +85,11 @@ pub struct ShaderDesc {
 }
 
 impl ShaderDesc {
+    /// Number of storage buffers that it binds.
+    pub fn storage_buffers(&self) -> u32 {
+        self.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
+    }
+
     /// Invocations on each axis of a workgroup, with these values of the specialisation constants.
     pub fn workgroup(&self, words: &[u32]) -> [u32; 3] {
         self.local_size.map(|size| match size {
