@@ -123,12 +123,13 @@ impl KernelShape {
             Some("split") => Update::Split,
             Some("fused") => Update::Fused,
             Some("lazy") => Update::Lazy,
-            _ if is_card => Update::Lazy,
+            _ if is_card && group_walks => Update::Lazy,
             _ => Update::Split,
         };
         let lazy = shape.with_lazy_updates(device).filter(|_| update != Update::Split);
         let shape = lazy.map_or(shape, |shape| Self { update, ..shape });
-        let has_sweeps = chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated);
+        let has_sweeps =
+            chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated && group_walks);
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
 
