@@ -4,9 +4,7 @@
 //
 // The buffer: a ticket for each of the two passes; the words of project_visible; those of emit_ordered.
 
-const uint LOOK_OWN = 1u << 30u;    // of the partition alone
-const uint LOOK_PREFIX = 2u << 30u; // of all partitions up to this one
-const uint LOOK_SUM = (1u << 30u) - 1u;
+#include "partition_words.glsl"
 const uint LOOK_SPINS = 16u;        // looks at a word that is not there yet
 
 // Gaussians of an invocation of project_visible, of `n` in all: few where there would not be enough workgroups.
@@ -48,18 +46,13 @@ uint look_partition(uint ticket, uint failed, out bool has_failed) {
     return look_ticket;
 }
 
-// A sum that does not leave the bits of a word; the largest stands for all above.
-uint look_add(uint a, uint b) {
-    return min(a + b, LOOK_SUM);
-}
-
 // Tells what the partition has, and returns the sum over the partitions before. Called by all invocations of the workgroup, with
 // equal arguments.
 uint look_before(uint words, uint part, uint own) {
     uint lane = gl_LocalInvocationIndex;
     bool tells = lane == 0u && part + 1u != SWEEP_HELD;
     if (tells) {
-        atomicExchange(look_back[words + part], (part == 0u ? LOOK_PREFIX : LOOK_OWN) | own);
+        atomicExchange(look_back[words + part], (part == 0u ? SWEEP_PREFIX : SWEEP_OWN) | own);
     }
     uint sum = 0u, left = part, spins = 0u; // left: partitions that are not in the sum
     while (left > 0u) {
@@ -70,10 +63,10 @@ uint look_before(uint words, uint part, uint own) {
             look_high = 0u;
         }
         barrier();
-        uint found = lane < left ? atomicOr(look_back[words + left - 1u - lane], 0u) : LOOK_OWN;
-        if (found <= LOOK_SUM) {
+        uint found = lane < left ? atomicOr(look_back[words + left - 1u - lane], 0u) : SWEEP_OWN;
+        if (found <= SWEEP_SUM) {
             atomicMin(look_missing, lane);
-        } else if ((found & LOOK_PREFIX) != 0u) {
+        } else if ((found & SWEEP_PREFIX) != 0u) {
             atomicMin(look_nearest, lane);
         }
         barrier();
@@ -83,22 +76,21 @@ uint look_before(uint words, uint part, uint own) {
         if (lane < taken) {
             // By halves: neither sum overflows.
             atomicAdd(look_low, found & 0xffffu);
-            atomicAdd(look_high, (found & LOOK_SUM) >> 16u);
+            atomicAdd(look_high, (found & SWEEP_SUM) >> 16u);
         }
         barrier();
-        uint high = look_high + (look_low >> 16u);
-        sum = look_add(sum, high >= 0x4000u ? LOOK_SUM : high << 16u | look_low & 0xffffu);
+        sum = sweep_add(sum, joined(look_low, look_high));
         left = ends ? 0u : left - taken;
         spins = taken > 0u ? 0u : spins + 1u;
         barrier();
         if (spins > LOOK_SPINS) {
-            sum = look_add(sum, look_recount(left - 1u));
+            sum = sweep_add(sum, look_recount(left - 1u));
             left--;
             spins = 0u;
         }
     }
     if (tells && part > 0u) {
-        atomicExchange(look_back[words + part], LOOK_PREFIX | look_add(sum, own));
+        atomicExchange(look_back[words + part], SWEEP_PREFIX | sweep_add(sum, own));
     }
     return sum;
 }

@@ -9,10 +9,7 @@
 #include "partitions.glsl"
 const uint SWEEP_SUBGROUPS = SWEEP_LANES / SUBGROUP_SIZE;
 
-// A word: two bits for its state, then a sum.
-const uint SWEEP_OWN = 1u << 30u;    // of the partition alone
-const uint SWEEP_PREFIX = 2u << 30u; // of all partitions up to this one
-const uint SWEEP_SUM = (1u << 30u) - 1u;
+#include "partition_words.glsl"
 const uint SWEEP_SPINS = 64u;        // looks at a word that is not there yet
 
 shared uint sweep_ticket;
@@ -21,11 +18,6 @@ shared uint sweep_found[SWEEP_LANES];
 
 // Counts a partition into sweep_found, by all invocations; each pass has its own.
 void sweep_recount(uint part);
-
-// A sum that does not leave the bits of a word; the largest stands for all above.
-uint sweep_add(uint a, uint b) {
-    return min(a + b, SWEEP_SUM);
-}
 
 // Index of this invocation by subgroup and lane.
 uint sweep_lane() {

@@ -54,12 +54,6 @@ void sweep_recount(uint part) {
     barrier();
 }
 
-// Sums of the low and the high halves of words, neither of which can overflow, as one sum.
-uint joined(uint low, uint high) {
-    high += low >> 16u;
-    return high >= 0x4000u ? SWEEP_SUM : high << 16u | low & 0xffffu;
-}
-
 void main() {
     uint n = counted_items(), part = sweep_partition(), lane = sweep_lane();
     if (part * SWEEP_PARTITION >= n) {

@@ -6,6 +6,7 @@
 #include "gaussian.glsl"
 #include "record.glsl"
 #include "ellipse.glsl"
+#include "sort_key.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile of a splat.
 // Work:    64 splats per workgroup. A splat's instances are contiguous: first those of the scene layer, then
 //          those of its object layer; keys are layer * tile_count + tile.
@@ -27,29 +28,7 @@ FETCHU(8, gaussian_from_splat);
 FETCHU(9, labels);
 FETCHU(10, layer_from_label);
 #endif
-// Where the instances of a splat go.
-struct Target {
-    uint splat, layer;
-    uint first; // instance
-    uint count; // tiles
-};
-
-void put(uint at, uint key, uint splat) {
-    tile_keys[at] = key;
-    splat_from_instance[at] = splat;
-}
-
-// Writes the instances of a splat's n-th tile.
-void put_tile(StepUniforms u, Target t, uint n, uint tile) {
-    if (n < t.count) {
-        put(t.first + n, tile, t.splat);
-#ifdef LABELS
-        if (t.layer != 0u) {
-            put(t.first + t.count + n, t.layer * u.tile_count + tile, t.splat);
-        }
-#endif
-    }
-}
+#include "pairs.glsl"
 
 void emit(StepUniforms u, Target t, Ellipse e) {
     uint written = 0u;

@@ -43,12 +43,7 @@ INOUT(14, uint, dispatch_args);
 #define LOOK_LANES ORDERED_LANES
 #include "look_back.glsl"
 
-// Where the instances of a splat go.
-struct Target {
-    uint splat, layer;
-    uint first; // instance
-    uint count; // tiles
-};
+#include "pairs.glsl"
 shared Target targets[WALKERS];
 shared uint tiles_before[WALKERS]; // of the splats before
 shared uvec2 row_tiles[WALKERS];   // of a row: first tile, splat
@@ -60,27 +55,7 @@ uint touched(uint k) {
 uint look_recount(uint part) {
     uvec2 all;
     sums_before(uvec2(touched(part * ORDERED_LANES + gl_LocalInvocationIndex), 0u), all);
-    return min(all.x, LOOK_SUM);
-}
-
-void put(uint at, uint key, uint splat) {
-    tile_keys[at] = KEY(key);
-    splat_from_instance[at] = splat;
-#ifdef SWEEP
-    count_digits(key);
-#endif
-}
-
-// Writes the instances of a splat's n-th tile.
-void put_tile(StepUniforms u, Target t, uint n, uint tile) {
-    if (n < t.count) {
-        put(t.first + n, tile, t.splat);
-#ifdef LABELS
-        if (t.layer != 0u) {
-            put(t.first + t.count + n, t.layer * u.tile_count + tile, t.splat);
-        }
-#endif
-    }
+    return min(all.x, SWEEP_SUM);
 }
 
 // Rows of tiles by invocation, 64 at a time; then their tiles by invocation, so that neighbours write to neighbouring places.
@@ -114,10 +89,10 @@ void main() {
         return;
     }
     uvec2 all, before = sums_before(uvec2(touched(k), 0u), all);
-    uint own = min(all.x, LOOK_SUM), first = look_before(look_ordered(u.gaussian_count), part, own);
+    uint own = min(all.x, SWEEP_SUM), first = look_before(look_ordered(u.gaussian_count), part, own);
     if (part == (visible - 1u) / ORDERED_LANES && lane == 0u) {
-        uint total = look_add(first, own);
-        put_instances(total == LOOK_SUM ? 0xffffffffu : total);
+        uint total = sweep_add(first, own);
+        put_instances(total == SWEEP_SUM ? 0xffffffffu : total);
     }
 #ifdef SWEEP
     clear_bins(lane, ORDERED_LANES);
