@@ -19,10 +19,6 @@ pub use modes::{MODES, Mode, Replacements};
 
 use super::Common;
 use super::measure::write_json;
-use labelgs::engine::EngineSize;
-use labelgs::engine::growth::capacity;
-use labelgs::gpu::Gpu;
-use labelgs::pass::{self, KernelShape, Variant};
 use labelgs::{Error, Result};
 use measure::SceneResult;
 use serde_json::json;
@@ -47,7 +43,9 @@ pub struct KernelArgs {
 pub fn run(args: &KernelArgs) -> Result<()> {
     let load_before = super::measure::load();
     let gpu = super::device::open()?;
-    let modes = compile(&gpu, args)?;
+    let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
+    let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
+    let modes: Vec<_> = modes.map(|(_, mode)| (*mode, Replacements::default())).collect();
     let plain: Vec<Mode> = modes.iter().map(|(mode, _)| *mode).collect();
     let capabilities = gpu.capabilities();
     let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
@@ -73,17 +71,6 @@ pub fn run(args: &KernelArgs) -> Result<()> {
             "threads": threads, "load_before": load_before, "scenes": scenes, "pairs": pairs }),
     )?;
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
-}
-
-/// The modes with their shaders for the device.
-fn compile(gpu: &Gpu, args: &KernelArgs) -> Result<Vec<(Mode, Replacements)>> {
-    let shape = KernelShape::of(gpu.capabilities());
-    let room = EngineSize::new(1, (64, 64)).for_training();
-    let variant = Variant { update: false, ..Variant::plain(room.image) };
-    let list = pass::training_step(&shape, &capacity(&shape, &room), variant);
-    let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
-    let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
-    modes.map(|(_, mode)| Ok((*mode, mode.compile(&list)?))).collect()
 }
 
 /// Failures: a NaN, or a default mode with too large an error.

@@ -2,11 +2,14 @@
 //!
 //! A macro takes the place of a constant of `glsl/include/constants.glsl`, or of a function of GLSL.
 
-use crate::compiler::{GLSL, spirv, texel_define};
+use crate::compiler::{GLSL, spirv};
+use crate::shadergen::compile::Define;
+use labelgs::pass::Stage;
 use labelgs::scheduler::plan::{PassList, Work};
 use labelgs::shaders::ShaderDesc;
 use labelgs::{Error, Result};
-use std::collections::HashMap;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,21 +20,22 @@ pub struct Mode {
     pub name: &'static str,
     /// The difference from the default, for the legend.
     pub about: &'static str,
-    /// Macro and value that its kernels are compiled with.
+    /// Macro and value that kernels are compiled with.
     define: Option<(&'static str, &'static str)>,
-    /// Stems of the kernels that the macro changes.
-    stems: &'static [&'static str],
+    /// Stages of these kernels; those that the macro leaves as they are stay.
+    stages: &'static [Stage],
 }
 
+const BLENDS: &[Stage] = &[Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
+/// Where it is decided which pairs there are, and in the blends, which of them count.
+const PAIRS: &[Stage] = &[Stage::PROJECT, Stage::TILE, Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
+
 const fn stop(name: &'static str, about: &'static str, value: &'static str) -> Mode {
-    let define = Some(("TRANSMITTANCE_MIN", value));
-    Mode { name, about, define, stems: &["blend_forward"] }
+    Mode { name, about, define: Some(("TRANSMITTANCE_MIN", value)), stages: BLENDS }
 }
 
 const fn cut(name: &'static str, about: &'static str, value: &'static str) -> Mode {
-    let define = Some(("ALPHA_MIN", value));
-    let stems = &["cull", "project_forward", "emit_instances", "blend_forward", "blend_backward"];
-    Mode { name, about, define, stems }
+    Mode { name, about, define: Some(("ALPHA_MIN", value)), stages: PAIRS }
 }
 
 /// 2^x for -126 <= x <= 0: the whole part goes into the exponent, of the rest a polynomial with the least largest
@@ -41,7 +45,7 @@ const CUBIC: &str = "(uintBitsToFloat(uint(int(floor(x)) + 127) << 23) * \
 
 /// Every mode, the default first.
 pub const MODES: &[Mode] = &[
-    Mode { name: "default", about: "the step as the engine runs it", define: None, stems: &[] },
+    Mode { name: "default", about: "the step as the engine runs it", define: None, stages: &[] },
     stop("stop 1e-2", "a pixel stops at T < 1e-2", "1e-2"),
     stop("stop 1e-3", "a pixel stops at T < 1e-3", "1e-3"),
     stop("stop 0", "no pixel stops", "0.0"),
@@ -51,59 +55,59 @@ pub const MODES: &[Mode] = &[
         name: "exp2 cubic",
         about: "exp2 by a polynomial of degree 3 (relative error 7.5e-5)",
         define: Some(("exp2(x)", CUBIC)),
-        stems: &["blend_forward", "blend_backward"],
+        stages: BLENDS,
     },
 ];
 
 /// Kernels of a mode, by the name of the engine's kernel that they stand in for.
 #[derive(Debug, Default)]
-pub struct Replacements(HashMap<&'static str, &'static ShaderDesc>);
+pub struct Replacements(RefCell<HashMap<&'static str, &'static ShaderDesc>>);
 
-impl Mode {
-    /// Compiles the kernels of `list` that the mode changes.
-    pub fn compile(&self, list: &PassList) -> Result<Replacements> {
-        let mut made = Replacements::default();
-        let Some((name, value)) = self.define else { return Ok(made) };
-        for stem in self.stems {
-            let wrong = |what: &str| Error::Check(format!("mode `{}`: {stem} {what}", self.name));
-            let mut passes = list.work.iter().filter_map(|work| match work {
-                Work::Pass(pass) => Some(pass.shader),
-                Work::Fill { .. } | Work::Copy { .. } => None,
-            });
-            let shader = passes.find(|shader| shader.stem == *stem).ok_or_else(|| wrong("is in no pass of a step"))?;
-            let path = source_of(stem)?.ok_or_else(|| wrong("has no file"))?;
-            let source = fs::read_to_string(&path).map_err(Error::read(&path))?;
-            let mut defines = texel_define(shader.name.ends_with("_texel"));
-            defines.push((name.to_owned(), Some(value.to_owned())));
-            let spirv = spirv(&format!("{stem} ({})", self.name), &source, &defines)?;
-            if spirv == shader.spirv {
-                return Err(wrong("is the same with the macro and without"));
-            }
-            made.0.insert(shader.name, Box::leak(Box::new(ShaderDesc { spirv, ..*shader })));
+impl Replacements {
+    /// The kernel with a macro; compiles it once, as the engine's own if the macro changes nothing.
+    fn of(&self, shader: &'static ShaderDesc, (name, value): (&str, &str)) -> Result<&'static ShaderDesc> {
+        if let Some(&made) = self.0.borrow().get(shader.name) {
+            return Ok(made);
         }
+        let path = source_of(shader.stem)?;
+        let source = fs::read_to_string(&path).map_err(Error::read(&path))?;
+        let mut defines: Vec<Define> = shader.macros.iter().map(|&own| (own.to_owned(), None)).collect();
+        defines.push((name.to_owned(), Some(value.to_owned())));
+        let spirv = spirv(shader.name, &source, &defines)?;
+        let made = if spirv == shader.spirv { shader } else { Box::leak(Box::new(ShaderDesc { spirv, ..*shader })) };
+        self.0.borrow_mut().insert(shader.name, made);
         Ok(made)
-    }
-
-    /// The list of the mode, from that of the default. Every kernel of the mode must be in it.
-    pub fn list(&self, default: &PassList, kernels: &Replacements) -> Result<PassList> {
-        let mut list = PassList { name: self.name.to_owned(), ..default.clone() };
-        let mut put = 0;
-        for work in &mut list.work {
-            if let Work::Pass(pass) = work
-                && let Some(shader) = kernels.0.get(pass.shader.name)
-            {
-                (pass.shader, put) = (shader, put + 1);
-            }
-        }
-        let all = || Error::Check(format!("mode `{}`: the step has other kernels than those of the mode", self.name));
-        if put == kernels.0.len() { Ok(list) } else { Err(all()) }
     }
 }
 
-/// The file of a kernel.
-fn source_of(stem: &str) -> Result<Option<PathBuf>> {
+impl Mode {
+    /// The list of the mode, from that of the default. Every mode changes the forward blend.
+    pub fn list(&self, default: &PassList, kernels: &Replacements) -> Result<PassList> {
+        let mut list = PassList { name: self.name.to_owned(), ..default.clone() };
+        let Some(define) = self.define else { return Ok(list) };
+        let mut changed = BTreeSet::new();
+        for work in &mut list.work {
+            if let Work::Pass(pass) = work
+                && self.stages.contains(&pass.stage)
+            {
+                let made = kernels.of(pass.shader, define)?;
+                if !std::ptr::eq(made, pass.shader) {
+                    changed.insert(pass.stage);
+                    pass.shader = made;
+                }
+            }
+        }
+        let problem = || Error::Check(format!("mode `{}` changes no kernel of the forward blend", self.name));
+        if changed.contains(&Stage::BLEND_FORWARD) { Ok(list) } else { Err(problem()) }
+    }
+}
+
+/// The file of a kernel; one that is declared to come from another kernel's has more words in its name.
+fn source_of(stem: &str) -> Result<PathBuf> {
     let glsl = Path::new(GLSL);
-    let folders = fs::read_dir(glsl).map_err(Error::read(glsl))?;
-    let files = folders.flatten().map(|folder| folder.path().join(format!("{stem}.comp")));
-    Ok(files.into_iter().find(|file| file.is_file()))
+    let folders: Vec<PathBuf> =
+        fs::read_dir(glsl).map_err(Error::read(glsl))?.flatten().map(|folder| folder.path()).collect();
+    let words = std::iter::successors(Some(stem), |name| name.rsplit_once('_').map(|(shorter, _)| shorter));
+    let mut files = words.flat_map(|name| folders.iter().map(move |folder| folder.join(format!("{name}.comp"))));
+    files.find(|file| file.is_file()).ok_or_else(|| Error::Bug(format!("{stem} has no file")))
 }
