@@ -15,6 +15,7 @@ mod large;
 mod limits;
 mod measure;
 mod memory;
+mod order;
 mod pace;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
 #[path = "../shadergen/mod.rs"]
@@ -66,6 +67,8 @@ enum Command {
     Tile(Common),
     /// The sort in each form that the device has.
     Sort(Common),
+    /// Bytes of a step by the order of the Gaussians.
+    Order(order::Options),
     /// A large model from a trained one, to be timed.
     Split(split::Options),
     /// Predicted against measured memory of training.
@@ -94,6 +97,7 @@ fn run() -> Result<()> {
         Command::Limits(common) => limits::run(&common),
         Command::Tile(common) => tile::run(&common),
         Command::Sort(common) => sort::run(&common),
+        Command::Order(options) => order::run(&options),
         Command::Split(options) => split::run(&options),
         Command::Memory(common) => memory::run(&common),
         Command::Large(options) => large::run(&options),

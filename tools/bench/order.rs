@@ -1,0 +1,140 @@
+//! What the order of the Gaussians costs a card: bytes of a step in the order of the model, along a curve through space (Morton), and
+//! at random. Counted from what passes read and write, not timed, so any device will do.
+
+use crate::{device, measure::table};
+use labelgs::formats::read_model;
+use labelgs::pass::KernelShape;
+use labelgs::reference::{loss::Photo, step::Target};
+use labelgs::run::latest_model;
+use labelgs::scene::{Camera, Gaussians};
+use labelgs::scenes::{LoadOptions, open};
+use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::fixture::{Fixture, readable};
+use labelgs::verify::selftest::scenes::{Scene, generator};
+use labelgs::{Result, gpu::Gpu};
+use rand::Rng;
+use std::{array, path::PathBuf, sync::Arc};
+
+/// Bytes of a Gaussian in each plane: position, size, rotation, bands of colour. All Gaussians need the first two to be culled.
+const PLANES: [u64; 7] = [16, 16, 16, 16, 48, 64, 96];
+/// Bytes of a splat.
+const SPLAT: u64 = 48;
+/// Least that memory moves, bytes.
+const SECTOR: u64 = 32;
+/// Bytes of a line of a cache.
+const LINE: u64 = 128;
+
+/// Options of the counts.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Options {
+    /// Model, a PLY or the folder of a run.
+    model: PathBuf,
+    /// Its scene.
+    #[arg(long)]
+    scene: PathBuf,
+    /// Longest side of the views, px.
+    #[arg(long)]
+    max_resolution: Option<u32>,
+    /// Views, evenly from all.
+    #[arg(long, default_value_t = 4)]
+    views: usize,
+}
+
+/// Gaussians of a view by depth, which of them have a gradient, and places in that order of the splats of each tile.
+type Seen = (Vec<usize>, Vec<bool>, Vec<Vec<u32>>);
+
+/// Prints them.
+pub fn run(options: &Options) -> Result<()> {
+    let path = if options.model.is_dir() { latest_model(&options.model)? } else { options.model.clone() };
+    let model = Gaussians { labels: None, label_confidence: None, ..read_model(&path)?.gaussians };
+    let load = LoadOptions { photos: false, max_resolution: options.max_resolution, ..LoadOptions::default() };
+    let views = open(&options.scene, &load)?.train;
+    let (gpu, every) = (device::open()?, (views.len() / options.views.max(1)).max(1));
+    let seen = views.iter().step_by(every).map(|view| look(&gpu, &model, &view.camera)).collect::<Result<Vec<_>>>()?;
+    let mean = |of: fn(&Seen) -> usize| seen.iter().map(of).sum::<usize>() / seen.len().max(1);
+    let (visible, touched) = (mean(|of| of.0.len()), mean(|of| of.1.iter().filter(|&&touched| touched).count()));
+    let pairs = mean(|of| of.2.iter().map(Vec::len).sum());
+    println!("{} Gaussians; {visible} visible, {touched} with a gradient, {pairs} pairs; MB of a view", model.len());
+    let mut random = generator(3);
+    let orders = [("model", vec![0; model.len()]), ("Morton", codes(&model.means))];
+    let orders = orders.into_iter().chain([("random", (0..model.len()).map(|_| random.random()).collect())]);
+    let head = ["order", "warps without any", "project", "update", "tiles: splats", "their lines"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for (name, keys) in orders {
+        let mut order: Vec<usize> = (0..model.len()).collect();
+        order.sort_by_key(|&index| keys[index]);
+        let mut places = vec![0; model.len()];
+        (0..).zip(order).for_each(|(place, index)| places[index] = place);
+        let all: Vec<_> = seen.iter().map(|seen| count(seen, &places)).collect();
+        let mean = |at: usize| all.iter().map(|counts| counts[at]).sum::<f64>() / all.len() as f64;
+        rows.push([name.to_owned()].into_iter().chain((0..5).map(|at| format!("{:.3}", mean(at)))).collect());
+    }
+    println!("{}", table(&rows));
+    Ok(())
+}
+
+/// Runs a step of a view.
+fn look(gpu: &Arc<Gpu>, model: &Gaussians, camera: &Camera) -> Result<Seen> {
+    let shape = KernelShape { antialiased: model.antialiased, ..KernelShape::of(gpu.capabilities()) };
+    let camera = Camera { translation: camera.translation + camera.rotation * model.origin, ..camera.clone() };
+    let (size, pixels) = ((camera.width as usize, camera.height as usize), (camera.width * camera.height) as usize);
+    let tiles = shape.tiles(camera.width, camera.height);
+    let photo = Photo { size, colours: vec![[0.5; 3]; pixels], valid: vec![true; pixels] };
+    let target = Target { photo, label_map: vec![0; pixels], slots: Vec::new(), background: [0.0; 3] };
+    let scene = Scene { camera, gaussians: model.clone(), target, frozen: 0 };
+    let mut fixture = Fixture::new(Arc::clone(gpu), scene, false, shape, readable())?;
+    let mut report = fixture.train()?;
+    while fixture.engine.recover(&report)? {
+        report = fixture.train()?;
+    }
+    let splats = fixture.splats()?;
+    let touched = fixture.splat_gradients(&splats)?.iter().map(|gradient| gradient.colour != [0.0; 3]).collect();
+    let sorted = fixture.sorted_splats(report.counters.instance_count as usize)?;
+    let [starts, ends] =
+        [Buf::TILE_STARTS, Buf::TILE_ENDS].map(|of| fixture.get::<u32>(of, (tiles.0 * tiles.1) as usize));
+    let lists =
+        starts?.into_iter().zip(ends?).map(|(start, end)| sorted[start as usize..end.max(start) as usize].to_vec());
+    Ok((splats.iter().map(|splat| splat.gaussian).collect(), touched, lists.collect()))
+}
+
+/// Codes of 10 bits an axis in the box around all.
+fn codes(means: &[[f32; 3]]) -> Vec<u32> {
+    let side = |axis: usize, pick: fn(f32, f32) -> f32| means.iter().map(|mean| mean[axis]).reduce(pick).unwrap_or(0.0);
+    let sides: [_; 3] = array::from_fn(|axis| (side(axis, f32::min), side(axis, f32::max)));
+    let cell =
+        |value: f32, (low, high): (f32, f32)| ((value - low) / (high - low).max(f32::MIN_POSITIVE) * 1023.0) as u32;
+    let bit = |mean: &[f32; 3], bit: usize| (cell(mean[bit % 3], sides[bit % 3]) >> (bit / 3) & 1) << bit;
+    means.iter().map(|mean| (0..30).map(|at| bit(mean, at)).sum()).collect()
+}
+
+/// MB of the units that elements of so many bytes at ascending places lie in.
+fn moved(places: impl IntoIterator<Item = u64>, bytes: u64, unit: u64) -> f64 {
+    let (mut next, mut units) = (0, 0);
+    for place in places {
+        let end = ((place + 1) * bytes).div_ceil(unit);
+        (units, next) = (units + end - next.max(place * bytes / unit).min(end), end);
+    }
+    (units * unit) as f64 / 1e6
+}
+
+/// Share of the subgroups of 32 without a visible Gaussian, and MB: of the visible ones with both moments, because they are late; of
+/// all that an update reads and writes; of the splats of each tile; and of the lines of a cache that these lie in.
+fn count((gaussians, touched, tiles): &Seen, places: &[u64]) -> [f64; 5] {
+    let mut order: Vec<(u64, usize)> =
+        gaussians.iter().zip(0..).map(|(&gaussian, rank)| (places[gaussian], rank)).collect();
+    order.sort_unstable();
+    let idle = 1.0 - moved(order.iter().map(|of| of.0), 1, 32) * 1e6 / places.len().next_multiple_of(32) as f64;
+    let planes = |from: usize, all: bool| -> f64 {
+        let places = || order.iter().filter(|of| all || touched[of.1]).map(|of| of.0);
+        PLANES[from..].iter().map(|&bytes| moved(places(), bytes, SECTOR)).sum()
+    };
+    let mut numbers = vec![0; order.len()];
+    (0..).zip(&order).for_each(|(number, &(_, rank))| numbers[rank] = number);
+    let of_tile = |tile: &Vec<u32>| {
+        let mut own: Vec<u64> = tile.iter().map(|&rank| numbers[rank as usize]).collect();
+        own.sort_unstable();
+        [SECTOR, LINE].map(|unit| moved(own.iter().copied(), SPLAT, unit))
+    };
+    let [splats, lines] = tiles.iter().map(of_tile).fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+    [idle, 3.0 * planes(2, true), 6.0 * planes(0, false), splats, lines]
+}
