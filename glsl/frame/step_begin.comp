@@ -51,9 +51,9 @@ void main() {
     counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
     uint n = step.gaussian_count;
     put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
-    put(ARGS_SH1, folded_groups((n * 3u + 63u) / 64u));
+    put(ARGS_SH1, folded_groups((n * 2u + 63u) / 64u));
     put(ARGS_SH2, folded_groups((n * 4u + 63u) / 64u));
-    put(ARGS_SH3, folded_groups((n * 6u + 63u) / 64u));
+    put(ARGS_SH3, folded_groups((n * 5u + 63u) / 64u));
     put(ARGS_TILES, folded_groups((step.tile_count * (step.layer_count + 1u) + 63u) / 64u));
     put(ARGS_VISIBLE, folded_groups(visible_partitions(n)));
     put(ARGS_SPLATS, uvec3(0u, 1u, 1u));

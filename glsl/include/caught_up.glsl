@@ -79,7 +79,7 @@ vec4 late_direction(vec4 m, vec4 v) {
     DECLARE(means, late_means) \
     DECLARE(scales, late_rest.x) \
     DECLARE(quats, late_rest.y) \
-    DECLARE(sh0, late_rest.z) \
+    DECLARE(sh0, late_rest.zzzw) \
     DECLARE(sh1, late_rest.w) \
     DECLARE(sh2, late_rest.w) \
     DECLARE(sh3, late_rest.w)

@@ -1,19 +1,44 @@
-// Colour of Gaussian i before the clamp at 0.
+// Reads the coefficients k of Gaussian i, of the active degrees, and returns its colour before the clamp at 0. They are rgb triples,
+// one after the other over sh0 to sh3 with 1, 2, 4 and 5 vec4: sh0 ends with the first float of degree 1, sh2 with that of degree 3.
+// value4: an element of a plane, with what the Gaussian has missed (caught_up.glsl).
 
-vec3 sh_colour(uint i, float basis[15]) {
-    vec3 c = COLOUR_BIAS + SH_C0 * value4(sh0, i).xyz;
+#ifndef value4
+#define value4(name, e) fetch4(name, e)
+#endif
+
+vec3 sh_colour(uint i, float basis[15], out vec3 k[16]) {
+    vec4 last = value4(sh0, i);
+    k[0] = last.xyz;
+    vec3 colour = COLOUR_BIAS + SH_C0 * k[0];
     if (SH_DEGREE >= 1u) {
-        c += basis[0] * band1(i, 0u) + basis[1] * band1(i, 1u) + basis[2] * band1(i, 2u);
+        vec4 a = value4(sh1, 2u * i), b = value4(sh1, 2u * i + 1u);
+        k[1] = vec3(last.w, a.xy);
+        k[2] = vec3(a.zw, b.x);
+        k[3] = b.yzw;
+        colour += basis[0] * k[1] + basis[1] * k[2] + basis[2] * k[3];
     }
     if (SH_DEGREE >= 2u) {
-        vec4 a = value4(sh2, 4u * i), b = value4(sh2, 4u * i + 1u), d = value4(sh2, 4u * i + 2u), e = value4(sh2, 4u * i + 3u);
-        c += basis[3] * a.xyz + basis[4] * vec3(a.w, b.xy) + basis[5] * vec3(b.zw, d.x) + basis[6] * d.yzw + basis[7] * e.xyz;
+        vec4 a = value4(sh2, 4u * i), b = value4(sh2, 4u * i + 1u), c = value4(sh2, 4u * i + 2u);
+        last = value4(sh2, 4u * i + 3u);
+        k[4] = a.xyz;
+        k[5] = vec3(a.w, b.xy);
+        k[6] = vec3(b.zw, c.x);
+        k[7] = c.yzw;
+        k[8] = last.xyz;
+        colour += basis[3] * k[4] + basis[4] * k[5] + basis[5] * k[6] + basis[6] * k[7] + basis[7] * k[8];
     }
     if (SH_DEGREE >= 3u) {
-        vec4 a = value4(sh3, 6u * i), b = value4(sh3, 6u * i + 1u), d = value4(sh3, 6u * i + 2u);
-        vec4 e = value4(sh3, 6u * i + 3u), f = value4(sh3, 6u * i + 4u), g = value4(sh3, 6u * i + 5u);
-        c += basis[8] * a.xyz + basis[9] * vec3(a.w, b.xy) + basis[10] * vec3(b.zw, d.x) + basis[11] * d.yzw
-            + basis[12] * e.xyz + basis[13] * vec3(e.w, f.xy) + basis[14] * vec3(f.zw, g.x);
+        vec4 a = value4(sh3, 5u * i), b = value4(sh3, 5u * i + 1u), c = value4(sh3, 5u * i + 2u);
+        vec4 d = value4(sh3, 5u * i + 3u), e = value4(sh3, 5u * i + 4u);
+        k[9] = vec3(last.w, a.xy);
+        k[10] = vec3(a.zw, b.x);
+        k[11] = b.yzw;
+        k[12] = c.xyz;
+        k[13] = vec3(c.w, d.xy);
+        k[14] = vec3(d.zw, e.x);
+        k[15] = e.yzw;
+        colour += basis[8] * k[9] + basis[9] * k[10] + basis[10] * k[11] + basis[11] * k[12] + basis[12] * k[13]
+            + basis[13] * k[14] + basis[14] * k[15];
     }
-    return c;
+    return colour;
 }

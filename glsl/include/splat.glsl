@@ -2,7 +2,6 @@
 // includes gaussian.glsl, projection.glsl, sh.glsl, record.glsl, ellipse.glsl and caught_up.glsl. Variant antialiased: opacity times
 // the root of the coverage (Mip-Splatting).
 
-#include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 
 // Writes the record of a splat. Returns where its tiles are, and its depth.
@@ -21,7 +20,8 @@ Ellipse project_splat(StepUniforms u, uint s, uint i, out float z) {
     vec3 direction = normalize(mean.xyz - u.camera_centre);
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
-    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
+    vec3 coefficients[16];
+    vec3 raw = sh_colour(i, basis, coefficients), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
 
     bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + raw.x + raw.y + raw.z);
     if (!sane) {

@@ -7,9 +7,10 @@
     vec3 direction = offset * inv_distance;
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
-    vec3 colour = sh_colour(i, basis);
+    vec3 coefficients[16];
+    vec3 colour = sh_colour(i, basis, coefficients);
     vec3 v_colour = mix(vec3(0.0), vec3(b.zw, blue), greaterThan(colour, vec3(0.0)));
-    vec3 v_direction = sh_direction_gradient(i, direction, v_colour);
+    vec3 v_direction = sh_direction_gradient(coefficients, direction, v_colour);
     vec3 v_mean = (v_direction - direction * dot(direction, v_direction)) * inv_distance;
 
     // conic -> covariance -> M

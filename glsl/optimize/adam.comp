@@ -68,7 +68,8 @@ void main() {
     vec4 g = fetch4(gradients, s == NO_SPLAT ? 0u : s * STRIDE + (e - i * STRIDE));
     g = s == NO_SPLAT ? vec4(0.0) : g;
     vec4 rate = RATE == 0u ? u.rate_means
-        : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : RATE == 3u ? u.rate_sh0 : u.rate_sh_rest);
+        : RATE == 3u ? vec4(vec3(u.rate_sh0), u.rate_sh_rest)
+        : vec4(RATE == 1u ? u.rate_scales : RATE == 2u ? u.rate_quats : u.rate_sh_rest);
     float correction1 = u.adam_correction1, correction2 = u.adam_correction2;
 #endif
     vec4 m, v;
@@ -77,5 +78,5 @@ void main() {
     v = ADAM_BETA2 * v + (1.0 - ADAM_BETA2) * g * g;
     vec4 update = rate * (m * correction1) / (sqrt(v * correction2) + ADAM_EPSILON);
     parameters[e] = fetch4(parameters_in, e) - update;
-    store_moments(parameters, e, m, v, u.seed, RATE < 4u ? RATE : 3u + STRIDE / 2u);
+    store_moments(parameters, e, m, v, u.seed, RATE < 4u ? RATE : 3u + (STRIDE + 1u) / 2u);
 }

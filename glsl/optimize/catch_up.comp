@@ -70,13 +70,13 @@ void main() {
         quats_catch_up(e);
         sh0_catch_up(e);
     }
-    for (uint at = lane; SH_DEGREE >= 1u && at < 3u * late_count; at += 64u) {
-        sh1_catch_up(find(at, 3u));
+    for (uint at = lane; SH_DEGREE >= 1u && at < 2u * late_count; at += 64u) {
+        sh1_catch_up(find(at, 2u));
     }
     for (uint at = lane; SH_DEGREE >= 2u && at < 4u * late_count; at += 64u) {
         sh2_catch_up(find(at, 4u));
     }
-    for (uint at = lane; SH_DEGREE >= 3u && at < 6u * late_count; at += 64u) {
-        sh3_catch_up(find(at, 6u));
+    for (uint at = lane; SH_DEGREE >= 3u && at < 5u * late_count; at += 64u) {
+        sh3_catch_up(find(at, 5u));
     }
 }

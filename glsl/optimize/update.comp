@@ -22,6 +22,7 @@
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(constant_id = 18) const uint CHANGES = 1; // 0: the statistic alone
+const uint REST_FLOATS = 3u * SH_DEGREE * (SH_DEGREE + 2u); // of the coefficients above degree 0
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 INOUT1(1, Counters, counters);
@@ -59,7 +60,6 @@ FETCHU(33, layer_from_label);
 #define touched(i) touched_at[i]
 #include "caught_up.glsl"
 EACH_PLANE(CAUGHT_UP)
-#include "sh_fetch.glsl"
 #include "sh_colour.glsl"
 #include "sh_backward.glsl"
 #include "records.glsl"
@@ -131,12 +131,12 @@ void update_geometry(StepUniforms u, uint i, Sums sums) {
     }
 }
 
-// Gradient of one vec4 of a band of coefficients, of which `first` is the first and `floats` is three times their number.
-vec4 coefficient_gradient(uint slot, uint first, uint floats, uint part) {
+// Gradient of four floats of coefficients above degree 0; 0 above the active degree.
+vec4 coefficient_gradient(uint slot, uint first) {
     vec4 g = vec4(0.0);
     for (uint c = 0u; c < 4u; c++) {
-        uint at = 4u * part + c;
-        g[c] = at < floats ? touched_basis[15u * slot + first + at / 3u] * touched_colour[slot][at % 3u] : 0.0;
+        uint at = first + c;
+        g[c] = at < REST_FLOATS ? touched_basis[15u * slot + at / 3u] * touched_colour[slot][at % 3u] : 0.0;
     }
     return g;
 }
@@ -156,20 +156,21 @@ void update_colours(StepUniforms u) {
     uint lane = gl_LocalInvocationID.x, part;
     for (uint at = lane; at < touched_count; at += WALKERS) {
         uint slot = find(at, 1u, part);
-        sh0_step(u, touched_row[slot], vec4(SH_C0 * touched_colour[slot], 0.0), vec4(u.rate_sh0));
+        float first = SH_DEGREE >= 1u ? touched_basis[15u * slot] * touched_colour[slot].x : 0.0;
+        sh0_step(u, touched_row[slot], vec4(SH_C0 * touched_colour[slot], first), vec4(vec3(u.rate_sh0), u.rate_sh_rest));
     }
     vec4 rate = vec4(u.rate_sh_rest);
-    for (uint at = lane; SH_DEGREE >= 1u && at < 3u * touched_count; at += WALKERS) {
-        uint slot = find(at, 3u, part);
-        sh1_step(u, 3u * touched_row[slot] + part, coefficient_gradient(slot, 0u, 9u, part), rate);
+    for (uint at = lane; SH_DEGREE >= 1u && at < 2u * touched_count; at += WALKERS) {
+        uint slot = find(at, 2u, part);
+        sh1_step(u, 2u * touched_row[slot] + part, coefficient_gradient(slot, 1u + 4u * part), rate);
     }
     for (uint at = lane; SH_DEGREE >= 2u && at < 4u * touched_count; at += WALKERS) {
         uint slot = find(at, 4u, part);
-        sh2_step(u, 4u * touched_row[slot] + part, coefficient_gradient(slot, 3u, 15u, part), rate);
+        sh2_step(u, 4u * touched_row[slot] + part, coefficient_gradient(slot, 9u + 4u * part), rate);
     }
-    for (uint at = lane; SH_DEGREE >= 3u && at < 6u * touched_count; at += WALKERS) {
-        uint slot = find(at, 6u, part);
-        sh3_step(u, 6u * touched_row[slot] + part, coefficient_gradient(slot, 8u, 21u, part), rate);
+    for (uint at = lane; SH_DEGREE >= 3u && at < 5u * touched_count; at += WALKERS) {
+        uint slot = find(at, 5u, part);
+        sh3_step(u, 5u * touched_row[slot] + part, coefficient_gradient(slot, 25u + 4u * part), rate);
     }
 }
 

@@ -6,7 +6,7 @@
 #include "sh.glsl"
 // pose_backward — sum what the gradients of the splats say about the pose of the camera.
 // Work:    64 splats per workgroup.
-// Reads:   step; counters; gaussian_from_splat [V]; means, quats, sh1..sh3 [N]; v_means, v_quats, v_sh0 [V]
+// Reads:   step; counters; gaussian_from_splat [V]; means, quats, sh0..sh3 [N]; v_means, v_quats, v_sh0 [V]
 // Writes:  pose_partials [ceil(V / 64), 2]: the force, and the torque around the camera, both in world axes
 // Math:    moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Turning it turns them around the camera,
 //          but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the
@@ -21,15 +21,16 @@ READ1(1, Counters, counters);
 FETCHU(2, gaussian_from_splat);
 FETCH4(3, means);
 FETCH4(4, quats);
-FETCH4(5, sh1);
-FETCH4(6, sh2);
-FETCH4(7, sh3);
-READ(8, vec4, v_means);
-READ(9, vec4, v_quats);
-READ(10, vec4, v_sh0);
-WRITE(11, vec4, pose_partials);
+FETCH4(5, sh0);
+FETCH4(6, sh1);
+FETCH4(7, sh2);
+FETCH4(8, sh3);
+READ(9, vec4, v_means);
+READ(10, vec4, v_quats);
+READ(11, vec4, v_sh0);
+WRITE(12, vec4, pose_partials);
 
-#include "sh_fetch.glsl"
+#include "sh_colour.glsl"
 #include "sh_backward.glsl"
 
 shared vec3 forces[64];
@@ -44,7 +45,11 @@ void main() {
         vec3 offset = fetch4(means, i).xyz - step.camera_centre;
         float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
         vec3 direction = offset * inv_distance;
-        vec3 v_direction = sh_direction_gradient(i, direction, v_sh0[s].xyz / SH_C0);
+        float basis[15];
+        sh_basis(direction, SH_DEGREE, basis);
+        vec3 coefficients[16];
+        sh_colour(i, basis, coefficients);
+        vec3 v_direction = sh_direction_gradient(coefficients, direction, v_sh0[s].xyz / SH_C0);
         force = v_means[s].xyz;
         vec3 of_place = force - (v_direction - direction * dot(direction, v_direction)) * inv_distance;
         // Quaternions are w, x, y, z.

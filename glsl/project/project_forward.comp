@@ -10,7 +10,7 @@
 #include "ellipse.glsl"
 // project_forward — project and colour the visible Gaussians, and count the tiles of each.
 // Work:    64 splats per workgroup, splats in depth order.
-// Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
+// Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
 //          (integer atomics): nonfinite splats, which touch no tile

@@ -14,7 +14,7 @@
 //                   model, and count the tiles of each.
 // Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible ones are shared out again, so that
 //          no invocation waits for the others, and so are the rows of their tiles.
-// Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,3], sh2 [N,4], sh3 [N,6];
+// Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits of z;
 //          splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_* (integer atomics) as

@@ -17,6 +17,9 @@ const MISSED: &str = "missed_updates";
 /// Words of its rows.
 const WORDS: u32 = 8;
 
+/// Which of the eight rates each component of a vec4 has, by the rate of its attribute.
+const RATES: [[usize; 4]; 5] = [[0, 1, 2, 3], [4; 4], [5; 4], [6, 6, 6, 7], [7; 4]];
+
 /// What each Gaussian has missed.
 pub(super) struct Late {
     /// Number of updates, of each trained Gaussian.
@@ -36,12 +39,11 @@ impl Late {
     /// Catches up the values of a plane of parameters, given with its moments, which it catches up too.
     fn settle(&self, plane: Buf, [values, m, u]: [&mut [f32]; 3]) {
         let Some(attribute) = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane) else { return };
-        let (rate, floats) = (attribute.rate as usize, 4 * attribute.stride as usize);
+        let (rates, floats) = (RATES[attribute.rate as usize], 4 * attribute.stride as usize);
         for (row, &age) in self.ages.iter().enumerate().filter(|(_, age)| **age > 0) {
             let (sums, [first, second]) = &self.sums[age];
             for at in row * floats..(row + 1) * floats {
-                let sum = if rate == 0 { sums[at % 4] } else { sums[3 + rate] };
-                values[at] -= sum * (m[at] / (u[at].sqrt() + ADAM_EPSILON));
+                values[at] -= sums[rates[at % 4]] * (m[at] / (u[at].sqrt() + ADAM_EPSILON));
                 m[at] *= first;
                 u[at] *= second;
             }

@@ -9,8 +9,8 @@ use crate::scene::{Gaussians, LABEL_MAX, UNLABELLED};
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
-/// Bands above degree 0: plane, vec4 per Gaussian, first coefficient (without degree 0), number of coefficients.
-const BANDS: [(Buf, usize, usize, usize); 3] = [(Buf::SH1, 3, 0, 3), (Buf::SH2, 4, 3, 5), (Buf::SH3, 6, 8, 7)];
+/// Planes of colours after the first one: floats of each Gaussian, and how many above degree 0 are in the planes before.
+const COLOURS: [(Buf, usize, usize); 3] = [(Buf::SH1, 8, 1), (Buf::SH2, 16, 9), (Buf::SH3, 20, 25)];
 
 /// Writes the planes; sets the optimiser state to 0. Returns the ids of the labels on the device.
 pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize) -> Result<LabelIds> {
@@ -21,15 +21,13 @@ pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize
     sched.upload(Buf::MEANS, 0, 0, &with(&model.means, &|i| model.opacities[i]))?;
     sched.upload(Buf::SCALES, 0, 0, &with(&model.scales, &|_| 0.0))?;
     sched.upload(Buf::QUATS, 0, 0, &model.quats)?;
-    sched.upload(Buf::SH0, 0, 0, &with(&model.sh0, &|_| 0.0))?;
-    let rest = model.rest_per_gaussian();
-    for (plane, stride, first, count) in BANDS {
-        let mut words = vec![0.0_f32; model.len() * stride * 4];
-        if first < rest {
-            for (row, out) in words.chunks_exact_mut(stride * 4).enumerate() {
-                let from = row * rest + first;
-                out[..count * 3].copy_from_slice(model.sh_rest[from..from + count].as_flattened());
-            }
+    sched.upload(Buf::SH0, 0, 0, &with(&model.sh0, &|i| model.rest(i).first().map_or(0.0, |first| first[0])))?;
+    for (plane, floats, before) in COLOURS {
+        let mut words = vec![0.0_f32; model.len() * floats];
+        for (row, to) in words.chunks_exact_mut(floats).enumerate() {
+            let from = model.rest(row).as_flattened().get(before..).unwrap_or_default();
+            let count = floats.min(from.len());
+            to[..count].copy_from_slice(&from[..count]);
         }
         sched.upload(plane, 0, 0, &words)?;
     }
@@ -62,23 +60,25 @@ pub(super) fn upload_labels(sched: &mut Scheduler, labels: &[u32], size: &Engine
 pub(super) fn download(sched: &mut Scheduler, late: Option<&Late>, count: usize, sh_degree: u32) -> Result<Gaussians> {
     let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
     let mut rows = |plane: Buf| late::read(sched, late, plane, 4 * count).map(|all| all.as_chunks::<4>().0.to_vec());
-    let means = rows(Buf::MEANS)?;
+    let (means, sh0) = (rows(Buf::MEANS)?, rows(Buf::SH0)?);
     let mut model = Gaussians {
         means: xyz(&means),
         opacities: means.iter().map(|row| row[3]).collect(),
         scales: xyz(&rows(Buf::SCALES)?),
         quats: rows(Buf::QUATS)?,
-        sh0: xyz(&rows(Buf::SH0)?),
+        sh0: xyz(&sh0),
         sh_degree,
         ..Gaussians::default()
     };
     let rest = model.rest_per_gaussian();
     model.sh_rest = vec![[0.0; 3]; count * rest];
-    for (plane, stride, first, coefficients) in BANDS.into_iter().filter(|band| band.2 < rest) {
-        let words = late::read(sched, late, plane, count * stride * 4)?;
-        for (row, words) in words.chunks_exact(stride * 4).enumerate() {
-            let to = row * rest + first;
-            model.sh_rest[to..to + coefficients].as_flattened_mut().copy_from_slice(&words[..coefficients * 3]);
+    model.sh_rest.chunks_exact_mut(rest.max(1)).zip(&sh0).for_each(|(to, from)| to[0][0] = from[3]);
+    for (plane, floats, before) in COLOURS.into_iter().filter(|plane| plane.2 < 3 * rest) {
+        let words = late::read(sched, late, plane, count * floats)?;
+        for (to, from) in model.sh_rest.chunks_exact_mut(rest).zip(words.chunks_exact(floats)) {
+            let to = &mut to.as_flattened_mut()[before..];
+            let count = floats.min(to.len());
+            to[..count].copy_from_slice(&from[..count]);
         }
     }
     Ok(model)

@@ -29,9 +29,9 @@ pub(crate) const ATTRIBUTES: [Attribute; 7] = [
     attribute([Buf::SCALES, Buf::M_SCALES, Buf::U_SCALES], Buf::V_SCALES, 1, 1, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::QUATS, Buf::M_QUATS, Buf::U_QUATS], Buf::V_QUATS, 1, 2, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::SH0, Buf::M_SH0, Buf::U_SH0], Buf::V_SH0, 1, 3, 0, constants::ARGS_GAUSSIANS),
-    attribute([Buf::SH1, Buf::M_SH1, Buf::U_SH1], Buf::V_SH1, 3, 4, 1, constants::ARGS_SH1),
+    attribute([Buf::SH1, Buf::M_SH1, Buf::U_SH1], Buf::V_SH1, 2, 4, 1, constants::ARGS_SH1),
     attribute([Buf::SH2, Buf::M_SH2, Buf::U_SH2], Buf::V_SH2, 4, 4, 2, constants::ARGS_SH2),
-    attribute([Buf::SH3, Buf::M_SH3, Buf::U_SH3], Buf::V_SH3, 6, 4, 3, constants::ARGS_SH3),
+    attribute([Buf::SH3, Buf::M_SH3, Buf::U_SH3], Buf::V_SH3, 5, 4, 3, constants::ARGS_SH3),
 ];
 
 impl Attribute {
@@ -121,4 +121,24 @@ pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, opacity_reset(half: b.half) { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
         over_gaussians());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ATTRIBUTES;
+    use crate::pass::buffers::TABLE;
+
+    /// Three vec4 of geometry, and 16 rgb triples without padding; moments and gradients likewise.
+    #[test]
+    fn a_gaussian_of_degree_3_has_15_vec4() {
+        for (degree, vectors) in [(0, 4), (1, 6), (2, 10), (3, 15)] {
+            let attributes = || ATTRIBUTES.iter().filter(|a| a.from_degree <= degree);
+            assert_eq!(attributes().map(|a| a.stride).sum::<u32>(), vectors, "degree {degree}");
+            for set in 0..4 {
+                let planes = attributes().map(|a| if set < 3 { a.planes[set] } else { a.gradient });
+                let bytes: u32 = planes.map(|plane| TABLE[plane.index()].element_bytes).sum();
+                assert_eq!(bytes, 16 * vectors, "degree {degree}, planes {set}");
+            }
+        }
+    }
 }

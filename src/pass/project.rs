@@ -84,7 +84,7 @@ pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
     b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, pose_backward {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        quats: Buf::QUATS, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
+        quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
         v_quats: Buf::V_QUATS, v_sh0: Buf::V_SH0, pose_partials: partials,
     } [sh_degree: sh_degree], over_splats());
     pass!(b, pose_reduce {

@@ -65,7 +65,7 @@ fn everything(fixture: &mut Fixture) -> Vec<u32> {
     bits.extend(fixture.get::<u32>(Buf::V_SPLATS, 12 * splats));
     GRADIENTS[..4].iter().for_each(|&plane| bits.extend(fixture.get::<u32>(plane, 4 * splats)));
     bits.extend(fixture.get::<u32>(Buf::MEANS, 4 * count));
-    bits.extend(fixture.get::<u32>(Buf::SH3, 24 * count));
+    bits.extend(fixture.get::<u32>(Buf::SH3, 20 * count));
     bits.extend(fixture.get::<u32>(Buf::LABELS, count));
     bits
 }

@@ -14,7 +14,7 @@ use rand::Rng;
 /// Gaussians: more than the grid has invocations, and a few more.
 const ROWS: usize = 16_400;
 /// A plane of one vec4, the widest one, and one of other width.
-const PLANES: [(Buf, usize); 3] = [(Buf::MEANS, 4), (Buf::U_SH3, 24), (Buf::DENSIFY_STATS, 2)];
+const PLANES: [(Buf, usize); 3] = [(Buf::MEANS, 4), (Buf::U_SH3, 20), (Buf::DENSIFY_STATS, 2)];
 
 /// A wrong search.
 type Mutant = fn(&[f64], usize) -> Option<usize>;
