@@ -19,8 +19,8 @@ impl Ahead {
         let (gpu, is_over) = (Arc::clone(gpu), Arc::new(AtomicBool::new(false)));
         let ends = Arc::clone(&is_over);
         let compile = move || {
-            for (shader, spec) in lists.iter().flat_map(PassList::kernels) {
-                if ends.load(Ordering::Relaxed) || gpu.pipeline(shader, spec).is_err() {
+            for pass in lists.iter().flat_map(PassList::passes) {
+                if ends.load(Ordering::Relaxed) || gpu.pipeline(pass.shader, &pass.spec, &[]).is_err() {
                     return;
                 }
             }

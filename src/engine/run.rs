@@ -98,6 +98,10 @@ impl Engine {
 
     /// Compiles the kernels of lists that come later, in this order, while the device works.
     pub(crate) fn compile_ahead(&mut self, keys: impl IntoIterator<Item = ListKey>) {
+        // Where buffers share bindings, kernels follow from the places of their buffers, which plans find.
+        if self.gpu().limits().plan.is_packed() {
+            return;
+        }
         let lists = keys.into_iter().map(|key| self.declare(key)).collect();
         self.ahead = Some(Ahead::new(self.gpu(), lists));
     }

@@ -16,7 +16,8 @@ pub(crate) struct BufferView {
 
 impl BufferView {
     pub(crate) fn new(gpu: &Arc<Gpu>, buffer: &Buffer, format: vk::Format, offset: u64, bytes: u64) -> Result<Self> {
-        let info = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format).offset(offset).range(bytes);
+        let info = vk::BufferViewCreateInfo::default().buffer(buffer.raw()).format(format);
+        let info = info.offset(buffer.start() + offset).range(bytes);
         // SAFETY: the planner aligned the offset and checked the size; every device supports all four formats.
         let handle = vk_call("vkCreateBufferView", || unsafe { gpu.raw().create_buffer_view(&info, None) })?;
         Ok(Self { gpu: Arc::clone(gpu), handle })
@@ -41,6 +42,15 @@ pub(crate) enum Binding<'a> {
         /// Number of bytes.
         bytes: u64,
     },
+    /// A range of a buffer that shaders read as uniforms.
+    Uniform {
+        /// The buffer.
+        buffer: &'a Buffer,
+        /// First byte.
+        offset: u64,
+        /// Number of bytes.
+        bytes: u64,
+    },
     /// A typed view.
     Texel(&'a BufferView),
 }
@@ -53,7 +63,12 @@ pub(crate) struct DescriptorPool {
 
 impl DescriptorPool {
     pub(crate) fn new(gpu: &Arc<Gpu>, sets: u32, storage: u32, texel: u32) -> Result<Self> {
-        let sizes = [(vk::DescriptorType::STORAGE_BUFFER, storage), (vk::DescriptorType::UNIFORM_TEXEL_BUFFER, texel)];
+        let uniform = if gpu.limits().plan.is_packed() { sets } else { 0 };
+        let sizes = [
+            (vk::DescriptorType::STORAGE_BUFFER, storage),
+            (vk::DescriptorType::UNIFORM_TEXEL_BUFFER, texel),
+            (vk::DescriptorType::UNIFORM_BUFFER, uniform),
+        ];
         let sizes = sizes.iter().filter(|(_, count)| *count > 0);
         let sizes =
             sizes.map(|&(ty, descriptor_count)| vk::DescriptorPoolSize { ty, descriptor_count }).collect::<Vec<_>>();
@@ -63,7 +78,7 @@ impl DescriptorPool {
         Ok(Self { gpu: Arc::clone(gpu), handle })
     }
 
-    /// Allocates a set of the pipeline and writes its bindings, in the order of the shader's.
+    /// Allocates a set of the pipeline and writes its bindings, in the order of the pipeline's.
     pub(crate) fn set(&self, pipeline: &Pipeline, bindings: &[Binding<'_>]) -> Result<vk::DescriptorSet> {
         let layouts = [pipeline.set_layout()];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.handle).set_layouts(&layouts);
@@ -73,8 +88,9 @@ impl DescriptorPool {
         let buffers = bindings
             .iter()
             .map(|binding| match binding {
-                Binding::Storage { buffer, offset, bytes } => {
-                    [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset: *offset, range: *bytes }]
+                Binding::Storage { buffer, offset, bytes } | Binding::Uniform { buffer, offset, bytes } => {
+                    let offset = buffer.start() + offset;
+                    [vk::DescriptorBufferInfo { buffer: buffer.raw(), offset, range: *bytes }]
                 }
                 Binding::Texel(_) => [vk::DescriptorBufferInfo::default()],
             })
@@ -82,19 +98,16 @@ impl DescriptorPool {
         let views = bindings
             .iter()
             .map(|binding| match binding {
-                Binding::Storage { .. } => [vk::BufferView::null()],
+                Binding::Storage { .. } | Binding::Uniform { .. } => [vk::BufferView::null()],
                 Binding::Texel(view) => [view.handle],
             })
             .collect::<Vec<_>>();
-        let writes = bindings.iter().zip(pipeline.bindings()).enumerate().map(|(index, (binding, desc))| {
-            let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(desc.binding).descriptor_count(1);
+        let writes = bindings.iter().zip(pipeline.slots()).enumerate().map(|(index, (binding, &(number, kind)))| {
+            let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(number).descriptor_count(1);
+            let write = write.descriptor_type(kind);
             match binding {
-                Binding::Storage { .. } => {
-                    write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(&buffers[index])
-                }
-                Binding::Texel(_) => {
-                    write.descriptor_type(vk::DescriptorType::UNIFORM_TEXEL_BUFFER).texel_buffer_view(&views[index])
-                }
+                Binding::Storage { .. } | Binding::Uniform { .. } => write.buffer_info(&buffers[index]),
+                Binding::Texel(_) => write.texel_buffer_view(&views[index]),
             }
         });
         let writes = writes.collect::<Vec<_>>();

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::lab;
+use crate::shaders::{self, ShaderDesc};
 
 /// Limits of a device that a plan must respect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +21,9 @@ pub struct PlanLimits {
     pub max_allocation: u64,
     /// Maximum number of storage buffers per shader.
     pub max_storage_buffers: u32,
+    /// Storage bindings that all buffers of a shader share (`plan::windows`), on a device that has too few for a buffer each;
+    /// 0 if each has its own.
+    pub windows: u32,
     /// Maximum number of texel buffers per shader.
     pub max_texel_buffers: u32,
     /// Memory that the engine may use in total, in bytes: a share of the driver's free memory, or of the heap.
@@ -33,6 +37,27 @@ pub struct PlanLimits {
     pub runs_ahead: bool,
 }
 
+/// Alignment of buffers that share bindings: the largest block of the shaders has 352 bytes. Powers of 2, like all alignments of
+/// Vulkan.
+const PACKED_ALIGNMENT: u64 = 512;
+
+/// Most buffers of a shader that share bindings: their offsets fill a slot of [`PACKED_SLOT`] bytes.
+const PACKED_MAX: u32 = PACKED_SLOT / 4;
+
+/// Bytes between the offsets of two passes, a multiple of any alignment of uniform buffers.
+pub(crate) const PACKED_SLOT: u32 = 256;
+
+/// Most storage buffers of a shader that no device does without. Where others do not have their buffers, other passes do their
+/// work (`KernelShape`).
+fn own_bindings() -> u32 {
+    const REPLACEABLE: [&str; 6] =
+        ["update", "catch_up", "project_visible", "emit_ordered", "group_forward", "group_backward"];
+    let is_needed = |shader: &&&ShaderDesc| {
+        !REPLACEABLE.iter().any(|stem| shader.stem.starts_with(stem)) && !shader.macros.contains(&"LAZY")
+    };
+    shaders::ALL.iter().filter(is_needed).map(|shader| shader.storage_buffers()).max().unwrap_or(0)
+}
+
 impl Default for PlanLimits {
     /// Modest limits that every suitable device is likely to reach, without a bound on total memory.
     fn default() -> Self {
@@ -44,6 +69,7 @@ impl Default for PlanLimits {
             max_groups: [65_535; 3],
             max_allocation: 1 << 30,
             max_storage_buffers: 32,
+            windows: 0,
             max_texel_buffers: 32,
             max_memory: u64::MAX,
             frames: 2,
@@ -65,9 +91,26 @@ impl PlanLimits {
         if self.stages { self.max_memory.saturating_sub(engine) / 2 } else { 0 }
     }
 
-    /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines.
+    /// Has buffers share bindings if these are too few for a buffer each. The data of steps then go through staging, because
+    /// buffers that the host writes would take a binding of their own.
+    #[must_use]
+    pub fn packed(self) -> Self {
+        if self.is_packed() || self.max_storage_buffers >= own_bindings() {
+            return self;
+        }
+        Self { windows: self.max_storage_buffers, max_storage_buffers: PACKED_MAX, stages: true, ..self }
+    }
+
+    /// True if the buffers of a shader share bindings.
+    pub fn is_packed(&self) -> bool {
+        self.windows > 0
+    }
+
+    /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines. Buffers that share a binding
+    /// start at a whole element from its start, whatever their elements: a multiple of the largest.
     pub fn alignment(&self) -> u64 {
-        self.storage_alignment.max(self.texel_alignment).max(64)
+        let least = if self.is_packed() { PACKED_ALIGNMENT } else { 64 };
+        self.storage_alignment.max(self.texel_alignment).max(least)
     }
 }
 
@@ -92,7 +135,7 @@ pub struct Limits {
 
 impl Limits {
     /// Lowers limits to the values of `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` (numbers with K, M
-    /// or G), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, the
+    /// or G), and `_BUFFERS` (storage buffers per shader), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, the
     /// way of their data from `LABELGS_PHOTOS` (`upload` or `resident`), and whether the host works ahead from `LABELGS_AHEAD`
     /// (`no` or `yes`).
     pub(super) fn change_by_env(&mut self) -> Result<()> {
@@ -106,6 +149,12 @@ impl Limits {
                 let problem = || Error::usage(name, format!("{text} is not a size; expected a number with K, M or G"));
                 *limit = (*limit).min(parse_size(&text).ok_or_else(problem)?);
             }
+        }
+        if let Some(text) = lab::var("LABELGS_LIMIT_BUFFERS") {
+            let buffers = text.parse().ok().filter(|&buffers| buffers > 0);
+            let buffers =
+                buffers.ok_or_else(|| Error::usage("LABELGS_LIMIT_BUFFERS", "expected a number of storage buffers"))?;
+            self.plan.max_storage_buffers = self.plan.max_storage_buffers.min(buffers);
         }
         if let Some(text) = lab::var("LABELGS_FRAMES") {
             let frames = text.parse().ok().filter(|frames| (1..=16).contains(frames));

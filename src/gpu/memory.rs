@@ -45,13 +45,15 @@ impl Gpu {
     }
 }
 
-/// A buffer with its memory; freed when dropped.
+/// A buffer with its memory, or a part of another buffer; freed when dropped.
 pub(crate) struct Buffer {
     gpu: Arc<Gpu>,
     name: String,
     handle: vk::Buffer,
     bytes: u64,
     allocation: Option<Allocation>,
+    /// Of a part: the buffer that has the handle and the memory, and the first byte in it.
+    whole: Option<(Arc<Buffer>, u64)>,
 }
 
 impl Buffer {
@@ -62,6 +64,8 @@ impl Buffer {
             | vk::BufferUsageFlags::INDIRECT_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
+        let is_packed = gpu.limits().plan.is_packed();
+        let usage = if is_packed { usage | vk::BufferUsageFlags::UNIFORM_BUFFER } else { usage };
         let families: Vec<u32> =
             gpu.capabilities.transfer_family.into_iter().chain([gpu.capabilities.queue_family]).collect();
         // Both queues use buffers as they come: for buffers, unlike images, that costs nothing.
@@ -75,7 +79,8 @@ impl Buffer {
         // SAFETY: the device is alive and the size is not 0 (the planner reserves at least one element).
         let handle = vk_call("vkCreateBuffer", || unsafe { gpu.raw().create_buffer(&info, None) })?;
         // From here on, dropping `buffer` destroys the handle.
-        let mut buffer = Self { gpu: Arc::clone(gpu), name: name.to_owned(), handle, bytes, allocation: None };
+        let of = (Arc::clone(gpu), name.to_owned());
+        let mut buffer = Self { gpu: of.0, name: of.1, handle, bytes, allocation: None, whole: None };
         // SAFETY: this device just created the handle.
         let requirements = unsafe { gpu.raw().get_buffer_memory_requirements(handle) };
         let location = match kind {
@@ -102,6 +107,15 @@ impl Buffer {
         })?;
         gpu.name_object(handle, name);
         Ok(buffer)
+    }
+
+    /// A part of a buffer, which lives as long as its parts.
+    pub(crate) fn part(whole: &Arc<Self>, name: &str, start: u64, bytes: u64) -> Result<Self> {
+        if bytes == 0 || start.checked_add(bytes).is_none_or(|end| end > whole.bytes) {
+            return Err(Error::Bug(format!("{bytes} bytes at {start} for {name}: no part of {whole:?}")));
+        }
+        let (gpu, name, handle) = (Arc::clone(&whole.gpu), name.to_owned(), whole.handle);
+        Ok(Self { gpu, name, handle, bytes, allocation: None, whole: Some((Arc::clone(whole), start)) })
     }
 
     fn refused(&self, error: AllocationError) -> Error {
@@ -141,9 +155,19 @@ impl Buffer {
         self.bytes
     }
 
-    /// The handle, for descriptors and commands.
+    /// The handle, for descriptors and commands, which count bytes from [`Self::start`].
     pub(crate) fn raw(&self) -> vk::Buffer {
         self.handle
+    }
+
+    /// The buffer of which this is a part, or itself.
+    pub(crate) fn whole(&self) -> &Self {
+        self.whole.as_ref().map_or(self, |(whole, _)| whole)
+    }
+
+    /// First byte behind the handle: 0 but for parts.
+    pub(crate) fn start(&self) -> u64 {
+        self.whole.as_ref().map_or(0, |(_, start)| *start)
     }
 
     /// Copies bytes to host-visible memory. The caller ensures that the device does not use them meanwhile.
@@ -164,6 +188,9 @@ impl Buffer {
 
     fn mapped(&self, offset: u64, length: usize) -> Result<*mut u8> {
         let inside = offset.checked_add(length as u64).is_some_and(|end| end <= self.bytes);
+        if let (true, Some((whole, start))) = (inside, &self.whole) {
+            return whole.mapped(start + offset, length);
+        }
         let pointer = self.allocation.as_ref().and_then(Allocation::mapped_ptr);
         match pointer {
             // SAFETY: the offset is inside the mapped range, as checked above.
@@ -176,6 +203,9 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
+        if self.whole.is_some() {
+            return;
+        }
         // SAFETY: created by this device; the scheduler waits for the device before it drops buffers.
         unsafe { self.gpu.raw().destroy_buffer(self.handle, None) };
         if let (Some(allocation), Some(allocator)) = (self.allocation.take(), lock(&self.gpu.allocator).as_mut()) {

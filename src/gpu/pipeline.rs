@@ -1,9 +1,9 @@
 //! Compute pipelines.
 
 use super::call::vk_call;
-use super::{Gpu, lock};
+use super::{Gpu, lock, packed};
 use crate::error::{Error, Result};
-use crate::shaders::{BindingDesc, BindingKind, PUSHED_WORDS, ShaderDesc};
+use crate::shaders::{BindingKind, PUSHED_WORDS, ShaderDesc};
 use ash::vk;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
@@ -17,7 +17,15 @@ pub(super) struct PipelineKey {
     /// Values of the specialisation constants.
     spec: Vec<u32>,
     subgroup_size: Option<u32>,
+    /// Window of each storage buffer, if they share bindings.
+    windows: Vec<u8>,
 }
+
+/// Binding and kind of a descriptor.
+pub(super) type Slot = (u32, vk::DescriptorType);
+
+/// A kernel to compile: its shader, the constants of a pass, and the windows of its storage buffers.
+pub(crate) type Kernel<'a> = (&'static ShaderDesc, &'a [u32], Vec<u8>);
 
 /// A pipeline, or none before its first use.
 pub(super) type PipelineSlot = Arc<Mutex<Option<Arc<Pipeline>>>>;
@@ -25,7 +33,7 @@ pub(super) type PipelineSlot = Arc<Mutex<Option<Arc<Pipeline>>>>;
 /// A compute pipeline with its layouts.
 pub(crate) struct Pipeline {
     device: ash::Device,
-    shader: &'static ShaderDesc,
+    slots: Vec<Slot>,
     set_layout: vk::DescriptorSetLayout,
     layout: vk::PipelineLayout,
     handle: vk::Pipeline,
@@ -33,27 +41,37 @@ pub(crate) struct Pipeline {
 
 impl Gpu {
     /// Returns the pipeline of a shader; creates it on first use. `spec` has the constants of a pass and is empty for the
-    /// defaults.
-    pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32]) -> Result<Arc<Pipeline>> {
+    /// defaults. `windows` has the window of each storage buffer where they share bindings, and is empty for the first.
+    pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32], windows: &[u8]) -> Result<Arc<Pipeline>> {
         let specialised = shader.spec.iter().enumerate().filter(|(_, constant)| !constant.is_pushed);
         let spec = specialised.map(|(place, constant)| spec.get(place).copied().unwrap_or(constant.default)).collect();
         let subgroup_size = self.pinned(shader, self.subgroup_size());
         let spirv = shader.spirv.as_ptr() as usize;
-        let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size };
+        let windows = self.windows(shader, windows);
+        let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size, windows };
         let slot = Arc::clone(lock(&self.pipelines).entry(key.clone()).or_default());
         // Others wait for this pipeline only: it may take long.
         let mut slot = lock(&slot);
         let pipeline = match slot.take() {
             Some(pipeline) => pipeline,
-            None => Arc::new(Pipeline::new(self, shader, &key.spec, subgroup_size)?),
+            None => Arc::new(Pipeline::new(self, shader, (&key.spec, &key.windows), subgroup_size)?),
         };
         *slot = Some(Arc::clone(&pipeline));
         Ok(pipeline)
     }
 
     /// Creates pipelines by several threads, so that [`Self::pipeline`] finds them.
-    pub(crate) fn compile(&self, passes: &[(&'static ShaderDesc, &[u32])]) -> Result<()> {
-        passes.par_iter().try_for_each(|(shader, spec)| self.pipeline(shader, spec).map(drop))
+    pub(crate) fn compile(&self, kernels: &[Kernel<'_>]) -> Result<()> {
+        kernels.par_iter().try_for_each(|(shader, spec, windows)| self.pipeline(shader, spec, windows).map(drop))
+    }
+
+    /// The window of each storage buffer of a shader: the first for all if none are given; none where each has its own binding.
+    pub(super) fn windows(&self, shader: &ShaderDesc, given: &[u8]) -> Vec<u8> {
+        match (self.limits().plan.is_packed(), given) {
+            (false, _) => Vec::new(),
+            (true, []) => vec![0; shader.storage_buffers() as usize],
+            (true, given) => given.to_vec(),
+        }
     }
 
     /// The subgroup size to pin for a shader, if it uses subgroups.
@@ -90,11 +108,28 @@ fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
     ))
 }
 
+/// Descriptors of a shader: in the order of its bindings, or windows, the places of buffers in them, and texel buffers.
+fn slots(shader: &ShaderDesc, windows: packed::Windows<'_>) -> Vec<Slot> {
+    let own = |kind| match kind {
+        BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
+        BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+    };
+    let bindings = shader.bindings.iter().map(|binding| (binding.binding, own(binding.kind)));
+    if windows.is_empty() {
+        return bindings.collect();
+    }
+    let (first, count) = (packed::first_binding(shader.bindings), packed::count(windows));
+    let shared = (first..first + count).map(|number| (number, vk::DescriptorType::STORAGE_BUFFER));
+    let places = (first + count, vk::DescriptorType::UNIFORM_BUFFER);
+    let texels = bindings.filter(|(_, kind)| *kind == vk::DescriptorType::UNIFORM_TEXEL_BUFFER);
+    shared.chain([places]).chain(texels).collect()
+}
+
 impl Pipeline {
     pub(super) fn new(
         gpu: &Gpu,
         shader: &'static ShaderDesc,
-        spec: &[u32],
+        (spec, windows): (&[u32], packed::Windows<'_>),
         subgroup_size: Option<u32>,
     ) -> Result<Self> {
         let width = gpu.check_workgroup(shader, spec, subgroup_size)?;
@@ -102,7 +137,7 @@ impl Pipeline {
         // From here on, dropping `pipeline` destroys its handles; destroying a null handle does nothing.
         let mut pipeline = Self {
             device,
-            shader,
+            slots: slots(shader, windows),
             set_layout: vk::DescriptorSetLayout::null(),
             layout: vk::PipelineLayout::null(),
             handle: vk::Pipeline::null(),
@@ -113,14 +148,18 @@ impl Pipeline {
             let name = shader.name;
             return Err(Error::Bug(format!("the SPIR-V of {name} has {} bytes", shader.spirv.len())));
         }
-        let words = words.iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>();
+        let mut words = words.iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>();
+        if !windows.is_empty() {
+            let shared = packed::repack(&words, shader.bindings, windows);
+            words = shared.map_err(|what| Error::Bug(format!("{} cannot share bindings: {what}", shader.name)))?;
+        }
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the SPIR-V comes from the shader compiler of the build.
         let module = vk_call("vkCreateShaderModule", || unsafe { gpu.raw().create_shader_module(&info, None) })?;
         let full =
             gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
         let flags = gpu.pipeline_flags();
-        let made = pipeline.make(gpu.pipeline_cache(), module, spec, (subgroup_size, full), flags);
+        let made = pipeline.make((gpu.pipeline_cache(), shader), module, spec, (subgroup_size, full), flags);
         // SAFETY: finished pipelines do not need their modules.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
         made.map_err(|error| refused(gpu, shader, error))?;
@@ -129,13 +168,9 @@ impl Pipeline {
     }
 
     fn make_layouts(&mut self) -> Result<()> {
-        let bindings = self.shader.bindings.iter().map(|binding| {
-            let kind = match binding.kind {
-                BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
-                BindingKind::Texel => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-            };
+        let bindings = self.slots.iter().map(|&(number, kind)| {
             vk::DescriptorSetLayoutBinding::default()
-                .binding(binding.binding)
+                .binding(number)
                 .descriptor_type(kind)
                 .descriptor_count(1)
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
@@ -162,13 +197,13 @@ impl Pipeline {
 
     fn make(
         &mut self,
-        cache: vk::PipelineCache,
+        (cache, shader): (vk::PipelineCache, &ShaderDesc),
         module: vk::ShaderModule,
         spec: &[u32],
         (size, full): (Option<u32>, bool),
         flags: vk::PipelineCreateFlags,
     ) -> Result<()> {
-        let constants = self.shader.spec.iter().filter(|constant| !constant.is_pushed);
+        let constants = shader.spec.iter().filter(|constant| !constant.is_pushed);
         let entries = constants.enumerate().map(|(index, constant)| vk::SpecializationMapEntry {
             constant_id: constant.id,
             offset: index as u32 * 4,
@@ -210,8 +245,8 @@ impl Pipeline {
         self.set_layout
     }
 
-    pub(super) fn bindings(&self) -> &'static [BindingDesc] {
-        self.shader.bindings
+    pub(super) fn slots(&self) -> &[Slot] {
+        &self.slots
     }
 }
 

@@ -5,11 +5,13 @@ use super::capabilities::{Capabilities, DeviceKind, Features, MEMORY, Need, SUBG
 use super::hidden::Hidden;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
-use crate::shaders::{self, ShaderDesc};
 use ash::vk;
 
 /// Least memory of a device: one block of the allocator. A driver that only compiles has none at all.
 const MEMORY_MIN: u64 = 64 << 20;
+
+/// Least storage buffers of a shader, as Vulkan has it: the model and what stays, scratch, reports, and one to spare.
+const WINDOWS_MIN: u32 = 4;
 
 impl Capabilities {
     /// Queries a device.
@@ -52,6 +54,8 @@ impl Capabilities {
         let mut limits = limits(&core, &eleven, max_buffer, memory, timestamp_bits);
         limits.change_by_env()?;
         hidden.limits(&mut limits);
+        let bindings = limits.plan.max_storage_buffers;
+        limits.plan = limits.plan.packed();
         let mut subgroup = subgroup(&eleven, &control, &features);
         hidden.subgroup(&mut subgroup);
         let mut found = Self {
@@ -70,7 +74,7 @@ impl Capabilities {
             transfer_family: hidden.transfer(transfer_family(&families)),
             size_control_is_extension: has_size_control && !is_1_3,
         };
-        found.needs = needs(&found, family.is_some());
+        found.needs = needs(&found, family.is_some(), bindings);
         if !found.subgroup.serves() {
             found.subgroup.emulate(found.is_cpu());
         }
@@ -214,28 +218,21 @@ fn subgroup(
 }
 
 /// Compares the requirements and optional features with the device.
-fn needs(found: &Capabilities, has_queue: bool) -> Vec<Need> {
+fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
     let (limits, features) = (&found.limits, &found.features);
     let (major, minor, patch) = found.api_version;
     let flag = |what, is_met, reason| need(what, is_met, "yes", if is_met { "yes" } else { "no" }.to_owned(), reason);
     let least = |what, needed: u32, found: u32, reason| {
         need(what, found >= needed, &needed.to_string(), found.to_string(), reason)
     };
-    // Where these do not have their buffers, other passes do their work (`KernelShape`).
-    const REPLACEABLE: [&str; 6] =
-        ["update", "catch_up", "project_visible", "emit_ordered", "group_forward", "group_backward"];
-    let is_needed = |shader: &&&ShaderDesc| {
-        !REPLACEABLE.iter().any(|stem| shader.stem.starts_with(stem)) && !shader.macros.contains(&"LAZY")
-    };
-    let bindings = shaders::ALL.iter().filter(is_needed).map(|shader| shader.storage_buffers()).max().unwrap_or(0);
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
         need(MEMORY, limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
         flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
-        least("workgroup size", 256, limits.max_invocations, "scan and sort"),
-        least("storage buffers per shader", bindings, limits.plan.max_storage_buffers, "bindings of the largest pass"),
+        least("workgroup size", 128, limits.max_invocations, "projection"),
+        least("storage buffers per shader", WINDOWS_MIN, bindings, "all buffers share them, if they are few"),
     ];
     needs.extend(wishes(limits, &found.subgroup));
     needs

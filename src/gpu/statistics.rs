@@ -40,7 +40,7 @@ impl Gpu {
     /// constant of the shader.
     pub fn statistics(&self, shader: &'static ShaderDesc, spec: &[u32], size: u32) -> Result<Vec<Statistic>> {
         let Some(functions) = &self.statistics else { return Err(unknown(&self.capabilities)) };
-        let pipeline = Pipeline::new(self, shader, spec, self.pinned(shader, size))?;
+        let pipeline = Pipeline::new(self, shader, (spec, &self.windows(shader, &[])), self.pinned(shader, size))?;
         // A compute pipeline is one executable.
         let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline.raw()).executable_index(0);
         let found = vk_call("vkGetPipelineExecutableStatisticsKHR", || {

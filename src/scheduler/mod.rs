@@ -5,6 +5,7 @@
 
 mod guard;
 mod loads;
+mod packed;
 pub mod plan;
 pub(crate) mod profiler;
 mod recorder;
@@ -162,8 +163,9 @@ impl Scheduler {
         }
         // On first use, which may take long on a new driver.
         let _stage = Stage::new("compiling kernels", 0);
-        let passes: Vec<_> = plans.iter().flat_map(|plan| plan.list.kernels()).collect();
-        self.gpu.compile(&passes)?;
+        let passes = plans.iter().flat_map(|plan| plan.list.passes().map(move |pass| (plan, pass)));
+        let kernels = passes.map(|(plan, pass)| Ok((pass.shader, &pass.spec[..], self.windows(plan, pass)?)));
+        self.gpu.compile(&kernels.collect::<Result<Vec<_>>>()?)?;
         let mut ids = Vec::new();
         for plan in plans {
             let recordings = self.record(&plan)?;

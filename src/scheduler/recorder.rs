@@ -85,7 +85,7 @@ impl<'a> Recorder<'a> {
     pub(super) fn fill(&self, buffer: &Buffer, offset: u64, bytes: u64, word: u32) -> Result<()> {
         check_range(buffer, offset, bytes)?;
         // SAFETY: recording; the range is aligned and inside the buffer, as checked above.
-        unsafe { self.gpu.raw().cmd_fill_buffer(self.command, buffer.raw(), offset, bytes, word) };
+        unsafe { self.gpu.raw().cmd_fill_buffer(self.command, buffer.raw(), buffer.start() + offset, bytes, word) };
         Ok(())
     }
 
@@ -93,11 +93,12 @@ impl<'a> Recorder<'a> {
     pub(super) fn copy(&self, from: (&Buffer, u64), to: (&Buffer, u64), bytes: u64) -> Result<()> {
         check_range(from.0, from.1, bytes)?;
         check_range(to.0, to.1, bytes)?;
-        let overlap = from.0.raw() == to.0.raw() && from.1 < to.1 + bytes && to.1 < from.1 + bytes;
+        let (src, dst) = (from.0.start() + from.1, to.0.start() + to.1);
+        let overlap = from.0.raw() == to.0.raw() && src < dst + bytes && dst < src + bytes;
         if overlap {
             return Err(Error::Bug(format!("copy within {:?}: the two ranges overlap", from.0)));
         }
-        let regions = [vk::BufferCopy { src_offset: from.1, dst_offset: to.1, size: bytes }];
+        let regions = [vk::BufferCopy { src_offset: src, dst_offset: dst, size: bytes }];
         // SAFETY: recording; the ranges are inside the buffers and do not overlap, as checked above.
         unsafe { self.gpu.raw().cmd_copy_buffer(self.command, from.0.raw(), to.0.raw(), &regions) };
         Ok(())
@@ -133,7 +134,9 @@ impl<'a> Recorder<'a> {
             }
             match groups {
                 Groups::Count([x, y, z]) => raw.cmd_dispatch(command, *x, *y, *z),
-                Groups::Indirect(buffer, offset) => raw.cmd_dispatch_indirect(command, buffer.raw(), *offset),
+                Groups::Indirect(buffer, offset) => {
+                    raw.cmd_dispatch_indirect(command, buffer.raw(), buffer.start() + *offset);
+                }
             }
         }
         Ok(())

@@ -2,10 +2,15 @@
 
 use super::SchedulerOptions;
 use super::guard;
+use super::packed;
 use super::recorder::{Groups, Recorder};
 use super::storage::Storage;
 use crate::error::{Error, Result};
-use crate::gpu::{Binding, BufferView, CommandBuffer, DescriptorPool, Gpu, Lane, Markers, QueryPool};
+use crate::gpu::limits::PACKED_SLOT;
+use crate::gpu::{
+    Binding, Buffer, BufferView, CommandBuffer, DescriptorPool, Gpu, Lane, Markers, MemoryKind, QueryPool,
+};
+use crate::scheduler::plan::windows::Span;
 use crate::scheduler::plan::{Buf, Class, Grid, PassDecl, Plan, TexelFormat, Uses, Work};
 use crate::shaders::{BindingKind, PUSHED_WORDS};
 use ash::vk;
@@ -20,6 +25,7 @@ pub(super) struct Recording {
     /// Timeline value of the last submit.
     pub(super) busy: u64,
     _descriptors: DescriptorPool,
+    _places: Option<Buffer>,
     _views: HashMap<Buf, BufferView>,
 }
 
@@ -31,6 +37,8 @@ struct Writer<'a> {
     frame: usize,
     recorder: Recorder<'a>,
     descriptors: &'a DescriptorPool,
+    /// Where buffers share bindings: their places, a slot for each item.
+    places: Option<&'a Buffer>,
     views: &'a HashMap<Buf, BufferView>,
 }
 
@@ -50,14 +58,19 @@ impl Recording {
         let queries = timed.then(|| QueryPool::new(gpu, items as u32 + 1)).transpose()?;
         let markers = options.crash_markers.then(|| Markers::new(gpu, items)).transpose()?;
         let views = views(gpu, plan, storage, frame)?;
+        let slots = u64::from(PACKED_SLOT) * items.max(1) as u64;
+        let is_packed = gpu.limits().plan.is_packed();
+        let places = is_packed.then(|| Buffer::new(gpu, "places of buffers", slots, MemoryKind::Upload)).transpose()?;
         let recorder = Recorder::begin(gpu, &command)?;
-        let writer = Writer { gpu, plan, storage, frame, recorder, descriptors: &descriptors, views: &views };
+        let (descriptors_, places_) = (&descriptors, places.as_ref());
+        let writer =
+            Writer { gpu, plan, storage, frame, recorder, descriptors: descriptors_, places: places_, views: &views };
         writer.prologue(queries.as_ref())?;
         for item in 0..items {
             writer.item(item, queries.as_ref(), markers.as_ref())?;
         }
         writer.recorder.end()?;
-        Ok(Self { command, queries, markers, busy: 0, _descriptors: descriptors, _views: views })
+        Ok(Self { command, queries, markers, busy: 0, _descriptors: descriptors, _places: places, _views: views })
     }
 }
 
@@ -83,7 +96,7 @@ impl Writer<'_> {
             self.recorder.fill(markers.buffer(), index as u64 * 4, 4, 1)?;
         }
         match &self.plan.list.work[index] {
-            Work::Pass(pass) => self.pass(pass)?,
+            Work::Pass(pass) => self.pass(pass, index)?,
             Work::Fill { buf, word, .. } => {
                 let (buffer, offset) = self.storage.place(self.plan, *buf, self.frame)?;
                 self.recorder.fill(buffer, offset, self.plan.placement(*buf)?.bytes, *word)?;
@@ -102,11 +115,15 @@ impl Writer<'_> {
         Ok(())
     }
 
-    fn pass(&self, pass: &PassDecl) -> Result<()> {
-        let pipeline = self.gpu.pipeline(pass.shader, &pass.spec)?;
-        let mut bindings = Vec::new();
+    fn pass(&self, pass: &PassDecl, index: usize) -> Result<()> {
+        let (mut bindings, windows) = match self.places {
+            Some(places) => self.windows(pass, places, u64::from(PACKED_SLOT) * index as u64)?,
+            None => (Vec::new(), Vec::new()),
+        };
+        let pipeline = self.gpu.pipeline(pass.shader, &pass.spec, &windows)?;
         for (binding, &buf) in pass.shader.bindings.iter().zip(&pass.buffers) {
             bindings.push(match binding.kind {
+                BindingKind::Storage if !windows.is_empty() => continue,
                 BindingKind::Storage => {
                     let (buffer, offset) = self.storage.place(self.plan, buf, self.frame)?;
                     Binding::Storage { buffer, offset, bytes: self.plan.placement(buf)?.bound }
@@ -130,6 +147,31 @@ impl Writer<'_> {
             pushed.get_or_insert([0; PUSHED_WORDS])[constant.id as usize] = word;
         }
         self.recorder.dispatch(&pipeline, set, pushed, &groups)
+    }
+
+    /// The windows that hold the storage buffers of a pass, with the places of these, and the window of each.
+    fn windows<'b>(&'b self, pass: &PassDecl, places: &'b Buffer, slot: u64) -> Result<(Vec<Binding<'b>>, Vec<u8>)> {
+        let bound = packed::bound(self.gpu, self.storage, self.plan, pass, self.frame)?;
+        let limits = self.gpu.limits().plan;
+        let (most, found) = (limits.windows as usize, bound.cover.windows.len());
+        if found > most {
+            return Err(Error::Bug(format!("pass {} has {found} windows; the device binds {most}", pass.label)));
+        }
+        if found == 0 {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        places.write(slot, bytemuck::cast_slice(&bound.places))?;
+        let window = |(span, buffer): (&Span<u64>, &&'b Buffer)| {
+            // Windows count from the handle.
+            Binding::Storage {
+                buffer: buffer.whole(),
+                offset: span.start,
+                bytes: (span.end - span.start).min(limits.max_storage_range),
+            }
+        };
+        let windows = bound.cover.windows.iter().zip(&bound.buffers).map(window);
+        let places = Binding::Uniform { buffer: places, offset: slot, bytes: PACKED_SLOT.into() };
+        Ok((windows.chain([places]).collect(), bound.cover.window_of))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Memory of a plan: a VkBuffer for each buffer outside of scratch, and the pages of the Step arena.
+//! Memory of a plan: a VkBuffer for each buffer outside of scratch, or a part of one (`packed`), and the pages of the Step arena.
 
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// All buffers of a scheduler.
 pub(super) struct Storage {
     /// By row of the table, then by copy; empty for scratch.
-    own: Vec<Vec<Buffer>>,
+    pub(super) own: Vec<Vec<Buffer>>,
     /// Pages of the Step arena.
     step: Vec<Buffer>,
 }
@@ -55,12 +55,7 @@ impl Storage {
 
 /// Allocates all copies of a buffer; returns none for a buffer of 0 bytes.
 fn allocate(gpu: &Arc<Gpu>, decl: &BufferDecl, bytes: u64, limits: &Limits) -> Result<Vec<Buffer>> {
-    let kind = |copy: usize| match decl.class {
-        Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
-        Class::PerFrame if limits.stages && copy < limits.frames => MemoryKind::Device,
-        Class::PerFrame => MemoryKind::Upload,
-        Class::Report => MemoryKind::Download,
-    };
+    let kind = |copy| memory::kind(decl.class, copy, limits);
     let copies = if bytes == 0 { 0 } else { decl.class.copies(limits) };
     (0..copies).map(|copy| Buffer::new(gpu, decl.name, bytes, kind(copy))).collect()
 }
@@ -73,6 +68,11 @@ impl Scheduler {
 
     /// Allocates every buffer outside of scratch.
     pub(super) fn allocate_own(&mut self) -> Result<()> {
+        if self.limits.is_packed() {
+            self.storage.own = self.packed(&self.counts)?;
+            (0..self.table.len()).try_for_each(|index| self.clear(Buf(index as u16)))?;
+            return self.write_own_guards();
+        }
         for index in 0..self.table.len() {
             let decl = &self.table[index];
             if decl.class != Class::Step {
@@ -89,10 +89,14 @@ impl Scheduler {
     /// need, and nothing is lost.
     pub(super) fn resize_own(&mut self, counts: Vec<u64>) -> Result<()> {
         self.cancel_loads();
-        let resized = self.resize_those(&counts, true).and_then(|()| self.resize_those(&counts, false));
+        let is_packed = self.limits.is_packed();
+        let resized = match is_packed {
+            true => self.resize_packed(&counts),
+            false => self.resize_those(&counts, true).and_then(|()| self.resize_those(&counts, false)),
+        };
         if resized.is_ok() {
             self.counts = counts;
-        } else {
+        } else if !is_packed {
             // Shrink again what has grown, since others need that memory; a buffer that fails to shrink stays large.
             let old = self.counts.clone();
             if let Err(error) = self.resize_those(&old, false) {

@@ -74,7 +74,11 @@ fn without_optional_features_a_training_is_the_same() {
     let hash = ["invariants::processes::hash_of_a_training"];
     let run = |environment: &[(&str, &str)]| hash_in(&child(&hash, environment));
     let all = hash_in(&child(&hash, &[]));
-    for (name, value) in [("LABELGS_HIDE", "timestamps,memory_model,robust"), ("LABELGS_LIMIT_TEXELS", "64K")] {
+    for (name, value) in [
+        ("LABELGS_HIDE", "timestamps,memory_model,robust"),
+        ("LABELGS_LIMIT_TEXELS", "64K"),
+        ("LABELGS_LIMIT_BUFFERS", "4"),
+    ] {
         assert_eq!(run(&[(name, value)]), all, "with {name}={value}");
     }
     // Emulated subgroups add in another order than lavapipe's.

@@ -47,6 +47,11 @@ impl Place {
         place
     }
 
+    /// Chooses another driver, or other features of it, from now on.
+    pub fn choose(&mut self, environment: &[(&'static str, &str)]) {
+        self.environment = environment.iter().map(|&(name, value)| (name, value.to_owned())).collect();
+    }
+
     /// A path in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)

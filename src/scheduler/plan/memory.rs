@@ -5,6 +5,7 @@ use super::buffers::{BufferDecl, Class, Table};
 use super::pass::PassList;
 use super::{GUARD_BYTES, Plan, PlanOptions};
 use crate::error::{Error, Result};
+use crate::gpu::MemoryKind;
 
 /// Bytes of the staging memory for transfers to and from device memory: one half for each direction.
 pub(crate) const STAGING_BYTES: u64 = 8 << 20;
@@ -30,6 +31,16 @@ pub(crate) fn bytes_of(decl: &BufferDecl, counts: &[u64]) -> Result<u64> {
             cure: (decl.domain.cure)((1 << 62) / u64::from(decl.element_bytes)),
         }
     })
+}
+
+/// Memory of a copy of a buffer: who uses it. Copies after those of the frames are staging.
+pub(crate) fn kind(class: Class, copy: usize, limits: &Limits) -> MemoryKind {
+    match class {
+        Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
+        Class::PerFrame if limits.stages && copy < limits.frames => MemoryKind::Device,
+        Class::PerFrame => MemoryKind::Upload,
+        Class::Report => MemoryKind::Download,
+    }
 }
 
 /// Bytes allocated for one copy of a buffer with its own memory.

@@ -12,6 +12,7 @@ mod lifetime;
 pub(crate) mod memory;
 pub(crate) mod pass;
 mod report;
+pub(crate) mod windows;
 
 pub use crate::gpu::limits::PlanLimits as Limits;
 pub use barrier::Use;
@@ -136,6 +137,9 @@ impl Plan {
             lifetime::check_written_first(table, &labels, &uses)?;
         }
         let (placements, step_pages) = arena::place(table, &sizes, &lives, limits, options)?;
+        if limits.is_packed() {
+            windows::check(table, counts, list, &placements, (limits, options))?;
+        }
         let touches = uses.iter().map(|uses| barrier::touches(uses, &placements)).collect::<Result<Vec<_>>>()?;
         let barriers = barrier::derive(table, &labels, &touches, options.barrier_everywhere);
         let items = labels.into_iter().zip(touches).zip(barriers);

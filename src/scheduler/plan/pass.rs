@@ -112,10 +112,10 @@ impl PassList {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// The shader of each dispatch, and its words.
-    pub(crate) fn kernels(&self) -> impl Iterator<Item = (&'static ShaderDesc, &[u32])> {
+    /// The dispatches.
+    pub(crate) fn passes(&self) -> impl Iterator<Item = &PassDecl> {
         self.work.iter().filter_map(|work| match work {
-            Work::Pass(pass) => Some((pass.shader, pass.spec.as_slice())),
+            Work::Pass(pass) => Some(pass),
             Work::Fill { .. } | Work::Copy { .. } => None,
         })
     }
