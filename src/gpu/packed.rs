@@ -309,6 +309,7 @@ impl Module {
 #[cfg(test)]
 mod tests {
     use super::{count, first_binding, instructions, op, repack, stride};
+    use crate::gpu::limits::PlanLimits;
     use crate::shaders::{self, ShaderDesc};
 
     fn words(shader: &ShaderDesc) -> Vec<u32> {
@@ -354,8 +355,7 @@ mod tests {
 
     #[test]
     fn elements_start_at_whole_elements_of_a_window() {
-        let alignment =
-            crate::gpu::limits::PlanLimits { max_storage_buffers: 4, ..PlanLimits::default() }.packed().alignment();
+        let alignment = PlanLimits { max_storage_buffers: 4, ..PlanLimits::default() }.packed().alignment();
         for binding in shaders::ALL.iter().flat_map(|shader| shader.bindings) {
             assert!(alignment.is_multiple_of(stride(binding)), "{binding:?}");
         }
@@ -367,7 +367,7 @@ mod tests {
         let (own, windows) = (words(shader), windows(shader));
         let refused = |words: &[u32], windows: &[u8]| repack(words, shader.bindings, windows).expect_err("refused");
         assert!(refused(&own[..3], &windows).contains("no header"));
-        assert!(refused(&own[..own.len() - 1], &windows).contains("a broken instruction"));
+        assert!(refused(&[&own[..], &[op::LOAD | 4 << 16]].concat(), &windows).contains("a broken instruction"));
         assert!(refused(&own, &windows[1..]).contains("windows for"));
         assert!(refused(&own[..op::HEADER], &windows).contains("0 functions"));
         let mut whole = own.clone();

@@ -6,7 +6,7 @@ use crate::lab;
 use crate::shaders::constants::{
     LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_LANES,
 };
-use crate::shaders::{ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
+use crate::shaders::{self, ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
 use std::borrow::Cow;
 
 /// Shape of the kernels: fixed for a device, but for what the model needs.
@@ -108,7 +108,10 @@ impl KernelShape {
     /// Returns the shape for a device.
     pub fn of(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
-        let texel = shape.texel && device.limits.plan.max_texel_elements >= TEXELS_MIN;
+        let limits = &device.limits.plan;
+        let most_texels = shaders::ALL.iter().map(|shader| shader.texel_buffers()).max().unwrap_or(0);
+        let has_texels = limits.max_texel_elements >= TEXELS_MIN && limits.max_texel_buffers >= most_texels;
+        let texel = shape.texel && has_texels;
         let shape = Self { texel, emulated: device.subgroup.is_emulated, ..shape };
         let is_card = !device.is_cpu();
         let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);

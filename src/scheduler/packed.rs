@@ -64,6 +64,9 @@ impl Scheduler {
     /// Moves all buffers outside of scratch to new blocks. Model buffers keep the common prefix. Needs room for old and new
     /// blocks; without it, all stays as it was.
     pub(super) fn resize_packed(&mut self, counts: &[u64]) -> Result<()> {
+        if (0..self.table.len()).all(|index| matches!(self.grows(index, counts), Ok(None))) {
+            return Ok(());
+        }
         let fresh = self.packed(counts)?;
         let old = std::mem::replace(&mut self.storage.own, fresh);
         for (index, old) in old.iter().enumerate() {

@@ -133,7 +133,7 @@ impl Scheduler {
     }
 
     /// Returns true if a buffer must grow, false if it may shrink, `None` if it stays.
-    fn grows(&self, index: usize, counts: &[u64]) -> Result<Option<bool>> {
+    pub(super) fn grows(&self, index: usize, counts: &[u64]) -> Result<Option<bool>> {
         let decl = &self.table[index];
         if decl.class == Class::Step {
             return Ok(None);

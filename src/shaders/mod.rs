@@ -87,7 +87,16 @@ pub struct ShaderDesc {
 impl ShaderDesc {
     /// Number of storage buffers that it binds.
     pub fn storage_buffers(&self) -> u32 {
-        self.bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).count() as u32
+        self.bindings_of(BindingKind::Storage)
+    }
+
+    /// Number of texel buffers that it binds.
+    pub fn texel_buffers(&self) -> u32 {
+        self.bindings_of(BindingKind::Texel)
+    }
+
+    fn bindings_of(&self, kind: BindingKind) -> u32 {
+        self.bindings.iter().filter(|binding| binding.kind == kind).count() as u32
     }
 
     /// Invocations on each axis of a workgroup, with these values of the specialisation constants.
