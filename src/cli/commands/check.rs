@@ -1,7 +1,7 @@
 //! `labelgs check`: faults of a capture before training.
 
 use crate::cli::support::{Context, ReadArgs};
-use crate::scenes::capture::{Fault, Report, scan};
+use crate::scenes::capture::{Fault, Finding, Report, scan};
 use crate::scenes::{self, LoadOptions};
 use crate::words::counted;
 use crate::{Error, Result};
@@ -24,7 +24,14 @@ pub struct CheckArgs {
 pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     // It looks at the photos in full size, few times: a file of their pixels would cost more than it saves.
     // What is missing or damaged is a finding.
-    let options = LoadOptions { test_every: None, photo_folder: None, max_bad_photos: 1.0, ..LoadOptions::default() };
+    // Surroundings that are transparent are none.
+    let options = LoadOptions {
+        test_every: None,
+        photo_folder: None,
+        max_bad_photos: 1.0,
+        keep_opacity: true,
+        ..LoadOptions::default()
+    };
     let dataset = scenes::open(&args.scene, &args.read.options(options))?;
     let is_found = |note: &&String| dataset.flaws.iter().any(|flaw| flaw.text() == *note);
     dataset.notes.iter().filter(|note| !is_found(note)).for_each(|note| tracing::warn!("{note}"));
@@ -59,7 +66,16 @@ fn table(report: &Report) -> String {
     text += &format!("{:>12} {:>20}  what\n", "fault", "photo");
     for finding in &report.findings {
         let view = finding.view.as_deref().unwrap_or("-");
-        text += &format!("{:>12} {view:>20}  {}; {}\n", finding.fault.text(), finding.text, finding.cure);
+        text +=
+            &format!("{:>12} {view:>20}  {}; {}{}\n", finding.fault.text(), finding.text, finding.cure, typed(finding));
     }
     text
+}
+
+/// Returns the command of a cure that is one.
+fn typed(finding: &Finding) -> &'static str {
+    match finding.fault {
+        Fault::Surroundings => ": labelgs train SCENE --masks DIR --masked-only -o OUT",
+        _ => "",
+    }
 }

@@ -27,6 +27,8 @@ pub enum Fault {
     WhiteBalance,
     /// Hardly any point of the photo is seen by others.
     Alone,
+    /// The surroundings do not follow the poses, as around an object on a turntable.
+    Surroundings,
     /// Sizes or distances that training cannot handle well.
     Scale,
 }
@@ -49,6 +51,7 @@ impl Fault {
                 "train gains of each photo (exposure), or take photos with fixed exposure and white balance"
             }
             Self::Alone => "leave the photo out, or add photos between it and the others",
+            Self::Surroundings => "make masks of the object, and train it alone (masked_only)",
             Self::Scale => "scale and centre the reconstruction, or remove stray points",
         }
     }

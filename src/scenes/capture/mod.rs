@@ -7,6 +7,7 @@ mod neighbours;
 mod photos;
 mod poses;
 mod shown;
+mod surroundings;
 
 use super::colmap::{self, Seen};
 use super::listed_path::Place;
@@ -27,6 +28,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 pub use finding::{Fault, Finding};
+pub use surroundings::{still_share, text as surroundings_text};
 
 /// What a scan measures of a photo.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -172,6 +174,7 @@ pub fn scan(scene: &Path, lookup: &Lookup, dataset: &Dataset) -> Result<Report> 
         findings.extend(alone.into_iter().filter(|of| !of.view.as_ref().is_some_and(|view| away.contains(view))));
     }
     findings.extend(poses::scale(dataset));
+    findings.extend(surroundings::findings(dataset)?);
     // The faces of a wide photo look at other things than their neighbours: sky is smooth, and no other photo shows it.
     let windows = windows(scene, lookup)?;
     let is_face = |name: &String| windows.get(name).is_some_and(|window| window.photo != window.name);
