@@ -1,6 +1,6 @@
 //! The cameras of a scene: on a dome around it, facing inwards, or on a flight over a city.
 
-use super::{Preset, SynthOptions, flight, hash01};
+use super::{Preset, SynthOptions, flight, hash01, turntable};
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::Camera;
 use std::f64::consts::TAU;
@@ -14,6 +14,9 @@ const ELEVATIONS: [f64; 3] = [16.0, 33.0, 52.0];
 pub fn cameras(options: &SynthOptions) -> Vec<Camera> {
     match options.preset {
         Preset::City => (0..options.views).map(|view| looking(options, flight::pose(options, view))).collect(),
+        _ if turntable::is_turned(options.preset) => {
+            (0..options.views).map(|view| turntable::camera(options, view)).collect()
+        }
         _ => ring_of_cameras(options),
     }
 }
@@ -34,7 +37,7 @@ fn on_ring(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
     (target + outward * (DISTANCE * (1.0 + 0.1 * random(4))), -outward)
 }
 
-fn looking(options: &SynthOptions, (centre, forward): (DVec3, DVec3)) -> Camera {
+pub(super) fn looking(options: &SynthOptions, (centre, forward): (DVec3, DVec3)) -> Camera {
     let right = forward.cross(DVec3::Z).normalize();
     let down = forward.cross(right);
     // Through the quaternion, because the files store that.

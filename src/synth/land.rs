@@ -2,6 +2,7 @@
 
 use super::Preset;
 use super::material::{ground_albedo, noise};
+use super::turntable::STAND;
 use glam::DVec3;
 
 /// Plots of the city along x and along y; the world's origin is in the middle.
@@ -19,20 +20,40 @@ pub(super) struct Land {
     pub(super) sky: f64,
     /// Radii between which the ground fades to the colour of the horizon.
     pub(super) haze: (f64, f64),
-    has_streets: bool,
+    pub(super) has_streets: bool,
+    /// White wall in place of the sky, and a stand on white ground.
+    pub(super) is_studio: bool,
+    pub(super) has_ground: bool,
 }
+
+/// Colour of the wall in a studio.
+pub(super) const WALL: DVec3 = DVec3::new(0.95, 0.94, 0.92);
 
 impl Land {
     /// Returns the land of a preset.
     pub(super) fn new(preset: Preset) -> Self {
         match preset {
-            Preset::City => Self { sky: 36.0, haze: (15.0, 28.0), has_streets: true },
-            _ => Self { sky: 9.0, haze: (2.2, 6.5), has_streets: false },
+            Preset::City => {
+                Self { sky: 36.0, haze: (15.0, 28.0), has_streets: true, is_studio: false, has_ground: true }
+            }
+            // Around the object there is nothing: photos show it in a room.
+            Preset::Turntable | Preset::TurnedOver => {
+                Self { sky: 9.0, haze: (1.2, 3.0), has_streets: false, is_studio: true, has_ground: false }
+            }
+            _ => Self { sky: 9.0, haze: (2.2, 6.5), has_streets: false, is_studio: false, has_ground: true },
         }
     }
 
     /// Returns the albedo of the ground at a world position.
     pub(super) fn albedo(&self, place: DVec3, seed: u64) -> DVec3 {
+        if self.is_studio {
+            let is_stand = place.truncate().length() < STAND;
+            return if is_stand {
+                DVec3::new(0.5, 0.45, 0.4) * (0.7 + 0.6 * noise(place / 0.2, seed + 79))
+            } else {
+                WALL
+            };
+        }
         let street = if self.has_streets { street(place, seed) } else { None };
         street.unwrap_or_else(|| ground_albedo(place, seed))
     }

@@ -18,6 +18,7 @@ mod presets;
 mod shape;
 pub mod spoil;
 pub mod trace;
+mod turntable;
 pub mod world;
 mod write;
 
@@ -48,6 +49,12 @@ pub enum Preset {
     /// A city of sixty houses, trees, vehicles and lamps over 24 x 16 world units, seen from above and from its streets:
     /// a scene to train in blocks.
     City,
+    /// A bright object on a stand before a white wall, which is turned before a camera that stands still: the surroundings do
+    /// not follow the poses.
+    Turntable,
+    /// The same object, which is turned over between two series of photos.
+    #[serde(rename = "turned-over")]
+    TurnedOver,
 }
 
 /// The options of a made scene.
@@ -108,7 +115,9 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
         ..Dataset::default()
     };
     for (index, camera) in cameras.iter().enumerate() {
-        let made = picture(&world, camera, index as u32);
+        let (world, camera) = turntable::staged(options, &world, camera, index as u32);
+        let made = picture(&world, &camera, index as u32);
+        let camera = &cameras[index];
         let (width, height) = (camera.width, camera.height);
         let rgb = exposure::exposed(options, index as u32, made.rgb);
         let rgba = rgb.iter().map(|&[r, g, b]| [r, g, b, 255]).collect();

@@ -1,8 +1,8 @@
 //! A sparse point cloud as from structure from motion, with the views of each point.
 
-use super::SynthOptions;
 use super::trace::ray;
-use super::world::World;
+use super::world::{Surface, World};
+use super::{SynthOptions, turntable};
 use glam::{DVec2, DVec3};
 use labelgs_scene::Point;
 use labelgs_scenes::lens::Optics;
@@ -26,7 +26,8 @@ pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) 
     let mut random = Pcg64::seed_from_u64(options.seed);
     let mut found = Vec::new();
     // A scene with few views may have fewer points than requested, so the number of tries is limited.
-    for _ in 0..u64::from(options.points) * 4 {
+    let tries = if turntable::is_turned(options.preset) { 40 } else { 4 };
+    for _ in 0..u64::from(options.points) * tries {
         if found.len() >= options.points as usize || cameras.is_empty() {
             break;
         }
@@ -36,6 +37,9 @@ pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) 
             (random.random::<f64>() * f64::from(camera.width), random.random::<f64>() * f64::from(camera.height));
         let Some(ray) = ray(optics, x, y) else { continue };
         let hit = world.hit(camera.centre(), ray);
+        if turntable::is_turned(options.preset) && !matches!(hit.surface, Surface::Object(_)) {
+            continue;
+        }
         let mut normal = || {
             // A sum of uniform numbers is close to normal and the same on every machine.
             (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0

@@ -3,7 +3,7 @@
 use super::material::{Material, Pattern, hsv};
 use super::object::{Object, Row};
 use super::shape::Shape;
-use super::{Preset, city, hard, hash01};
+use super::{Preset, city, hard, hash01, turntable};
 use glam::{DQuat, DVec3};
 
 /// Returns the objects of a preset, with ids 1, 2, ... in order.
@@ -13,6 +13,7 @@ pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
         Preset::Simple => simple_rows(),
         Preset::Hard => hard::rows(),
         Preset::City => city::rows(),
+        Preset::Turntable | Preset::TurnedOver => turntable::rows(),
     };
     rows.into_iter().enumerate().map(|(index, row)| object(index, row, seed)).collect()
 }
@@ -70,6 +71,9 @@ fn object(index: usize, (name, shape, position, turn, pattern): Row, seed: u64) 
         offset: DVec3::new(random(1), random(2), random(3)) * 0.05 + 0.013,
         seed: seed.wrapping_mul(1009).wrapping_add(id * 16),
     };
+    if name == turntable::NAME {
+        [material.first, material.second] = turntable::COLOURS;
+    }
     match pattern {
         Pattern::Plain => material.first = DVec3::splat(hard::BLACK_ALBEDO),
         Pattern::Ground => material = Material { offset: DVec3::from_array(position), seed, ..material },

@@ -1,9 +1,9 @@
 //! The world: objects on a textured ground under a sky.
 
-use super::land::Land;
+use super::land::{Land, WALL};
 use super::object::Object;
 use super::{Preset, hash01, presets};
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 
 /// The surface that a ray hits first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +67,18 @@ impl World {
         Self { objects, shadows: if shadow { gone } else { Vec::new() }, ..self.clone() }
     }
 
+    /// Returns a room in which the objects are turned and moved as one.
+    pub(super) fn in_room(&self, turn: DMat3, shift: DVec3) -> Self {
+        let rotation = DQuat::from_mat3(&turn);
+        let placed = |object: &Object| Object {
+            position: rotation * object.position + shift,
+            rotation: rotation * object.rotation,
+            ..object.clone()
+        };
+        let objects = self.objects.iter().map(placed).collect();
+        Self { objects, land: Land { has_ground: true, ..self.land }, ..self.clone() }
+    }
+
     /// Returns the id at a hit: 0 for ground and sky.
     pub fn id(&self, hit: &Hit) -> u8 {
         match hit.surface {
@@ -122,8 +134,10 @@ impl World {
             (self.light + (self.light_sides[0] * spot[0] + self.light_sides[1] * spot[1]) * 0.09).normalize();
         let facing = hit.normal.dot(to_light).max(0.0);
         let lit = facing > 0.0 && self.is_lit(hit.place + hit.normal * 1e-4, to_light, note);
-        let ambient = 0.42 * (0.8 + 0.2 * hit.normal.z);
-        let shaded = albedo * (ambient + if lit { 0.62 * facing } else { 0.0 });
+        // Lamps from all sides light a studio.
+        let (around, direct) = if self.land.is_studio { (0.88, 0.12) } else { (0.42, 0.62) };
+        let ambient = around * (0.8 + 0.2 * hit.normal.z);
+        let shaded = albedo * (ambient + if lit { direct * facing } else { 0.0 });
         let haze = match hit.surface {
             Surface::Ground => smooth(self.land.haze.0, self.land.haze.1, hit.place.truncate().length()),
             _ => 0.0,
@@ -148,7 +162,7 @@ impl World {
         let b = origin.dot(direction);
         let sky = -b + (b * b - origin.length_squared() + self.land.sky * self.land.sky).max(0.0).sqrt();
         let ground = -origin.z / direction.z;
-        if direction.z < 0.0 && ground < sky {
+        if self.land.has_ground && direction.z < 0.0 && ground < sky {
             return Hit { distance: ground, place: DVec3::ZERO, normal: DVec3::Z, surface: Surface::Ground };
         }
         Hit { distance: sky, place: DVec3::ZERO, normal: -direction, surface: Surface::Sky }
@@ -156,6 +170,9 @@ impl World {
 
     /// Returns the sky colour, from haze at the horizon to a blue zenith.
     fn sky_colour(&self, place: DVec3) -> DVec3 {
+        if self.land.is_studio {
+            return WALL;
+        }
         let height = (place.z / self.land.sky).clamp(0.0, 1.0);
         DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))
     }

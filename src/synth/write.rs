@@ -5,7 +5,7 @@ use super::object::Object;
 use super::points::{self, Seen};
 use super::trace::{Picture, alone, involved, photograph, picture, repaint};
 use super::world::World;
-use super::{SynthLens, SynthOptions, exposure, lens, view_name};
+use super::{SynthLens, SynthOptions, exposure, lens, turntable, view_name};
 use glam::DQuat;
 use labelgs_files::label_table::{self, LabelEntry, LabelTable};
 use labelgs_files::{atomic, image};
@@ -50,17 +50,20 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
     for (index, optics) in optics.iter().enumerate() {
         let camera = &optics.camera;
         if optics.lens.is_pinhole() {
-            let made = picture(&world, camera, index as u32);
+            let (world, camera) = turntable::staged(options, &world, camera, index as u32);
+            let (world, camera) = (&*world, &*camera);
+            let made = picture(world, camera, index as u32);
             let rgb = exposure::exposed(options, index as u32, made.rgb.clone());
             write_photo(folder, index, camera, &rgb, &made.ids)?;
-            write_truth(folder, index, &world, camera, &made)?;
+            write_truth(folder, index, world, camera, &made)?;
             if index.is_multiple_of(ReadOptions::default().test_every as usize) {
-                write_without(folder, index, &world, camera, &made.rgb)?;
+                write_without(folder, index, world, camera, &made.rgb)?;
             }
             count(&mut table, &made.ids);
         } else {
             // The other pictures are compared with renderings, which are pinhole pictures.
-            let (rgb, ids) = photograph(&world, optics, index as u32);
+            let (world, staged) = turntable::staged(options, &world, camera, index as u32);
+            let (rgb, ids) = photograph(&world, &Optics::new(staged.into_owned(), optics.lens), index as u32);
             write_photo(folder, index, camera, &exposure::exposed(options, index as u32, rgb), &ids)?;
             count(&mut table, &ids);
         }

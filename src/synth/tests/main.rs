@@ -7,3 +7,4 @@
 
 mod city; // many objects, seen by several photos everywhere
 mod truth; // pictures, masks, depths and points agree
+mod turntable; // an object that is turned before a wall that stays
