@@ -6,6 +6,7 @@ use super::protocol::score::Distance;
 use super::regions::{RegionScores, Witnesses};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use super::subject::Subject;
+use super::target::Target;
 use crate::error::Result;
 use crate::label::occlusion::{Rule, by_contour};
 use crate::label::vote::model::objects_of;
@@ -77,7 +78,7 @@ pub fn evaluate(
             let rendered = if is_there { Some(subject.render(&view.camera, &of_object)?) } else { None };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
             let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
-            let (photo, mask) = (view.photo()?, view.mask()?);
+            let (Target { photo, .. }, mask) = (Target::of(view, [0.0; 3])?, view.mask()?);
             let mask = mask.as_deref();
             let unknown = pixels_of(mask, hidden[index].get(&(id as u16)));
             let truth = ObjectTruth {
@@ -110,18 +111,18 @@ fn score_scene(
         false => rendered.label_map(),
     });
     let map = map.transpose()?;
-    let (photo, mask) = (view.photo()?, view.mask()?);
-    let mask = mask.as_deref();
-    let mut score = ViewScores::new(&rendered.rgb, &photo, map.as_ref(), mask)?;
+    let (target, mask) = (Target::of(view, how.options.background)?, view.mask()?);
+    let (photo, mask) = (&*target.photo, mask.as_deref());
+    let mut score = ViewScores::of(&rendered.rgb, (photo, target.coloured()), map.as_ref(), mask)?;
     if let Some(witnesses) = witnesses {
         let seen = witnesses.see(&view.camera, &rendered)?;
-        score.regions = Some(RegionScores::new(&rendered.rgb, &photo, mask, &seen));
+        score.regions = Some(RegionScores::new(&rendered.rgb, photo, mask, &seen));
     }
-    score.lpips = how.lpips.map(|lpips| distance(lpips, &rendered.rgb, &photo)).transpose()?;
+    score.lpips = how.lpips.map(|lpips| distance(lpips, &rendered.rgb, target.coloured())).transpose()?;
     let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim)), ("LPIPS", score.lpips)];
     let numbers = numbers.into_iter().filter(|(_, value)| value.is_some()).collect();
     let (labels, truth) = (map.as_ref(), mask);
-    watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, &photo, &rendered.rgb) })?;
+    watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, photo, &rendered.rgb) })?;
     Ok((score, hidden_by(mask, &rendered)?))
 }
 

@@ -21,6 +21,7 @@ pub mod specks;
 pub mod ssim;
 pub mod ssim8;
 pub mod subject;
+pub(crate) mod target;
 
 pub use compared::{Compared, Watch};
 pub use evaluate::{AmodalTruth, Rendering, evaluate};

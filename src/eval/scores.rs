@@ -116,15 +116,25 @@ impl ObjectTruth<'_> {
 impl ViewScores {
     /// Scores a render, and its label map if both it and the mask of the view are given.
     pub fn new(render: &[[f32; 3]], photo: &Photo, map: Option<&LabelMap>, mask: Option<&LabelMap>) -> Result<Self> {
+        Self::of(render, (photo, photo), map, mask)
+    }
+
+    /// The same, with another photo for the scores of colours: that of the pixels that count for them.
+    pub(super) fn of(
+        render: &[[f32; 3]],
+        (photo, coloured): (&Photo, &Photo),
+        map: Option<&LabelMap>,
+        mask: Option<&LabelMap>,
+    ) -> Result<Self> {
         let pixels = photo.rgba.len();
         let lengths = [Some(render.len()), map.map(|map| map.ids.len()), mask.map(|mask| mask.ids.len())];
         if lengths.into_iter().flatten().any(|length| length != pixels) {
             return Err(Error::Bug("render, label map, mask and photo differ in size".into()));
         }
         let mut scores = Self {
-            psnr: psnr(render, photo),
-            psnr_corrected: psnr_corrected(render, photo, |_| true).unwrap_or(f64::NAN),
-            ssim: ssim(render, photo),
+            psnr: psnr(render, coloured),
+            psnr_corrected: psnr_corrected(render, coloured, |_| true).unwrap_or(f64::NAN),
+            ssim: ssim(render, coloured),
             specks: map.zip(mask).map(|(map, mask)| specks(map, mask)),
             ..Self::default()
         };

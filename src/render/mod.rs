@@ -51,11 +51,16 @@ pub struct RenderOptions {
     pub sh_degree: Option<u32>,
     /// Parts to read back.
     pub parts: Parts,
+    /// Pixels that are more clear than opaque have no label: around objects that were trained alone there is nothing else.
+    pub clear_labels: bool,
 }
+
+/// Opacity below which they are.
+const CLEAR: f32 = 0.5;
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { near: NEAR, background: [0.0; 3], sh_degree: None, parts: Parts::ALL }
+        Self { near: NEAR, background: [0.0; 3], sh_degree: None, parts: Parts::ALL, clear_labels: false }
     }
 }
 
@@ -167,7 +172,7 @@ fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOpt
     let image = engine.picture(pixels)?;
     let weight_depth = if depth || main { engine.weights_and_depths(pixels)? } else { Vec::new() };
     let pick = |asked: bool, part: usize| weight_depth.iter().filter(|_| asked).map(|pair| pair[part]).collect();
-    Ok(Rendered {
+    let mut rendered = Rendered {
         width,
         height,
         rgb: image.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
@@ -180,7 +185,12 @@ fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOpt
             (true, true) => engine.label_map(pixels)?,
             (true, false) => vec![UNLABELLED; pixels],
         },
-    })
+    };
+    if options.clear_labels {
+        let clear = rendered.labels.iter_mut().zip(&rendered.alpha).filter(|(_, alpha)| **alpha < CLEAR);
+        clear.for_each(|(label, _)| *label = UNLABELLED);
+    }
+    Ok(rendered)
 }
 
 /// Returns labels as a map like those of masks.

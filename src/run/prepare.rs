@@ -17,7 +17,7 @@ use crate::gpu::Gpu;
 use crate::records::checkpoint_folder;
 use crate::records::occlusion_table::OcclusionTable;
 use crate::scene::{Dataset, Gaussians};
-use crate::scenes::capture::Sightings;
+use crate::scenes::capture::{self, Sightings};
 use crate::scenes::{self, Lookup};
 use crate::scheduler::SchedulerOptions;
 use crate::train::setup::TrainerOptions;
@@ -66,6 +66,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
             settings
         }
     };
+    let settings = settings.settled();
     if request.restart && settings.run.checkpoint_every == Every::NEVER {
         return Err(Error::usage(
             Setting("restart"),
@@ -80,8 +81,24 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
     let inputs = resumed.as_ref().map_or(&request.inputs, |resumed| &resumed.record.inputs).clone();
     let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
+    if resumed.is_none() {
+        warn_of_surroundings(&settings, &dataset)?;
+    }
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
     Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
+}
+
+/// Says that the objects should be trained alone, if there are masks and the surroundings do not follow the poses.
+fn warn_of_surroundings(settings: &Settings, dataset: &Dataset) -> Result<()> {
+    let has_masks = dataset.train.iter().any(|view| view.mask.is_some());
+    if !has_masks || settings.read.masked_only {
+        return Ok(());
+    }
+    if let Some(share) = capture::still_share(dataset)? {
+        let cure = Setting("masked_only");
+        tracing::warn!("{}: train the objects of the masks alone with {cure}", capture::surroundings_text(share));
+    }
+    Ok(())
 }
 
 fn check_new(settings: &Settings, request: &Request) -> Result<()> {

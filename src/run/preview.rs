@@ -4,6 +4,7 @@ use super::history::{Entry, Scored};
 use super::{Event, Live, Run, models};
 use crate::error::Result;
 use crate::eval::metrics::{label_iou, psnr};
+use crate::eval::target::Target;
 use crate::render::Parts;
 use crate::train::between::Between;
 use std::path::PathBuf;
@@ -30,14 +31,16 @@ impl Between<Run<'_>> for PreviewJob {
 /// Writes a preview of the current scene. Returns none without a photo.
 pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
-    let Some(photo) = &view.photo else { return Ok(None) };
-    let photo = photo.get()?;
+    if view.photo.is_none() {
+        return Ok(None);
+    }
+    let target = Target::of(view, run.trainer.render_options().background)?;
     let parts = if run.trainer.has_labels() { Parts::LABELS } else { Parts::COLOUR };
     let mut live = Live::new(&mut run.trainer, &mut run.history, &run.dataset, None);
     let rendered = live.render(&view.camera, parts)?;
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
-    models::save_preview(&path, &photo, &rendered)?;
+    models::save_preview(&path, &target.photo, &rendered)?;
     // The preview of a stopped run is not on the schedule, which a run that goes on keeps.
     if !run.stopped {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -46,7 +49,7 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
         run.history.put(&Entry::Preview(Scored {
             step: run.trainer.steps_done(),
             view: Some(view.name.clone()),
-            psnr: finite(psnr(&rendered.rgb, &photo)),
+            psnr: finite(psnr(&rendered.rgb, target.coloured())),
             ssim: None,
             iou: mask.and_then(|mask| label_iou(&rendered.labels, &mask)),
         }));

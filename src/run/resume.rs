@@ -74,7 +74,7 @@ fn read(path: &Path) -> Result<Resumed> {
 /// Applies the requested settings to the checkpoint and logs each change.
 fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<Resumed> {
     let then = &resumed.settings;
-    let mut wanted = changed(Some(then))?;
+    let mut wanted = changed(Some(then))?.settled();
     wanted.check()?;
     // Automatic values were decided when the run began.
     wanted.train.keep_decided(&then.train);

@@ -9,7 +9,7 @@ use crate::options::parse::bytes;
 use crate::options::{Key, Options};
 use crate::scenes::{self, LoadOptions, ReadOptions};
 use crate::train::setup::near_plane::NEAR;
-use crate::train::{Preset, TrainConfig};
+use crate::train::{ExposureMode, Preset, TrainConfig};
 use crate::words::did_you_mean;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
@@ -74,9 +74,22 @@ impl Settings {
         self.read.texts().into_iter().chain(self.train.texts()).chain(self.run.texts()).collect()
     }
 
+    /// Sets what follows from others: objects alone have nothing behind them, and no sky.
+    pub(super) fn settled(mut self) -> Self {
+        if self.read.masked_only {
+            self.train.random_background = true;
+            self.train.far_points = 0;
+        }
+        self
+    }
+
     /// Refuses invalid values; messages name the option.
     pub fn check(&self) -> Result<()> {
         self.read.check()?;
+        if self.read.masked_only && self.train.exposure == ExposureMode::On {
+            let problem = format!("is on, which needs {}: no photo exposed it", Setting("exposure").to("off"));
+            return Err(Error::usage(Setting("masked_only"), problem));
+        }
         self.train.check()?;
         self.run.check_ranges()
     }
@@ -140,6 +153,8 @@ impl Settings {
             test_every: some(self.read.test_every),
             background: self.train.background,
             keep_opacity: self.train.random_background,
+            masked_only: self.read.masked_only,
+            cut: self.read.masked_only,
             photos: true,
             photo_memory: self.run.photo_memory,
             ..LoadOptions::default()

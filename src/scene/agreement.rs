@@ -3,6 +3,7 @@
 
 use super::{Camera, Photo, Point, View};
 use crate::error::Result;
+use crate::view::ALPHA_CLEAR;
 use glam::DVec2;
 use std::sync::Arc;
 
@@ -99,7 +100,7 @@ fn of_view(photo: &Photo, nearest: impl Iterator<Item = (f64, DVec2, [u8; 3])>) 
     let pair = |(_, pixel, [r, g, b]): (f64, DVec2, [u8; 3])| {
         let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
         let [pr, pg, pb, alpha] = photo.rgba[(y * photo.width + x) as usize];
-        (alpha > 0).then(|| [r, g, b, pr, pg, pb].map(f64::from))
+        (alpha > 0 && alpha != ALPHA_CLEAR).then(|| [r, g, b, pr, pg, pb].map(f64::from))
     };
     let mut pairs: Vec<[f64; 6]> = nearest.filter_map(pair).collect();
     for column in 0..6 {

@@ -103,6 +103,11 @@ impl Camera {
         Self { fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy, width, height, ..self.clone() }
     }
 
+    /// Returns the camera for the part of the image of a size that begins at a pixel.
+    pub fn cut(&self, (left, top): (u32, u32), (width, height): (u32, u32)) -> Self {
+        Self { cx: self.cx - f64::from(left), cy: self.cy - f64::from(top), width, height, ..self.clone() }
+    }
+
     /// Returns the camera for an image at a share of its size, up to 1.
     pub fn shrunk(&self, share: f64) -> Self {
         self.resized(side_at(self.width, share), side_at(self.height, share))

@@ -40,6 +40,19 @@ impl LabelMap {
         objects_of(&self.ids)
     }
 
+    /// Returns the rectangle of all objects: left, top, and right and bottom beyond it, px; `None` without an object.
+    pub fn bounds(&self) -> Option<[u32; 4]> {
+        let mut found: Option<[u32; 4]> = None;
+        for (y, row) in (0..).zip(self.ids.chunks(self.width.max(1) as usize)) {
+            let Some(first) = row.iter().position(|&id| id != 0) else { continue };
+            let last = row.iter().rposition(|&id| id != 0).unwrap_or(first);
+            let (first, last) = (first as u32, last as u32 + 1);
+            let [left, top, right, _] = found.unwrap_or([first, y, last, y]);
+            found = Some([left.min(first), top, right.max(last), y + 1]);
+        }
+        found
+    }
+
     /// Returns the map at a size of at least 1 x 1 px, by the id at the middle of each pixel.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let from =

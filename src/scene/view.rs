@@ -28,7 +28,7 @@ pub struct Photo {
 }
 
 /// Alpha of a valid pixel that shows nothing but what is behind it.
-const ALPHA_CLEAR: u8 = 128;
+pub const ALPHA_CLEAR: u8 = 128;
 
 /// Returns the alpha of a valid pixel of an opacity from 0 to 1.
 pub fn alpha_of(opacity: f64) -> u8 {
@@ -138,6 +138,8 @@ pub struct Dataset {
     pub train: Vec<View>,
     /// Held-out views, sorted by name.
     pub test: Vec<View>,
+    /// The photos show the objects of the masks alone, and those to train on are cut to them.
+    pub objects_only: bool,
     /// Initial points; may be empty.
     pub points: Vec<Point>,
     /// Notes for the user about reading, a line each.

@@ -59,7 +59,7 @@ impl DepthFolder {
             return Err(Error::data(path, "", problem + "; make maps of the same photos"));
         }
         let (width, height) = view.camera.size();
-        let values = resample_nearest(&map.values, from, window, (width, height), f32::NAN);
+        let values = part_of(window, view, |size| resample_nearest(&map.values, from, window, size, f32::NAN));
         if !values.iter().any(|value| value.is_finite()) {
             return Err(Error::data(path, "", "holds no finite depth"));
         }
@@ -71,4 +71,22 @@ impl DepthFolder {
         let window = self.windows.get(view)?;
         Some((window, self.files.find(&window.photo)?))
     }
+}
+
+/// Returns the view's part of a picture of its whole window: views of objects alone are cut to these.
+fn part_of(window: &Window, view: &View, whole: impl FnOnce((u32, u32)) -> Vec<f32>) -> Vec<f32> {
+    let (of, camera) = (&window.camera, &view.camera);
+    let side = |side: u32, scale: f64| (f64::from(side) * scale).round() as u32;
+    let size = (side(of.width, camera.fx / of.fx), side(of.height, camera.fy / of.fy));
+    if size.0 <= camera.width && size.1 <= camera.height {
+        return whole(camera.size());
+    }
+    let full = of.resized(size.0, size.1);
+    let [left, top] = [full.cx - camera.cx, full.cy - camera.cy].map(|side| side.round().max(0.0) as usize);
+    let rows = whole(size);
+    let row = |y: usize| {
+        let first = ((top + y).min(size.1 as usize - 1)) * size.0 as usize + left;
+        rows[first.min(rows.len())..(first + camera.width as usize).min(rows.len())].iter().copied()
+    };
+    (0..camera.height as usize).flat_map(row).collect()
 }

@@ -22,6 +22,7 @@ mod llff;
 mod load;
 mod lookup;
 mod mask_notes;
+pub mod matte;
 mod metashape;
 mod missing;
 mod photo_finder;
@@ -72,6 +73,10 @@ pub struct LoadOptions {
     pub background: [f32; 3],
     /// Keeps the opacity of transparent photos that are not held out, over black, instead.
     pub keep_opacity: bool,
+    /// The photos show the objects of the masks alone: see [`matte`]. Those without an object are left out.
+    pub masked_only: bool,
+    /// Cuts such photos to their objects, unless they are held out.
+    pub cut: bool,
     /// Decodes the photos. Their sizes are read in any case.
     pub photos: bool,
     /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
@@ -105,6 +110,8 @@ impl Default for LoadOptions {
             test_every: Some(8),
             background: [0.0; 3],
             keep_opacity: false,
+            masked_only: false,
+            cut: false,
             photos: true,
             max_bad_photos: MAX_BAD_PHOTOS,
             lookup: Lookup::default(),
@@ -132,6 +139,10 @@ pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if !(0.0..=1.0).contains(&options.max_bad_photos) {
         let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
         return Err(Error::usage(Setting("max_bad_photos"), problem));
+    }
+    if options.masked_only && options.photos && options.masks.is_none() {
+        let problem = format!("needs the masks of the objects: name their folder in {}", Setting("masks"));
+        return Err(Error::usage(Setting("masked_only"), problem));
     }
     let stage = Stage::new("reading poses and points", 0);
     let listing = list(scene, &options.lookup)?;

@@ -3,7 +3,7 @@
 use super::listing::{Listed, Listing};
 use super::photo_store::PhotoStore;
 use super::recipe::{MadeView, MadeViews, Recipe};
-use super::{LoadOptions, bad_photos, frame_check, mask_notes, missing, stray};
+use super::{LoadOptions, bad_photos, frame_check, init, mask_notes, missing, stray};
 use labelgs_files::all::all_or_one_error;
 use labelgs_files::names::shortened;
 use labelgs_files::photo_files::PhotoFiles;
@@ -71,7 +71,7 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
     let (train, test) = divided(loaded, options.only.as_deref());
     let Listing { source, native, points, .. } = listing;
-    let mut dataset = Dataset { root: root.to_owned(), source, train, test, points, notes, flaws };
+    let mut dataset = Dataset { root: root.to_owned(), source, train, test, objects_only: false, points, notes, flaws };
     // Some of the views say nothing about all masks.
     if let (Some(masks), None) = (&masks, &options.only) {
         dataset.notes.extend(mask_notes::notes(masks, &dataset));
@@ -80,6 +80,22 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     // Faces of wide photos are turned against them.
     let native = Some(native).filter(|_| !is_wide && options.lookup.poses.is_native());
     frame_check::check(&mut dataset, native, options.lookup.poses)?;
+    if options.masked_only && options.photos { without_surroundings(dataset) } else { Ok(dataset) }
+}
+
+/// Takes the scene for one of objects alone, without the points that the masks show to be no part of them.
+fn without_surroundings(mut dataset: Dataset) -> Result<Dataset> {
+    let places: Vec<_> = dataset.points.iter().map(|point| point.position).collect();
+    dataset.objects_only = true;
+    let mut inside = init::inside(&dataset, &places)?.into_iter();
+    let before = dataset.points.len();
+    dataset.points.retain(|_| inside.next() == Some(true));
+    if dataset.points.len() < before {
+        let left_out = counted(before - dataset.points.len(), "point");
+        dataset
+            .notes
+            .push(format!("{left_out} of {before} lie outside of the objects, by their masks, and are left out"));
+    }
     Ok(dataset)
 }
 
@@ -124,7 +140,11 @@ fn note_blank(root: &Path, blank: &[String], is_all: bool, notes: &mut Vec<Strin
     if blank.is_empty() {
         return Ok(());
     }
-    let problem = format!("{} have no pixel that counts: all are ignored, or outside of the lens", shortened(blank));
+    let problem = format!(
+        "{} have no pixel that counts: all are ignored, outside of the lens, or without the mask of an object where objects \
+         alone are trained",
+        shortened(blank)
+    );
     if is_all {
         return Err(Error::data(root, "photos", problem + "; check what is ignored and the coefficients of the lens"));
     }

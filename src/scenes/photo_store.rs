@@ -146,7 +146,9 @@ impl Kept for Photo {
     }
 
     fn recipe(all: &Recipe) -> (Recipe, PathBuf) {
-        (Recipe { mask: None, ..all.clone() }, all.listed.photo.clone().unwrap_or_default())
+        // A photo of objects alone needs their mask.
+        let mask = all.mask.clone().filter(|_| all.masked_only);
+        (Recipe { mask, ..all.clone() }, all.listed.photo.clone().unwrap_or_default())
     }
 
     fn of(view: MadeView) -> Option<Self> {

@@ -23,6 +23,13 @@ labelgs_scene::options! {
             /// Words of c2w or w2c (camera-to-world, world-to-camera), opencv or opengl (axes of the camera: y down and looking
             /// along z, or y up and looking along -z), and xyzw (quaternions whose real part is last), with commas between.
             poses <"WORDS">: PoseConvention = PoseConvention::default(), fixed;
+
+            /// Train the objects of the masks alone, and nothing of their surroundings.
+            ///
+            /// For an object on a turntable, whose surroundings do not turn with it. The masks become the opacity of the photos,
+            /// soft at the edges and without the colour of the surroundings there; photos are cut to their objects, those
+            /// without an object are left out, and each step has a random colour behind them (random_background).
+            masked_only <"SWITCH">: bool = false, fixed;
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::LoadOptions;
 use super::lens::Lens;
 use super::listing::{Listed, check_camera};
+use super::matte::cut_out;
 use super::resample::{resample_ids, undistort_photo};
 use super::window::Window;
 use labelgs_files::image::{check_size, photo_size, read_open_photo, read_photo};
@@ -25,7 +26,15 @@ pub struct Recipe {
     pub background: Option<[f32; 3]>,
     pub max_resolution: Option<u32>,
     pub undistort: bool,
+    /// The photo shows the objects of the mask alone.
+    pub masked_only: bool,
+    /// It is cut to them.
+    pub cut: bool,
 }
+
+/// Pixels around the objects that a photo to train on keeps, as a share of its longest side, and least, px: the windows of the loss
+/// reach so far, and what is wrong there must be seen.
+const MARGIN: (f64, u32) = (0.02, 8);
 
 /// A view with its pixels.
 pub struct MadeView {
@@ -49,9 +58,11 @@ impl Recipe {
         [mask, ignore]: [Option<PathBuf>; 2],
         options: &LoadOptions,
     ) -> Self {
-        let LoadOptions { photos, max_resolution, undistort, .. } = *options;
-        let background = (listed.test == Some(true) || !options.keep_opacity).then_some(options.background);
-        Self { listed, source, mask, ignore, photos, background, max_resolution, undistort }
+        let LoadOptions { photos, max_resolution, undistort, masked_only, .. } = *options;
+        let cut = options.cut && masked_only && listed.test != Some(true);
+        let is_solid = !masked_only && (listed.test == Some(true) || !options.keep_opacity);
+        let background = is_solid.then_some(options.background);
+        Self { listed, source, mask, ignore, photos, background, max_resolution, undistort, masked_only, cut }
     }
 
     /// Reads the size in the photo's file; `None` without a file.
@@ -85,6 +96,9 @@ impl Recipe {
             resampled += is_other(&ignored);
             leave_out(photo, &ignored);
         }
+        if let (true, Some(photo), Some(mask)) = (self.masked_only, &mut photo, &mask) {
+            cut_out(photo, mask);
+        }
         let windows = self.windows(&original);
         let (path, place) = match &self.listed.photo {
             Some(photo) => (photo, String::new()),
@@ -99,14 +113,50 @@ impl Recipe {
         }
         let view = |window: Window| {
             let size = self.size_of(&window);
-            MadeView {
+            let made = MadeView {
                 camera: window.camera.resized(size.0, size.1),
                 photo: photo.as_ref().map(|photo| fitted(photo, &window, size)),
                 mask: mask.as_ref().map(|mask| resample_ids(mask, &window, size)),
                 name: window.name,
-            }
+            };
+            if self.masked_only { self.of_objects(made) } else { made }
         };
         Ok(MadeViews { views: windows.into_iter().map(view).collect(), resampled })
+    }
+
+    /// Takes the weight of a photo without an object, and cuts others to their objects.
+    fn of_objects(&self, made: MadeView) -> MadeView {
+        let found = made.mask.as_ref().and_then(LabelMap::bounds);
+        let Some([left, top, right, bottom]) = found else {
+            let blank = |photo: Photo| Photo { rgba: vec![[0; 4]; photo.rgba.len()], ..photo };
+            return MadeView { photo: made.photo.map(blank), ..made };
+        };
+        if !self.cut {
+            return made;
+        }
+        let (width, height) = made.camera.size();
+        let margin = ((MARGIN.0 * f64::from(width.max(height))).ceil() as u32).max(MARGIN.1);
+        let (left, top) = (left.saturating_sub(margin), top.saturating_sub(margin));
+        let size = ((right + margin).min(width) - left, (bottom + margin).min(height) - top);
+        let part = |at: usize| {
+            let first = (top as usize + at) * width as usize + left as usize;
+            first..first + size.0 as usize
+        };
+        let rows = || (0..size.1 as usize).map(part);
+        MadeView {
+            camera: made.camera.cut((left, top), size),
+            photo: made.photo.map(|photo| Photo {
+                width: size.0,
+                height: size.1,
+                rgba: rows().flat_map(|row| &photo.rgba[row]).copied().collect(),
+            }),
+            mask: made.mask.map(|mask| LabelMap {
+                width: size.0,
+                height: size.1,
+                ids: rows().flat_map(|row| &mask.ids[row]).copied().collect(),
+            }),
+            ..made
+        }
     }
 
     /// Returns the number of pixels of all views.

@@ -25,6 +25,8 @@ pub(super) struct Context {
     pub(super) strategy: Box<dyn Strategy>,
     pub(super) shared: Shared,
     pub(super) views: Views,
+    /// The photos show objects alone.
+    pub(super) objects_only: bool,
     scale: SceneScale,
     /// Where Gaussians grow; `None`: everywhere.
     grow_zone: Option<Zone>,
@@ -71,6 +73,7 @@ impl Context {
             strategy,
             shared,
             views,
+            objects_only: dataset.objects_only,
             scale,
             grow_zone,
             image,

@@ -97,7 +97,8 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
         main: asked(&[What::TopId, What::TopWeight]),
         labels: asked(&[What::Labels]),
     };
-    let options = RenderOptions { background: args.background, ..RenderOptions::new(near, parts) };
+    let clear_labels = args.reading.of_run(&args.model)?.masked_only;
+    let options = RenderOptions { background: args.background, clear_labels, ..RenderOptions::new(near, parts) };
     let mut files = Vec::new();
     let stage = Stage::new("rendering", cameras.len());
     for (stem, camera) in &cameras {

@@ -102,7 +102,12 @@ impl ServerArgs {
 pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let (model, known) = open(&args.model, &args.table)?;
     let dataset = match &args.scene {
-        Some(scene) => open_scene(scene, &args.reading.of_run(&args.model)?, args.masks.clone(), [0.0; 3], true)?,
+        Some(scene) => {
+            let mut reading = args.reading.of_run(&args.model)?;
+            // Without masks, photos are shown as they are.
+            reading.masked_only &= args.masks.is_some();
+            open_scene(scene, &reading, args.masks.clone(), [0.0; 3], true)?
+        }
         // Without their photos.
         None => Dataset { train: views_of_model(&args.model)?, ..Dataset::default() },
     };

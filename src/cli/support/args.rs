@@ -80,6 +80,9 @@ pub struct SceneArgs {
     /// Folder of pictures named as masks: pixels above 0 are left out of votes and scores.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
+    /// The photos show the objects of the masks alone, by the settings of the model's run.
+    #[arg(skip)]
+    pub masked_only: bool,
     #[command(flatten)]
     pub read: ReadArgs,
 }
@@ -87,14 +90,13 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// Returns these arguments; values that were not typed come from the run of `model`, if it has one.
     pub fn of_run(&self, model: &Path) -> Result<Self> {
-        let Some(ReadOptions { max_resolution, test_every, poses }) = Settings::of_model(model)?.map(|run| run.read)
-        else {
-            return Ok(self.clone());
-        };
+        let Some(run) = Settings::of_model(model)? else { return Ok(self.clone()) };
+        let ReadOptions { max_resolution, test_every, poses, masked_only } = run.read;
         let longest = (max_resolution > 0).then_some(max_resolution);
         Ok(Self {
             test_every: self.test_every.or(Some(test_every)),
             max_resolution: self.max_resolution.or(longest),
+            masked_only: self.masked_only || masked_only,
             read: ReadArgs { poses: self.read.poses.or(Some(poses)), ..self.read.clone() },
             ..self.clone()
         })

@@ -44,7 +44,8 @@ pub(crate) fn open_scene(
     let test_every = Some(reading.test_every()).filter(|&every| every > 0);
     let (max_resolution, base) = (reading.max_resolution, LoadOptions::default());
     let ignore = reading.ignore.clone();
-    let options = LoadOptions { masks, ignore, max_resolution, test_every, background, photos, ..base };
+    let masked_only = reading.masked_only;
+    let options = LoadOptions { masks, ignore, max_resolution, test_every, background, masked_only, photos, ..base };
     scenes::open_logged(path, &reading.read.options(options))
 }
 

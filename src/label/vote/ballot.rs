@@ -51,12 +51,14 @@ pub struct Sweep {
     pub border: u32,
     /// Gaussians vote with their alpha, as if nothing were in front of them.
     pub alone: bool,
+    /// Only pixels with a label vote: in photos of objects alone, all that is there belongs to one.
+    pub labelled_only: bool,
 }
 
 impl Sweep {
     /// Takes votes by blending weight.
     pub fn new(near: f32, border: u32) -> Self {
-        Self { near, border, alone: false }
+        Self { near, border, alone: false, labelled_only: false }
     }
 }
 
@@ -171,7 +173,11 @@ fn count(
 /// Adds the votes of one view for the labels in `chunk`.
 fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result<()> {
     let mask = voter.mask.get()?;
-    let all_columns = columns_of(&mask, voter.photo.map(Pixels::get).transpose()?.as_deref(), chunk, how.border);
+    let mut all_columns = columns_of(&mask, voter.photo.map(Pixels::get).transpose()?.as_deref(), chunk, how.border);
+    if how.labelled_only {
+        let rest = all_columns.iter_mut().zip(&mask.ids).filter(|(_, id)| **id == 0);
+        rest.for_each(|(column, _)| *column = VOTE_NONE);
+    }
     let trust = |label: &u16| voter.trust.and_then(|trust| trust.get(label)).copied().unwrap_or(1.0);
     let weights: Vec<f32> = chunk.iter().map(trust).collect();
     for band in engine.bands(voter.camera) {

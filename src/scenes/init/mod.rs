@@ -1,5 +1,6 @@
 //! The first Gaussians of a scene: at its points, or in the space that its cameras see.
 
+mod hull;
 mod random;
 mod region;
 mod shell;
@@ -16,6 +17,7 @@ use labelgs_scene::{Dataset, Error, Gaussians, Point, Result};
 use rayon::prelude::*;
 use std::num::NonZero;
 
+pub use hull::inside;
 pub use thin::thinned;
 
 /// Opacity of a new Gaussian.
@@ -50,7 +52,10 @@ pub fn first_gaussians(dataset: &Dataset, points: &[Point], seed: u64, count_if_
         return Ok(from_points(points, &distances2, dataset.extent()));
     }
     let _stage = Stage::new("finding places for the first Gaussians", 0);
-    let mut points = random::points(dataset, seed, count_if_no_points)?;
+    let mut points = match dataset.objects_only {
+        true => hull::points(dataset, seed, count_if_no_points)?,
+        false => random::points(dataset, seed, count_if_no_points)?,
+    };
     points.extend_from_slice(&dataset.points);
     let mut distances2 = neighbour_distances2(&points, dataset.extent())?;
     distances2.par_iter_mut().zip(&points).for_each(|(distance2, point)| {

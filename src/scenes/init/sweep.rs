@@ -19,6 +19,8 @@ const DEPTHS: u32 = 48;
 const DIFFERENCE_MAX: u32 = 48 * 3;
 /// Most photos to compare a pixel with.
 const COMPARED_MAX: usize = 24;
+/// Opacity, as the alpha of a photo, up to which a small pixel shows nothing of the objects.
+const NEARLY_CLEAR: u8 = 192;
 /// Most tries per point.
 const TRIES_MAX: usize = 3;
 
@@ -26,6 +28,8 @@ const TRIES_MAX: usize = 3;
 pub(super) struct Sweep {
     photos: Vec<(Camera, Photo)>,
     depths: (f64, f64),
+    /// What is clear in a photo is nothing, and unlike anything.
+    objects_only: bool,
 }
 
 impl Sweep {
@@ -37,7 +41,12 @@ impl Sweep {
             Ok((camera.resized(width, height), shrink_photo(&photo, width, height)))
         };
         let photos = views.iter().filter_map(|view| Some(small(view.photo.as_ref()?, &view.camera)));
-        Ok(Self { photos: photos.collect::<Result<_>>()?, depths })
+        Ok(Self { photos: photos.collect::<Result<_>>()?, depths, objects_only: false })
+    }
+
+    /// Makes the sweep of photos of objects alone.
+    pub(super) fn of_objects(views: &[View], depths: (f64, f64)) -> Result<Self> {
+        Ok(Self { objects_only: true, ..Self::new(views, depths)? })
     }
 
     /// Returns at most `count` points: one behind each random pixel that three photos agree on.
@@ -68,7 +77,7 @@ impl Sweep {
 
     fn point(&self, index: usize, pixel: DVec2, phase: f64) -> Option<Point> {
         let (camera, photo) = &self.photos[index];
-        let colour = texel(photo, pixel)?;
+        let colour = texel(photo, pixel).filter(|_| !self.is_nothing(photo, pixel))?;
         let (near, far) = self.depths;
         let depth = |step: u32| {
             let part = (f64::from(step) + phase) / f64::from(DEPTHS);
@@ -90,11 +99,16 @@ impl Sweep {
         // Start at the own photo, so that the compared photos vary evenly.
         let compared = (own % step..self.photos.len()).step_by(step).filter(|&index| index != own);
         for (camera, photo) in compared.map(|index| &self.photos[index]) {
-            let Some(texel) = camera.sees(point.position).and_then(|pixel| texel(photo, pixel)) else { continue };
+            let Some(pixel) = camera.sees(point.position) else { continue };
+            let Some(texel) = texel(photo, pixel) else { continue };
             let difference: u32 = (0..3).map(|c| u32::from(texel[c].abs_diff(point.colour[c]))).sum();
-            sum += difference.min(DIFFERENCE_MAX);
+            sum += if self.is_nothing(photo, pixel) { DIFFERENCE_MAX } else { difference.min(DIFFERENCE_MAX) };
             seen += 1;
         }
         (seen >= others).then(|| f64::from(sum) / seen as f64)
+    }
+
+    fn is_nothing(&self, photo: &Photo, pixel: DVec2) -> bool {
+        self.objects_only && photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize][3] <= NEARLY_CLEAR
     }
 }

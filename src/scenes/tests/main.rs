@@ -15,6 +15,7 @@ mod frames; // conventions of poses, points of another frame
 mod init; // the first Gaussians of a scene
 mod lenses; // formulas of lenses, and a scene through each of them
 mod masks; // masks beside their photos
+mod objects; // photos of objects alone
 mod photos; // decoding, sizes, averaging, undistortion
 mod poses; // LLFF and Metashape
 mod rigs;

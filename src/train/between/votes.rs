@@ -28,8 +28,8 @@ impl Votes {
             return Ok(None);
         }
         context.refresh_poses()?;
-        let Context { engine, config, views, .. } = context;
-        let how = Sweep::new(config.near, config.mask_border);
+        let Context { engine, config, views, objects_only, .. } = context;
+        let how = Sweep { labelled_only: *objects_only, ..Sweep::new(config.near, config.mask_border) };
         let (means, voters) = (engine.means()?, views.voters());
         // Masks that disagree with the labels of the model have less weight.
         let is_judged = self.have_labelled;

@@ -144,7 +144,8 @@ impl Trainer {
     /// Returns the options of the steps, for previews.
     pub fn render_options(&self) -> RenderOptions {
         let config @ &TrainConfig { near, background, .. } = self.config();
-        RenderOptions { near, background, sh_degree: Some(config.sh_degree_at(self.step)), ..RenderOptions::default() }
+        let (sh_degree, clear_labels) = (Some(config.sh_degree_at(self.step)), self.context.objects_only);
+        RenderOptions { near, background, sh_degree, clear_labels, ..RenderOptions::default() }
     }
 
     /// Halves all learning rates for the rest of the run.

@@ -45,7 +45,12 @@ pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let near = near_plane(&args.model, args.scoring.near)?;
     let weights = args.scoring.lpips.as_deref().map(Weights::read).transpose()?;
     let how = Rendering {
-        options: RenderOptions { near, background: args.background, ..RenderOptions::default() },
+        options: RenderOptions {
+            near,
+            background: args.background,
+            clear_labels: reading.masked_only,
+            ..RenderOptions::default()
+        },
         train: &dataset.train,
         by_main: args.compat,
         lpips: weights.as_ref().map(|weights| weights as &dyn Distance),

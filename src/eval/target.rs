@@ -1,0 +1,33 @@
+//! What a render of a view is compared with.
+
+use crate::error::Result;
+use crate::scene::view::ALPHA_CLEAR;
+use crate::scene::{Photo, View};
+use std::sync::Arc;
+
+/// The photo of a view behind which a render has its background.
+pub(crate) struct Target {
+    /// The photo, over that background where it is transparent.
+    pub(crate) photo: Arc<Photo>,
+    /// The same with weight only where it shows something, if it is a photo of objects alone.
+    objects: Option<Photo>,
+}
+
+impl Target {
+    /// Takes the photo of a view.
+    pub(crate) fn of(view: &View, background: [f32; 3]) -> Result<Self> {
+        let photo = view.photo()?;
+        let Some(rgba) = photo.over(background) else { return Ok(Self { photo, objects: None }) };
+        let shown = |(over, own): (&[u8; 4], &[u8; 4])| if own[3] == ALPHA_CLEAR { [0; 4] } else { *over };
+        let objects = rgba.iter().zip(&photo.rgba).map(shown).collect();
+        let (width, height) = (photo.width, photo.height);
+        let objects = Photo { width, height, rgba: objects };
+        Ok(Self { photo: Photo { rgba, width, height }.into(), objects: Some(objects) })
+    }
+
+    /// Returns the photo for scores of colours: what is clear in a photo of objects alone does not count, because it is
+    /// right wherever there is nothing.
+    pub(crate) fn coloured(&self) -> &Photo {
+        self.objects.as_ref().unwrap_or(&self.photo)
+    }
+}
