@@ -15,6 +15,7 @@ mod inspect;
 mod marks;
 pub mod mask;
 pub mod mask_folder;
+pub mod nested;
 mod photos;
 mod polygon;
 mod pred;

@@ -110,18 +110,28 @@ enum List {
     WithImage { annotations: Vec<Annotation> },
 }
 
+/// A mask of a list.
 #[derive(Deserialize)]
-struct Annotation {
-    segmentation: Value,
+pub(super) struct Annotation {
+    pub(super) segmentation: Value,
+    pub(super) predicted_iou: Option<f64>,
+    pub(super) stability_score: Option<f64>,
 }
 
 const EXPECTED: &str = r#"expected what amg.py writes as run lengths: [{"segmentation": {"size": [height, width], "counts": "..."}, "area": 9}]"#;
 
-fn masks(path: &Path, view: &View) -> Result<Vec<Mark>> {
+/// Reads the list of a photo's masks.
+pub(super) fn annotations(path: &Path) -> Result<Vec<Annotation>> {
     // The message of a type with two forms tells neither line nor reason.
     let value: Value = read::json(path, EXPECTED)?;
-    let (List::Alone(list) | List::WithImage { annotations: list }) =
+    let list =
         serde_json::from_value(value).map_err(|_| Error::data(path, "", format!("is no list of masks; {EXPECTED}")))?;
+    let (List::Alone(list) | List::WithImage { annotations: list }) = list;
+    Ok(list)
+}
+
+fn masks(path: &Path, view: &View) -> Result<Vec<Mark>> {
+    let list = annotations(path)?;
     let mut marks = Vec::with_capacity(list.len());
     for (at, annotation) in list.iter().enumerate() {
         let wrong = |problem: String| Error::data(path, format!("mask {at}"), problem);

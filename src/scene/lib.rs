@@ -22,6 +22,7 @@ pub mod overview;
 pub mod path;
 pub mod phases;
 pub mod pixels;
+pub mod principal;
 pub mod sampling;
 pub mod spread;
 pub mod stage;

@@ -31,7 +31,7 @@ pub mod points;
 mod pose_convention;
 mod read_options;
 mod recipe;
-mod resample;
+pub mod resample;
 pub mod shelf;
 mod split;
 mod stray;

@@ -1,6 +1,7 @@
 //! `labelgs label`.
 
 use crate::cli::commands::masks::repair::table;
+use crate::cli::support::nested_masks::{MaskFolders, object_masks};
 use crate::cli::support::parsers::{model_file, near};
 use crate::cli::support::{
     Context, Progress, SceneArgs, WriteArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit,
@@ -9,7 +10,8 @@ use crate::edit::select::summarise;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
 use crate::gpu::Gpu;
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, own_masks, settle};
+use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{Counting, ROUNDS, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::{Gaussians, View};
 use crate::stage::Stage;
@@ -31,7 +33,8 @@ pub struct LabelArgs {
     /// Scene with the cameras of the masks.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder of id masks, one per view by name.
+    /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
+    /// together choose which of the nested masks are objects.
     #[arg(long, value_name = "DIR")]
     pub masks: PathBuf,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
@@ -64,8 +67,9 @@ pub struct LabelArgs {
 /// Gives the Gaussians of a trained model their labels.
 pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let mut dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
-    dataset.train.retain(|view| view.mask.is_some());
+    let masks = MaskFolders::of(&args.masks)?;
+    let mut dataset = open_scene(&args.scene, &args.reading, masks.pictures.clone(), [0.0; 3], true)?;
+    dataset.train.retain(|view| view.mask.is_some() || masks.lists.is_some());
     if dataset.train.is_empty() {
         return Err(Error::data(
             &args.masks,
@@ -76,8 +80,14 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     warn_of_misfit(&args.model, &model, &dataset)?;
     let gpu = open_gpu(context)?;
     let start = Instant::now();
-    let names = match args.per_view {
-        true => Some(make_agree(args, near, &gpu, &model, &mut dataset.train)?),
+    if let Some(lists) = &masks.lists {
+        let views: Vec<&View> = dataset.train.iter().collect();
+        let found = object_masks(lists, (&args.scene, &args.reading), &gpu, (&model, near), &views)?;
+        dataset.train.iter_mut().zip(found).for_each(|(view, mask)| view.mask = mask.map(Into::into));
+        dataset.train.retain(|view| view.mask.is_some());
+    }
+    let names = match args.per_view || masks.lists.is_some() {
+        true => Some(make_agree(args, near, &gpu, &model, (&mut dataset.train, masks.lists.is_some()))?),
         false => LabelTable::of_folder(&args.masks)?,
     };
     let views: Vec<&View> = dataset.train.iter().collect();
@@ -111,19 +121,26 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     context.show(&result, &text)
 }
 
-/// Replaces the masks of the views by those whose ids agree, and returns their names.
+/// Replaces the masks of the views by those whose ids agree, and returns their names. Masks of objects that all views chose do
+/// agree, and are mended.
 fn make_agree(
     args: &LabelArgs,
     near: f32,
     gpu: &Arc<Gpu>,
     model: &Gaussians,
-    views: &mut [View],
+    (views, are_objects): (&mut [View], bool),
 ) -> Result<LabelTable> {
     let borrowed: Vec<&View> = views.iter().collect();
     let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
     let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
     let stage = Stage::new("comparing masks", 2 * borrowed.len());
-    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || stage.count())?;
+    let mut tick = || stage.count();
+    let masks = match are_objects {
+        true => {
+            settle(&mut engine, model, &borrowed, &own_masks(&borrowed), how, (&mut Repairs::default(), &mut tick))?
+        }
+        false => agree(&mut engine, model, &borrowed, how, &mut tick)?.0,
+    };
     let names = table(&args.masks, true, &borrowed, &masks)?;
     views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
     Ok(names)

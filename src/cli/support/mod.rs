@@ -10,6 +10,7 @@ pub(crate) mod model_drawer;
 pub(crate) mod model_edit;
 pub(crate) mod model_fit;
 pub(crate) mod model_format;
+pub(crate) mod nested_masks;
 pub(crate) mod number_errors;
 pub(crate) mod parsers;
 pub mod scene;

@@ -3,13 +3,12 @@
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::gaussians::{ALPHA_MAX, axes_of};
 use labelgs_scene::harmonics::SH_C0;
+use labelgs_scene::principal::principal_axes;
 
 /// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
 const COLOUR_WEIGHT: f64 = 4.0;
 /// Smallest opacity that a merged Gaussian gets, so that it has a logit. Blending ends at the largest.
 const OPACITY_MIN: f64 = 1e-6;
-/// Sweeps of the eigenvalue iteration; five reach double precision for 3 x 3.
-const SWEEPS: usize = 8;
 
 /// A Gaussian as moments.
 #[derive(Clone, Debug)]
@@ -91,28 +90,9 @@ pub(super) fn covariance(quat: [f32; 4], scales: [f32; 3]) -> DMat3 {
     turn * DMat3::from_diagonal(squares) * turn.transpose()
 }
 
-/// Returns a rotation and the deviations along its axes, of a covariance. Jacobi's method.
+/// Returns a rotation and the deviations along its axes, of a covariance.
 pub(super) fn axes(covariance: &DMat3) -> (DQuat, [f64; 3]) {
-    let (mut matrix, mut turn) = (*covariance, DMat3::IDENTITY);
-    for _ in 0..SWEEPS {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let off = matrix.col(q)[p];
-            if off == 0.0 {
-                continue;
-            }
-            let ratio = (matrix.col(q)[q] - matrix.col(p)[p]) / (2.0 * off);
-            let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
-            let cosine = 1.0 / tangent.hypot(1.0);
-            let mut step = DMat3::IDENTITY;
-            *step.col_mut(p) = DVec3::ZERO;
-            *step.col_mut(q) = DVec3::ZERO;
-            (step.col_mut(p)[p], step.col_mut(p)[q]) = (cosine, -tangent * cosine);
-            (step.col_mut(q)[p], step.col_mut(q)[q]) = (tangent * cosine, cosine);
-            matrix = step.transpose() * matrix * step;
-            turn *= step;
-        }
-    }
-    let sizes = [0, 1, 2].map(|axis| matrix.col(axis)[axis].max(0.0).sqrt());
+    let (turn, sizes) = principal_axes(covariance);
     (DQuat::from_mat3(&turn).normalize(), sizes)
 }
 

@@ -53,15 +53,36 @@ pub fn agree(
     let renamed: Vec<Option<Pixels<LabelMap>>> = (views.iter().enumerate())
         .map(|(index, view)| Ok(view.mask()?.map(|mask| rename(index, &mask, &names).into())))
         .collect::<Result<_>>()?;
-    // The labels that all renamed masks give the model decide the content of each mask.
-    let voters = views.iter().zip(&renamed).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
+    let masks = settle(engine, model, views, &renamed, how, (&mut repairs, tick))?;
+    repairs.trace(&names, areas.into_keys());
+    Ok((masks, repairs))
+}
+
+/// Returns the masks that views have.
+pub fn own_masks(views: &[&View]) -> Vec<Option<Pixels<LabelMap>>> {
+    views.iter().map(|view| view.mask.clone()).collect()
+}
+
+/// Mends masks whose ids agree: all of them give the model labels, and these divide masks that cover several objects and fill
+/// in missed ones. `tick` is called once per view.
+pub fn settle(
+    engine: &mut Engine,
+    model: &Gaussians,
+    views: &[&View],
+    masks: &[Option<Pixels<LabelMap>>],
+    how: Agreement,
+    (repairs, tick): (&mut Repairs, &mut dyn FnMut()),
+) -> Result<Vec<Option<LabelMap>>> {
+    let counting = Sweep::new(how.near, 0);
+    // The labels that all masks give the model decide the content of each mask.
+    let voters = views.iter().zip(masks).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
     let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting)?;
     engine.set_labels(&decision.labels)?;
-    let mut masks = Vec::with_capacity(views.len());
-    for (index, (view, mask)) in views.iter().zip(&renamed).enumerate() {
+    let mut mended = Vec::with_capacity(views.len());
+    for (index, (view, mask)) in views.iter().zip(masks).enumerate() {
         let shown = label_map(engine, &view.camera, how.near)?;
-        masks.push(match mask {
-            Some(mask) => Some(mend(index, &*mask.get()?, &shown, &mut repairs)),
+        mended.push(match mask {
+            Some(mask) => Some(mend(index, &*mask.get()?, &shown, repairs)),
             None if how.make_missing => {
                 repairs.made.push(index);
                 Some(shown)
@@ -70,8 +91,7 @@ pub fn agree(
         });
         tick();
     }
-    repairs.trace(&names, areas.into_keys());
-    Ok((masks, repairs))
+    Ok(mended)
 }
 
 /// Returns the masks of views that told the model nothing, such as those that are held out, with the ids of its objects.

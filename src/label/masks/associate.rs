@@ -44,9 +44,9 @@ pub type Segment = (usize, u16);
 /// The overlap of two groups: the weight that both own, and the weight that either owns, over Gaussians visible in both
 /// views.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Overlap {
-    both: f64,
-    either: f64,
+pub(crate) struct Overlap {
+    pub both: f64,
+    pub either: f64,
 }
 
 impl Overlap {
@@ -54,7 +54,7 @@ impl Overlap {
         Self { both: self.both + other.both, either: self.either + other.either }
     }
 
-    fn ratio(self) -> f64 {
+    pub(crate) fn ratio(self) -> f64 {
         if self.either > 0.0 { self.both / self.either } else { 0.0 }
     }
 }
@@ -77,7 +77,7 @@ pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
             }
         }
     }
-    join(&segments, links)
+    join(&segments, links, SAME_OBJECT)
 }
 
 /// Returns the overlaps of the masks of two views, by ids, over the Gaussians visible in both.
@@ -105,15 +105,16 @@ fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
     found
 }
 
-/// Agglomerative clustering with average linkage.
-fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>) -> Vec<Vec<Segment>> {
+/// Joins the two groups with the largest overlap until no overlap reaches `least`: agglomerative clustering with average
+/// linkage. `links` are the overlaps of each segment with others. Two masks of one view never join.
+pub(crate) fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>, least: f64) -> Vec<Vec<Segment>> {
     let mut groups: Vec<Vec<Segment>> = segments.iter().map(|&segment| vec![segment]).collect();
     let mut seen_in: Vec<BTreeSet<usize>> = segments.iter().map(|&(view, _)| [view].into()).collect();
     // Pairs to join by overlap, whose bits are in its order because it is positive, then by number, so that the order is the
     // same everywhere.
     let candidate = |a: usize, b: usize, overlap: Overlap| {
         let ratio = overlap.ratio();
-        (ratio >= SAME_OBJECT).then_some((ratio.to_bits(), Reverse((a.min(b), a.max(b)))))
+        (ratio >= least).then_some((ratio.to_bits(), Reverse((a.min(b), a.max(b)))))
     };
     let pairs = links.iter().enumerate().flat_map(|(a, row)| row.iter().map(move |(&b, &overlap)| (a, b, overlap)));
     let mut heap: BinaryHeap<(u64, Reverse<(usize, usize)>)> =

@@ -4,6 +4,7 @@
 pub mod agree;
 pub mod associate;
 pub mod names;
+pub mod nested;
 pub mod repair;
 pub(crate) mod track;
 

@@ -1,11 +1,12 @@
 //! `labelgs masks repair`.
 
 use super::{files_of_photos, write_mask};
+use crate::cli::support::nested_masks::{MaskFolders, object_masks};
 use crate::cli::support::parsers::near;
 use crate::cli::support::{Context, Progress, SceneArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::files::atomic;
 use crate::files::label_table::{FILE, LabelEntry, LabelTable};
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow, own_masks, settle};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
@@ -20,7 +21,8 @@ use std::path::{Path, PathBuf};
 /// `labelgs masks repair`.
 #[derive(Args, Clone, Debug)]
 pub struct RepairArgs {
-    /// Folder of id masks.
+    /// Folder of id masks; or that of `masks make`, or lists that Segment Anything wrote: then all views together choose which
+    /// of the nested masks are objects.
     #[arg(value_name = "MASKS")]
     pub masks: PathBuf,
     /// A model of the scene, of any trainer, with or without labels. It shows which masks belong to one object.
@@ -53,7 +55,14 @@ pub struct RepairArgs {
 pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
-    let dataset = open_scene(&args.scene, &args.reading, Some(args.masks.clone()), [0.0; 3], true)?;
+    let folders = MaskFolders::of(&args.masks)?;
+    let mut dataset = open_scene(&args.scene, &args.reading, folders.pictures.clone(), [0.0; 3], true)?;
+    let (gpu, near) = (open_gpu(context)?, near_plane(&args.model, args.near)?);
+    if let Some(lists) = &folders.lists {
+        let views: Vec<&View> = dataset.train.iter().collect();
+        let found = object_masks(lists, (&args.scene, &args.reading), &gpu, (&model, near), &views)?;
+        dataset.train.iter_mut().zip(found).for_each(|(view, mask)| view.mask = mask.map(Into::into));
+    }
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.iter().all(|view| view.mask.is_none()) {
         return Err(Error::data(
@@ -67,7 +76,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     let all: Vec<&View> = views.iter().chain(&held_out).copied().collect();
     let windows = windows(&args.scene, &args.reading.read.lookup())?;
     let photos = files_of_photos(all.iter().map(|view| view.name.as_str()), &windows, &args.scene)?;
-    let mut engine = vote_engine(open_gpu(context)?, &model, &all, columns_of(&views))?;
+    let mut engine = vote_engine(gpu, &model, &all, columns_of(&views))?;
     let mut progress = Progress::new((2 * views.len() + held_out.len()) as u64, "views", &context.global);
     let mut done = 0;
     let mut tick = || {
@@ -75,12 +84,18 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         progress.set(done, String::new);
     };
     let how = Agreement {
-        near: near_plane(&args.model, args.near)?,
-        per_view: args.per_view,
+        near,
+        per_view: args.per_view || folders.lists.is_some(),
         min_views: args.min_views,
         make_missing: args.make_missing,
     };
-    let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
+    let (mut masks, mut repairs) = match folders.lists {
+        None => agree(&mut engine, &model, &views, how, &mut tick)?,
+        Some(_) => {
+            let mut repairs = Repairs::default();
+            (settle(&mut engine, &model, &views, &own_masks(&views), how, (&mut repairs, &mut tick))?, repairs)
+        }
+    };
     let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
     masks.extend(others);
     drop(progress);

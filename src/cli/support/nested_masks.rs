@@ -1,0 +1,91 @@
+//! Masks that a command was given: id pictures, or nested masks, of which all views together choose objects.
+
+use crate::cli::support::SceneArgs;
+use crate::engine::Engine;
+use crate::gpu::Gpu;
+use crate::label::masks::nested::{NestedMasks, objects, painted};
+use crate::masks::nested::{files_of_photos, read};
+use crate::scene::{Gaussians, LabelMap, View};
+use crate::scenes::resample::resample_ids;
+use crate::scenes::window::{Window, windows};
+use crate::stage::Stage;
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Folder of nested masks, and of the id pictures beside it whose outlines held-out views keep, in a folder of `masks make`.
+pub(crate) const NESTED: &str = "nested";
+pub(crate) const OBJECTS: &str = "objects";
+
+/// Where masks are.
+#[derive(Clone, Debug)]
+pub(crate) struct MaskFolders {
+    /// Id pictures.
+    pub pictures: Option<PathBuf>,
+    /// Nested masks.
+    pub lists: Option<PathBuf>,
+}
+
+impl MaskFolders {
+    /// Looks at the folder of a flag: that of `masks make`, one of Segment Anything's lists, or one of id pictures.
+    pub(crate) fn of(folder: &Path) -> Result<Self> {
+        let (lists, objects) = (folder.join(NESTED), folder.join(OBJECTS));
+        if lists.is_dir() {
+            return Ok(Self { pictures: objects.is_dir().then_some(objects), lists: Some(lists) });
+        }
+        let is_lists = crate::masks::nested::has_lists(folder)?;
+        let folder = folder.to_owned();
+        Ok(if is_lists {
+            Self { pictures: None, lists: Some(folder) }
+        } else {
+            Self { pictures: Some(folder), lists: None }
+        })
+    }
+}
+
+/// Returns the masks of the objects that all views together choose among nested masks; `None` for views without any.
+pub(crate) fn object_masks(
+    lists: &Path,
+    (scene, reading): (&Path, &SceneArgs),
+    gpu: &Arc<Gpu>,
+    (model, near): (&Gaussians, f32),
+    views: &[&View],
+) -> Result<Vec<Option<LabelMap>>> {
+    let windows = windows(scene, &reading.read.lookup())?;
+    let photo = |view: &View| windows.get(&view.name).map_or(view.name.clone(), |window| window.photo.clone());
+    let names: Vec<String> = views.iter().map(|view| photo(view)).collect();
+    let mut unique: Vec<&str> = names.iter().map(String::as_str).collect();
+    unique.sort_unstable();
+    unique.dedup();
+    let files: BTreeMap<&str, PathBuf> = match files_of_photos(lists, &unique)? {
+        Some(files) => unique.iter().zip(files).filter_map(|(name, file)| Some((*name, file?))).collect(),
+        None => {
+            let problem = "no training view has nested masks here; check the names of the lists";
+            return Err(Error::data(lists, "", problem));
+        }
+    };
+    let stage = Stage::new("reading masks", views.len());
+    let of_view = |(view, name): (&&View, &String)| -> Result<Option<NestedMasks>> {
+        let Some(file) = files.get(name.as_str()) else { return Ok(None) };
+        let masks = stage.counted(|| read(file))?;
+        let stored = Window::stored(&view.name, &view.camera);
+        let window = windows.get(&view.name).unwrap_or(&stored);
+        let size = (view.camera.width, view.camera.height);
+        let layers = masks.layers.iter().map(|layer| resample_ids(layer, window, size)).collect();
+        Ok(Some(NestedMasks { layers, ..masks }))
+    };
+    let nested: Vec<Option<NestedMasks>> = views.iter().zip(&names).map(of_view).collect::<Result<_>>()?;
+    drop(stage);
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = Engine::of_model(Arc::clone(gpu), model, sizes)?;
+    let stage = Stage::new("choosing objects", views.len());
+    let pairs: Vec<(&View, Option<&NestedMasks>)> =
+        views.iter().zip(&nested).map(|(view, masks)| (*view, masks.as_ref())).collect();
+    let found = objects(&mut engine, model, &pairs, near, &mut || stage.count())?;
+    if found.is_empty() {
+        let problem = "no object is found that several views confirm; make masks with more points, or less sure ones";
+        return Err(Error::data(lists, "", problem));
+    }
+    Ok(nested.iter().enumerate().map(|(view, masks)| painted(&found, view, masks.as_ref()?)).collect())
+}

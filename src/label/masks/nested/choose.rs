@@ -1,0 +1,109 @@
+//! The groups that are objects.
+
+use super::group::{Group, Scene};
+use std::collections::BTreeSet;
+
+/// Least quality of an object, and least share of views that confirm it: what other views do not confirm gets no object.
+const QUALITY_MIN: f64 = 0.15;
+const SUPPORT_MIN: f64 = 0.5;
+/// Fewest views with a mask of an object, if as many see it.
+const VIEWS_MIN: usize = 3;
+/// Share of a group inside of a larger one above which it is a part of it, and least ratio of their areas.
+const INSIDE_SHARE_MIN: f64 = 0.85;
+const LARGER_RATIO_MIN: f64 = 1.15;
+/// Share of a group that no better one covers, which it needs to be an object.
+const OWN_SHARE_MIN: f64 = 0.5;
+/// A part is an object beside the rest of its whole if it has this share of it, quality and support: two things that touch in
+/// most views.
+const APART_SHARE_MIN: f64 = 0.2;
+const APART_QUALITY_MIN: f64 = 0.5;
+const APART_SUPPORT_MIN: f64 = 0.9;
+/// Share that two such parts may have in common.
+const APART_SHARED_MAX: f64 = 0.3;
+
+/// Returns the groups that other views confirm.
+pub(super) fn confirmed(groups: Vec<Group>, views: usize) -> Vec<Group> {
+    let least = VIEWS_MIN.min(views);
+    let holds =
+        |group: &Group| group.quality >= QUALITY_MIN && group.support >= SUPPORT_MIN && group.best.len() >= least;
+    groups.into_iter().filter(holds).collect()
+}
+
+/// Chooses objects among groups: numbers of groups, those that lie on top of others last. As among the masks of one photo, a
+/// whole stands if its area times its quality is at least what the best choice inside of it explains.
+pub(super) fn objects(scene: &Scene, groups: &[Group]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..groups.len()).collect();
+    order.sort_by(|&a, &b| groups[a].area.total_cmp(&groups[b].area).then(a.cmp(&b)));
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); groups.len()];
+    let mut top: BTreeSet<usize> = order.iter().copied().collect();
+    for ((a, b), both) in scene.shared(groups) {
+        for (part, whole) in [(a, b), (b, a)] {
+            let (small, large) = (groups[part].area, groups[whole].area);
+            if large >= LARGER_RATIO_MIN * small && both >= INSIDE_SHARE_MIN * small {
+                parts[whole].push(part);
+                top.remove(&part);
+            }
+        }
+    }
+    let mut chosen: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); groups.len()];
+    for &group in &order {
+        let inside: BTreeSet<usize> = parts[group].iter().flat_map(|&part| chosen[part].iter().copied()).collect();
+        let whole = groups[group].area * groups[group].quality;
+        chosen[group] = if whole >= explained(scene, groups, &inside) { BTreeSet::from([group]) } else { inside };
+    }
+    let mut best: Vec<usize> =
+        top.iter().flat_map(|&group| &chosen[group]).copied().collect::<BTreeSet<_>>().into_iter().collect();
+    let value = |&group: &usize| groups[group].area * groups[group].quality;
+    best.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
+    let mut covered = vec![false; scene.weights.len()];
+    best.retain(|&group| {
+        let free = groups[group].rows.iter().filter(|&&row| !covered[row as usize]);
+        let keeps = free.map(|&row| scene.weights[row as usize]).sum::<f64>() >= OWN_SHARE_MIN * groups[group].area;
+        if keeps {
+            groups[group].rows.iter().for_each(|&row| covered[row as usize] = true);
+        }
+        keeps
+    });
+    let on_top: Vec<usize> = best.iter().flat_map(|&whole| apart(scene, groups, whole, &parts[whole])).collect();
+    // Surer groups lie on those that are less sure.
+    best.sort_by(|&a, &b| groups[a].quality.total_cmp(&groups[b].quality).then(a.cmp(&b)));
+    best.retain(|group| !on_top.contains(group));
+    best.extend(on_top);
+    best
+}
+
+/// Returns the parts of a whole that are objects of their own.
+fn apart(scene: &Scene, groups: &[Group], whole: usize, parts: &[usize]) -> Vec<usize> {
+    let value = |group: usize| groups[group].area * groups[group].quality;
+    let holds = |&part: &usize| {
+        let found = &groups[part];
+        found.area >= APART_SHARE_MIN * groups[whole].area
+            && found.quality >= APART_QUALITY_MIN
+            && found.support >= APART_SUPPORT_MIN
+    };
+    let mut able: Vec<usize> = parts.iter().copied().filter(holds).collect();
+    able.sort_by(|&a, &b| value(b).total_cmp(&value(a)).then(a.cmp(&b)));
+    let mut taken = BTreeSet::new();
+    able.retain(|&part| {
+        let found = &groups[part];
+        let shared = found.rows.iter().filter(|row| taken.contains(*row)).map(|&row| scene.weights[row as usize]);
+        let keeps = shared.sum::<f64>() < APART_SHARED_MAX * found.area;
+        if keeps {
+            taken.extend(found.rows.iter().copied());
+        }
+        keeps
+    });
+    able
+}
+
+/// Returns the sum over Gaussians of their weight times the best quality of the groups there.
+fn explained(scene: &Scene, groups: &[Group], chosen: &BTreeSet<usize>) -> f64 {
+    let mut best = std::collections::BTreeMap::new();
+    for &group in chosen {
+        for &row in &groups[group].rows {
+            let known: &mut f64 = best.entry(row).or_insert(0.0);
+            *known = known.max(groups[group].quality);
+        }
+    }
+    best.into_iter().map(|(row, quality): (u32, f64)| quality * scene.weights[row as usize]).sum()
+}
