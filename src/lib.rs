@@ -57,6 +57,7 @@
 //!
 //! `cli` (default): the program, with clap, progress bars and signals; without it the library needs none of them.
 //! `viewer`, a part of `cli`: the page that shows a model or a training in a browser.
+//! `network`, a part of `cli`: masks by a segmentation network.
 //! `build-shaderc` (default): builds the shader compiler from source instead of linking the system's. `lab`: faults on
 //! purpose, for tests.
 #![deny(unsafe_code)]
@@ -91,6 +92,8 @@ pub use labelgs_masks as masks;
 pub use labelgs_reference as reference;
 pub use labelgs_scene::{self as scene, Error, Result, Setting};
 pub use labelgs_scenes as scenes;
+#[cfg(feature = "network")]
+pub use labelgs_segment as segment;
 pub use labelgs_synth as synth;
 
 use labelgs_report as report;

@@ -20,16 +20,9 @@ impl PipelineFolder {
         Self { folder: folder.into() }
     }
 
-    /// Returns the folder in `LABELGS_CACHE`, else the user's cache folder; none for `off` or without a cache folder.
+    /// Uses the [`user_cache`].
     pub fn of_user() -> Option<Self> {
-        match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
-            Some(value) if value == "off" => None,
-            Some(folder) => Some(Self::new(folder)),
-            None => {
-                let base = choose_native_strategy().ok()?.cache_dir();
-                base.is_absolute().then(|| Self::new(base.join("labelgs")))
-            }
-        }
+        user_cache().map(Self::new)
     }
 
     /// Returns the folder for locks of the user's processes: that of the caches, else the system's for temporary files.
@@ -39,6 +32,18 @@ impl PipelineFolder {
 
     fn path(&self, device: &str) -> PathBuf {
         self.folder.join(format!("pipelines-{device}.bin"))
+    }
+}
+
+/// Returns the folder in `LABELGS_CACHE`, else the user's cache folder; none for `off` or without a cache folder.
+pub(crate) fn user_cache() -> Option<PathBuf> {
+    match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
+        Some(value) if value == "off" => None,
+        Some(folder) => Some(folder.into()),
+        None => {
+            let base = choose_native_strategy().ok()?.cache_dir();
+            base.is_absolute().then(|| base.join("labelgs"))
+        }
     }
 }
 

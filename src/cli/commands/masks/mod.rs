@@ -3,6 +3,8 @@
 pub(crate) mod check;
 pub(crate) mod collect;
 pub(crate) mod import;
+#[cfg(feature = "network")]
+pub(crate) mod make;
 pub(crate) mod repair;
 pub(crate) mod spoil;
 pub(crate) mod track;
@@ -31,6 +33,12 @@ pub enum MasksVerb {
     ///
     /// Example: labelgs masks import scene/masks --scene scene -o imported
     Import(import::ImportArgs),
+    /// Find masks in each photo by a segmentation network whose weights you name: an id picture for each photo, with ids of
+    /// its own.
+    ///
+    /// Example: labelgs masks make scene --network mobile_sam -o made
+    #[cfg(feature = "network")]
+    Make(make::MakeArgs),
     /// Write masks whose ids agree in all views, with the help of a trained model.
     ///
     /// Example: labelgs masks repair scene/masks --model out --scene scene -o repaired
@@ -55,6 +63,8 @@ impl MasksVerb {
         match self {
             Self::Check(args) => check::run(args, context),
             Self::Import(args) => import::run(args, context),
+            #[cfg(feature = "network")]
+            Self::Make(args) => make::run(args, context),
             Self::Repair(args) => repair::run(args, context),
             Self::Track(args) => track::run(args, context),
             Self::Collect(args) => collect::run(args, context),

@@ -1,0 +1,150 @@
+//! `labelgs masks make`.
+
+use super::{files_of_photos, write_mask};
+use crate::cli::support::nested_masks::{NESTED, OBJECTS};
+use crate::cli::support::parsers::share;
+use crate::cli::support::{Context, Progress, ReadArgs, quoted};
+use crate::files::resize::bounded_size;
+use crate::files::{atomic, read};
+use crate::masks::nested;
+use crate::records::pipeline_file::user_cache;
+use crate::scene::{LabelMap, View};
+use crate::scenes::{self, LoadOptions};
+use crate::segment::{FeatureCache, Level, Network, PhotoMasks, Search, masks_of_photo};
+use crate::words::counted;
+use crate::{Error, Result};
+use clap::Args;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// File that says how the masks of a folder were made.
+const FILE: &str = "masks.json";
+/// Longest side of a mask, px: twice the grid of the network, so that outlines are as smooth as it draws them.
+const MASK_PX: u32 = 512;
+
+/// The levels of nested masks, and the folders of their id pictures.
+const LEVELS: [(Level, &str); 3] = [(Level::Objects, OBJECTS), (Level::Parts, "parts"), (Level::Wholes, "wholes")];
+
+/// `labelgs masks make`.
+#[derive(Args, Clone, Debug)]
+pub struct MakeArgs {
+    /// Scene with the photos.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Folder with the segmentation network as ONNX, the encoder and the decoder: `encoder.onnx` and `decoder.onnx`, as
+    /// exported from Segment Anything, MobileSAM, EdgeSAM or SAM 2.
+    #[arg(long, value_name = "DIR")]
+    pub network: PathBuf,
+    /// Folder to write: nested/ has all masks of each photo, objects/, parts/ and wholes/ an id picture of each level. Photos
+    /// that have their masks there are left out, so that a stopped run goes on.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Points per side of a photo at which the network is asked.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=128))]
+    pub grid: u16,
+    /// Least score of a mask by the network's own word.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.7, value_parser = share)]
+    pub min_score: f32,
+    /// Least stability of a mask: its area where the network is surer, over that where it is less sure.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = share)]
+    pub min_stability: f32,
+    /// Threads. Default: as many as there are processors. Each takes about 60 MB besides the network.
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    #[command(flatten)]
+    pub read: ReadArgs,
+}
+
+/// How masks were made, beside them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Made {
+    schema_version: u32,
+    network: String,
+    grid: u16,
+    min_score: f32,
+    min_stability: f32,
+}
+
+/// Makes the masks.
+pub(crate) fn run(args: &MakeArgs, context: &Context) -> Result<()> {
+    let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
+    let network = Network::open(&args.network, threads)?;
+    remember(args, &network)?;
+    let options = LoadOptions { undistort: false, max_resolution: Some(network.side()), ..LoadOptions::default() };
+    let dataset = scenes::open_logged(&args.scene, &args.read.options(LoadOptions { test_every: None, ..options }))?;
+    let views = dataset.all();
+    let files = files_of_photos(views.iter().map(|view| view.name.as_str()), &BTreeMap::new(), &args.scene)?;
+    let cache = user_cache().map(|folder| FeatureCache::new(&folder, &network));
+    let mut progress = Progress::new(files.len() as u64, "photos", &context.global);
+    let (mut made, mut masks, mut empty) = (0, 0, Vec::new());
+    for (done, (file, of)) in files.iter().enumerate() {
+        let list = args.output.join(NESTED).join(file).with_extension("json");
+        if !list.is_file() {
+            let view = views[of[0]];
+            let found = of_photo(args, &network, cache.as_ref(), view)?;
+            for ((_, folder), map) in LEVELS.iter().zip(&found.levels) {
+                write_mask(&args.output.join(folder).join(file), map)?;
+            }
+            // Written last: its presence means that the photo is done.
+            nested::write(&list, size_of(&found.levels), &found.masks)?;
+            if found.masks.is_empty() {
+                empty.push(view.name.as_str());
+            }
+            (made, masks) = (made + 1, masks + found.masks.len());
+        }
+        progress.set(done as u64 + 1, String::new);
+    }
+    drop(progress);
+    if !empty.is_empty() {
+        tracing::warn!("nothing was found in {}: {}", counted(empty.len(), "photo"), empty.join(", "));
+    }
+    let output = args.output.display().to_string();
+    let left = files.len() - made;
+    let [scene, quoted_output] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
+    let text = format!(
+        "{output}: {} in {}, {left} were there\nnext:\n  labelgs train {scene} -o plain\n  labelgs label plain --scene {scene} \
+         --masks {quoted_output} -o labelled.ply\n",
+        counted(masks, "mask"),
+        counted(made, "photo"),
+    );
+    context.show(&json!({ "schema_version": 1, "output": output, "photos": made, "left": left, "masks": masks }), &text)
+}
+
+/// Writes how the masks are made, or refuses a folder whose masks were made otherwise.
+fn remember(args: &MakeArgs, network: &Network) -> Result<()> {
+    let made = Made {
+        schema_version: 1,
+        network: network.digest.clone(),
+        grid: args.grid,
+        min_score: args.min_score,
+        min_stability: args.min_stability,
+    };
+    let path = args.output.join(FILE);
+    if !path.is_file() {
+        atomic::require_empty("--output", &args.output)?;
+        return atomic::write_json(&path, &made);
+    }
+    let before: Made = read::json(&path, "how masks were made")?;
+    if before != made {
+        let problem = "these masks were made by another network or with other options; name a new folder";
+        return Err(Error::data(&path, "", problem));
+    }
+    Ok(())
+}
+
+fn of_photo(args: &MakeArgs, network: &Network, cache: Option<&FeatureCache>, view: &View) -> Result<PhotoMasks> {
+    let search = Search { grid: usize::from(args.grid), min_score: args.min_score, min_stability: args.min_stability };
+    let photo = view.photo()?;
+    let features = match cache {
+        Some(cache) => cache.of(network, &photo)?,
+        None => network.encode(&photo)?,
+    };
+    let size = bounded_size(features.photo, Some(MASK_PX));
+    masks_of_photo(network, &features, &search, &LEVELS.map(|(level, _)| level), size)
+}
+
+fn size_of(levels: &[LabelMap]) -> (u32, u32) {
+    levels.first().map_or((0, 0), |map| (map.width, map.height))
+}

@@ -1,0 +1,96 @@
+//! What an encoder has seen of a photo, in memory and on the disk.
+
+use super::network::Network;
+use half::f16;
+use labelgs_files::atomic;
+use labelgs_scene::{Photo, Result};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use std::path::{Path, PathBuf};
+
+/// The features of a photo, in 16 bits: so they are the same, fresh or from the disk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features {
+    /// Width and height of the photo, px.
+    pub photo: (u32, u32),
+    tensors: Vec<(Vec<usize>, Vec<f16>)>,
+}
+
+impl Features {
+    pub(crate) fn new(photo: (u32, u32), tensors: Vec<(Vec<usize>, Vec<f32>)>) -> Self {
+        let halves = |values: Vec<f32>| values.into_iter().map(f16::from_f32).collect();
+        Self { photo, tensors: tensors.into_iter().map(|(shape, values)| (shape, halves(values))).collect() }
+    }
+
+    pub(crate) fn finite(&self) -> bool {
+        self.tensors.iter().all(|(_, values)| values.iter().all(|value| value.is_finite()))
+    }
+
+    /// Returns shapes and values.
+    pub(crate) fn tensors(&self) -> impl Iterator<Item = (&[usize], Vec<f32>)> {
+        self.tensors
+            .iter()
+            .map(|(shape, values)| (shape.as_slice(), values.iter().map(|value| value.to_f32()).collect()))
+    }
+
+    /// Reads features that [`Features::write`] wrote; `None` if there are none that can be read.
+    pub fn read(path: &Path, photo: (u32, u32)) -> Option<Self> {
+        let bytes = labelgs_files::read::bytes(path).ok()?;
+        let file = SafeTensors::deserialize(&bytes).ok()?;
+        let tensor = |at: usize| {
+            let tensor = file.tensor(&at.to_string()).ok().filter(|tensor| tensor.dtype() == Dtype::F16)?;
+            let values = tensor.data().chunks_exact(2).map(|two| f16::from_le_bytes([two[0], two[1]]));
+            Some((tensor.shape().to_vec(), values.collect()))
+        };
+        let tensors: Vec<_> = (0..file.len()).map(tensor).collect::<Option<_>>()?;
+        Some(Self { photo, tensors }).filter(|features| !features.tensors.is_empty() && features.finite())
+    }
+
+    /// Writes the features.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let data: Vec<Vec<u8>> = self
+            .tensors
+            .iter()
+            .map(|(_, values)| values.iter().flat_map(|value| value.to_le_bytes()).collect())
+            .collect();
+        let views = self.tensors.iter().zip(&data).enumerate().map(|(at, ((shape, _), bytes))| {
+            let view =
+                TensorView::new(Dtype::F16, shape.clone(), bytes).expect("shape and length come from one tensor");
+            (at.to_string(), view)
+        });
+        let bytes = safetensors::serialize(views.collect::<Vec<_>>(), None).expect("names differ, lengths fit");
+        atomic::write(path, |file| file.write_all(&bytes))
+    }
+}
+
+/// Returns a number that tells contents of files apart.
+pub fn digest(bytes: &[u8]) -> u64 {
+    let half = bytes.len() / 2;
+    let (first, second) = (crc32fast::hash(bytes), crc32fast::hash(&bytes[half..]));
+    (u64::from(first) << 32 | u64::from(second)) ^ bytes.len() as u64
+}
+
+/// Features of photos on the disk, for one network.
+#[derive(Clone, Debug)]
+pub struct FeatureCache {
+    folder: PathBuf,
+}
+
+impl FeatureCache {
+    /// Uses a folder; writing creates it.
+    pub fn new(folder: &Path, network: &Network) -> Self {
+        Self { folder: folder.join(format!("features-{}", network.digest)) }
+    }
+
+    /// Returns the features of a photo: those on the disk, or fresh ones, which are written there.
+    pub fn of(&self, network: &Network, photo: &Photo) -> Result<Features> {
+        let bytes = photo.rgba.as_flattened();
+        let path = self.folder.join(format!("{:016x}-{}x{}.safetensors", digest(bytes), photo.width, photo.height));
+        let size = (photo.width, photo.height);
+        if let Some(found) = Features::read(&path, size) {
+            return Ok(found);
+        }
+        let features = network.encode(photo)?;
+        features.write(&path)?;
+        Ok(features)
+    }
+}

@@ -1,0 +1,139 @@
+//! Nested masks of a photo as levels: ids for parts, for objects and for wholes.
+
+use super::candidate::{Candidate, Search, candidates};
+use super::features::Features;
+use super::network::Network;
+use super::prompt::Frame;
+use labelgs_masks::nested::FoundMask;
+use labelgs_scene::{LabelMap, Result};
+use std::collections::BTreeSet;
+
+/// Share of a mask that lies in a larger one above which it is a part of it.
+const INSIDE_SHARE_MIN: f64 = 0.85;
+/// Least ratio of the areas of a whole and its part.
+const LARGER_RATIO_MIN: f64 = 1.15;
+/// Largest share of a photo that a whole has; larger masks are the surroundings.
+const WHOLE_SHARE_MAX: f64 = 0.4;
+
+/// Which of nested masks has a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// The smallest.
+    Parts,
+    /// The mask that explains more than the masks inside of it do together.
+    Objects,
+    /// The largest that is no part of the surroundings.
+    Wholes,
+}
+
+/// The masks of a photo.
+#[derive(Clone, Debug)]
+pub struct PhotoMasks {
+    /// All of them, the best first.
+    pub masks: Vec<FoundMask>,
+    /// A picture of ids from 1 for each level that was asked for.
+    pub levels: Vec<LabelMap>,
+}
+
+/// Finds the masks of a photo, and paints those of each level, at a size in px.
+pub fn masks_of_photo(
+    network: &Network,
+    features: &Features,
+    search: &Search,
+    levels: &[Level],
+    size: (u32, u32),
+) -> Result<PhotoMasks> {
+    let prepared = network.prepare(features)?;
+    let candidates = candidates(network, &prepared, search)?;
+    let inside: Vec<Vec<bool>> = candidates.iter().map(|mask| drawn(mask, &prepared.frame, size)).collect();
+    let paint = |&level: &Level| {
+        let chosen: Vec<&[bool]> =
+            of_level(&candidates, level).into_iter().map(|mask| inside[mask].as_slice()).collect();
+        painted(&chosen, size)
+    };
+    let levels = levels.iter().map(paint).collect();
+    let found = candidates.iter().zip(inside).map(|(mask, inside)| FoundMask {
+        inside,
+        score: mask.score,
+        stability: mask.stability,
+    });
+    // A mask without a pixel at this size is nothing.
+    Ok(PhotoMasks { masks: found.filter(|mask| mask.inside.contains(&true)).collect(), levels })
+}
+
+/// Returns the numbers of the masks of a level, those that lie on top of others last.
+fn of_level(masks: &[Candidate], level: Level) -> Vec<usize> {
+    let mut by_area: Vec<usize> = (0..masks.len()).collect();
+    by_area.sort_by_key(|&mask| (std::cmp::Reverse(masks[mask].area), mask));
+    match level {
+        Level::Parts => by_area,
+        Level::Objects => {
+            let chosen = objects(masks);
+            by_area.into_iter().filter(|mask| chosen.contains(mask)).collect()
+        }
+        Level::Wholes => {
+            let largest = masks.first().map_or(0.0, |mask| WHOLE_SHARE_MAX * mask.cells() as f64);
+            by_area.into_iter().rev().filter(|&mask| f64::from(masks[mask].area) < largest).collect()
+        }
+    }
+}
+
+/// Chooses objects among nested masks, from the parts up: a mask stands if its area times its quality is at least what the best
+/// choice inside of it explains, a sum over cells of the best quality there. No size is asked for: a sheet with everything
+/// on it falls, because the things on it are surer than it is.
+fn objects(masks: &[Candidate]) -> BTreeSet<usize> {
+    let mut order: Vec<usize> = (0..masks.len()).collect();
+    order.sort_by_key(|&mask| (masks[mask].area, mask));
+    let mut chosen: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); masks.len()];
+    let mut top: BTreeSet<usize> = order.iter().copied().collect();
+    for (at, &mask) in order.iter().enumerate() {
+        let parts = order[..at].iter().filter(|&&part| is_part(&masks[part], &masks[mask]));
+        let mut inside = BTreeSet::new();
+        for part in parts {
+            top.remove(part);
+            inside.extend(&chosen[*part]);
+        }
+        let whole = f64::from(masks[mask].area) * masks[mask].quality();
+        chosen[mask] = if whole >= explained(masks, &inside) { BTreeSet::from([mask]) } else { inside };
+    }
+    top.into_iter().flat_map(|mask| std::mem::take(&mut chosen[mask])).collect()
+}
+
+fn is_part(part: &Candidate, whole: &Candidate) -> bool {
+    f64::from(whole.area) >= LARGER_RATIO_MIN * f64::from(part.area)
+        && f64::from(part.shared(whole)) >= INSIDE_SHARE_MIN * f64::from(part.area)
+}
+
+/// Returns the sum over cells of the best quality of the masks there.
+fn explained(masks: &[Candidate], chosen: &BTreeSet<usize>) -> f64 {
+    let mut best = vec![0.0_f64; masks.first().map_or(0, Candidate::cells)];
+    for &mask in chosen {
+        let quality = masks[mask].quality();
+        masks[mask].inside().for_each(|cell| best[cell] = best[cell].max(quality));
+    }
+    best.iter().sum()
+}
+
+/// Returns the pixels of a mask in a picture of a size.
+fn drawn(mask: &Candidate, frame: &Frame, (width, height): (u32, u32)) -> Vec<bool> {
+    let grid = frame.grid();
+    let step = [frame.size.0 as f32 / width as f32, frame.size.1 as f32 / height as f32];
+    let inside = |at: u32| {
+        let (x, y) = (at % width, at / width);
+        mask.logit(frame, grid, [(x as f32 + 0.5) * step[0], (y as f32 + 0.5) * step[1]]) > 0.0
+    };
+    (0..width * height).map(inside).collect()
+}
+
+/// Paints masks as ids from 1, later ones on top. Masks that others cover have no id.
+fn painted(masks: &[&[bool]], (width, height): (u32, u32)) -> LabelMap {
+    let mut top = vec![0_usize; (width * height) as usize];
+    for (mask, number) in masks.iter().zip(1..) {
+        top.iter_mut().zip(*mask).filter(|(_, inside)| **inside).for_each(|(top, _)| *top = number);
+    }
+    let seen: BTreeSet<usize> = top.iter().copied().filter(|&number| number != 0).collect();
+    let mut ids = vec![0_u16; masks.len() + 1];
+    // Beyond the last id of a picture lie the smallest masks, which nobody misses.
+    seen.iter().zip(1..=u16::MAX).for_each(|(&number, id)| ids[number] = id);
+    LabelMap { width, height, ids: top.into_iter().map(|number| ids[number]).collect() }
+}
