@@ -1,6 +1,7 @@
 //! The commands that README.md and the guide show run as they stand, one after the other, in an empty folder. Only the
 //! long trainings are cut short, and the made scene is smaller.
 
+use labelgs::masks::nested::{self, FoundMask};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -54,11 +55,22 @@ fn track(folder: &Path) {
     }
 }
 
-/// What a segmenter of single photos would leave, in place of `tools/segment.py`: true masks with ids of each photo.
-fn segment(words: &[String]) -> Vec<String> {
-    let output = words.iter().skip_while(|word| *word != "-o").nth(1).expect("an output").clone();
-    let typed = ["labelgs", "masks", "spoil", "scene/masks", "--fault", "per-view", "-o", &output];
-    typed.map(str::to_owned).to_vec()
+/// What `masks make` would leave with a network: lists of the true masks.
+fn segment(folder: &Path) {
+    for entry in fs::read_dir(folder.join("scene/masks")).expect("masks").flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|ending| ending == "png") {
+            let ids = labelgs::masks::read_mask(&path).expect("ids");
+            let mask = |id: u16| FoundMask {
+                inside: ids.ids.iter().map(|&found| found == id).collect(),
+                score: 0.95,
+                stability: 0.95,
+            };
+            let masks: Vec<FoundMask> = ids.objects().into_iter().map(mask).collect();
+            let list = folder.join("made/nested").join(path.file_name().expect("a name")).with_extension("json");
+            nested::write(&list, (ids.width, ids.height), &masks).expect("a list");
+        }
+    }
 }
 
 /// The made scene at three tenths of its size, with fewer photos, and pixels that are named there.
@@ -116,8 +128,9 @@ fn run(pages: &[PathBuf]) {
             }
             let typed = line.split(" # ").next().expect("a command").trim();
             let mut words: Vec<String> = typed.split_whitespace().map(str::to_owned).collect();
-            if words[0] == "tools/segment.py" {
-                words = segment(&words);
+            if words.iter().any(|word| word == "--network") {
+                segment(folder.path());
+                continue;
             }
             if words[0] != "labelgs" {
                 let is_known = words[0] == "cargo" || words.iter().any(|word| Path::new(ROOT).join(word).is_file());

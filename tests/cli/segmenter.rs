@@ -1,67 +1,18 @@
-//! The way of the paper from photos to an object, with `tools/segment.py` and a segmenter that knows the truth.
+//! From photos to objects, by a network and by instances of single photos.
+
+#[path = "../../src/segment/tests/tiny.rs"]
+mod tiny;
 
 use assert_cmd::Command;
 use labelgs::files::LabelTable;
+use labelgs::files::image::write_png_rgb8;
 use labelgs::formats::read_model;
 use labelgs::masks::read_mask;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Output;
-
-/// It finds a photo's true mask by the photo's pixels. As segmenters do, it also marks what is around other masks, and
-/// gives masks of one object another place in the list of every photo.
-const SEGMENTER: &str = r#"
-import pathlib
-import random
-import numpy
-from PIL import Image
-
-scene = pathlib.Path(__file__).parent / "scene"
-masks = {}
-for path in (scene / "images").iterdir():
-    masks[numpy.array(Image.open(path).convert("RGB")).tobytes()] = scene / "masks" / (path.stem + ".png")
-
-def ids(photo):
-    return numpy.array(Image.open(masks[photo.tobytes()])).astype(int)
-
-def segment(photo):
-    true = ids(photo)
-    found = [true == value for value in numpy.unique(true) if value != 0] + [true != 0]
-    random.Random(int(photo.sum())).shuffle(found)
-    return [{"segmentation": mask} for mask in found]
-
-def wrong(photo):
-    return [numpy.ones((1, 1), bool)]
-
-number = 3
-"#;
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// Runs the script in a folder.
-fn segments(python: &str, folder: &Path, flags: &[&str]) -> Output {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/segment.py");
-    let mut command = std::process::Command::new(python);
-    command.args(flags.iter().take_while(|flag| **flag == "-S")).arg(script);
-    command.args(flags.iter().skip_while(|flag| **flag == "-S")).current_dir(folder);
-    command.env("PYTHONDONTWRITEBYTECODE", "1").output().expect("it runs")
-}
-
-/// Returns the Python that has what the script needs; packages of the system are not those of a Python of the user's.
-/// Without one, prints a message, or fails where it is required.
-fn python() -> Option<&'static str> {
-    let has = |python: &&str| {
-        let tried = std::process::Command::new(python).args(["-c", "import numpy, PIL.Image"]).output();
-        tried.is_ok_and(|output| output.status.success())
-    };
-    let found = ["python3", "/usr/bin/python3"].into_iter().find(has);
-    if found.is_none() {
-        assert!(std::env::var_os("LABELGS_REQUIRE_PYTHON").is_none(), "python3 with numpy and Pillow is required");
-        eprintln!("skipped: there is no python3 with numpy and Pillow");
-    }
-    found
 }
 
 /// Runs a command in a folder.
@@ -74,58 +25,86 @@ fn labelgs(folder: &Path, line: &str) -> String {
     text(&output.stdout)
 }
 
-/// A scene, and the segmenter beside it.
+/// Runs a command that fails, and returns what it says.
+#[track_caller]
+fn refusal(folder: &Path, line: &str) -> String {
+    let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
+    let output = command.current_dir(folder).args(line.split(' ')).output().expect("it runs");
+    assert!(!output.status.success(), "{line} does not fail");
+    text(&output.stderr)
+}
+
+/// A scene.
 fn place() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     labelgs(folder.path(), "synth scene --preset simple --size 96x72 --views 12 --points 400");
-    std::fs::write(folder.path().join("stub.py"), SEGMENTER).expect("written");
     folder
 }
 
-#[test]
-fn photos_become_an_object_without_masks_by_hand() {
-    let Some(_gpu) = crate::support::device() else { return };
-    let Some(python) = python() else { return };
-    let folder = place();
-    let folder = folder.path();
-    let output = segments(python, folder, &["scene", "-o", "segmented", "--with", "stub:segment"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("12/12"), "{}", text(&output.stdout));
-    labelgs(folder, "train scene --iterations 100 -o plain");
-    labelgs(folder, "masks repair segmented --per-view --model plain --scene scene -o masks");
-    labelgs(folder, "label plain --scene scene --masks masks -o two.ply");
-    labelgs(folder, "label plain --scene scene --masks segmented --per-view -o labelled.ply");
-    let [two, one] = ["two.ply", "labelled.ply"].map(|name| std::fs::read(folder.join(name)).expect("a model"));
-    assert!(two == one, "agreeing on the way gives the same labels as repaired masks");
-    // Pixels of each true object, by the id that the repair gave them.
-    let mut counts: BTreeMap<u16, BTreeMap<u16, u32>> = BTreeMap::new();
-    let mut views = 0;
-    for entry in std::fs::read_dir(folder.join("masks")).expect("masks").flatten() {
-        let name = entry.file_name();
-        if Path::new(&name).extension().is_some_and(|ending| ending == "png") {
-            let [found, truth] =
-                ["masks", "scene/masks"].map(|place| read_mask(folder.join(place).join(&name)).expect("ids"));
-            truth
-                .ids
-                .iter()
-                .zip(&found.ids)
-                .for_each(|(&t, &f)| *counts.entry(t).or_default().entry(f).or_default() += 1);
-            views += 1;
+/// Paints each photo in a flat colour for each object, which the tiny network can tell apart.
+fn paint(folder: &Path) {
+    const COLOURS: [[u8; 3]; 4] = [[40, 40, 40], [255, 40, 40], [40, 255, 40], [60, 60, 255]];
+    for view in 0..12 {
+        let mask = read_mask(folder.join(format!("scene/masks/{view:03}.png"))).expect("ids");
+        let pixels: Vec<[u8; 3]> = mask.ids.iter().map(|&id| COLOURS[usize::from(id)]).collect();
+        write_png_rgb8(folder.join(format!("scene/images/{view:03}.png")), mask.width, mask.height, &pixels)
+            .expect("painted");
+    }
+}
+
+/// Returns for each true object the id with the largest IoU in some masks, and that IoU.
+fn best_ids(folder: &Path, masks: &str) -> BTreeMap<u16, (u16, f64)> {
+    let mut counts: BTreeMap<(u16, u16), u32> = BTreeMap::new();
+    for view in 0..12 {
+        let [found, truth] = [masks, "scene/masks"]
+            .map(|place| read_mask(folder.join(place).join(format!("{view:03}.png"))).expect("ids"));
+        truth.ids.iter().zip(&found.ids).for_each(|(&t, &f)| *counts.entry((t, f)).or_default() += 1);
+    }
+    let sum = |of: &dyn Fn(&(u16, u16)) -> bool| {
+        counts.iter().filter(|(key, _)| of(key)).map(|(_, &count)| count).sum::<u32>()
+    };
+    let mut best: BTreeMap<u16, (u16, f64)> = BTreeMap::new();
+    for (&(truth, found), &both) in counts.iter().filter(|((truth, found), _)| *truth != 0 && *found != 0) {
+        let either = sum(&|key| key.0 == truth) + sum(&|key| key.1 == found) - both;
+        let iou = f64::from(both) / f64::from(either);
+        let known = best.entry(truth).or_insert((found, iou));
+        if iou > known.1 {
+            *known = (found, iou);
         }
     }
-    assert!(views >= 10, "{views} masks");
-    counts.remove(&0);
-    let mut ids = Vec::new();
-    for (object, found) in &counts {
-        let (id, most) = found.iter().max_by_key(|(_, pixels)| **pixels).expect("pixels");
-        let share = f64::from(*most) / f64::from(found.values().sum::<u32>());
-        assert!(*id != 0 && share > 0.9, "object {object}: {found:?}");
-        ids.push(*id);
-    }
-    ids.sort_unstable();
-    ids.dedup();
-    assert_eq!(ids.len(), counts.len(), "objects stay apart: {counts:?}");
-    labelgs(folder, &format!("extract labelled.ply --labels {} -o object.ply", ids[0]));
+    best
+}
+
+#[test]
+fn photos_become_objects_by_a_network_alone() {
+    let Some(_gpu) = crate::support::device() else { return };
+    let folder = place();
+    let folder = folder.path();
+    paint(folder);
+    tiny::write(&folder.join("net"));
+    let make = "masks make scene --network net -o made --grid 5";
+    let said = labelgs(folder, make);
+    assert!(said.contains("in 12 photos, 0 were there"), "{said}");
+    // A stopped run goes on, with what it knows of the photos.
+    let list = folder.join("made/nested/004.json");
+    let before = std::fs::read(&list).expect("a list");
+    std::fs::remove_file(&list).expect("removed");
+    let said = labelgs(folder, make);
+    assert!(said.contains("in 1 photo, 11 were there"), "{said}");
+    assert!(std::fs::read(&list).expect("a list") == before);
+    let refused = refusal(folder, "masks make scene --network net -o made --grid 6");
+    assert!(refused.contains("masks.json") && refused.contains("name a new folder"), "{refused}");
+    let levels = best_ids(folder, "made/objects");
+    assert_eq!(levels.len(), 3, "{levels:?}");
+
+    labelgs(folder, "train scene --iterations 100 -o plain");
+    labelgs(folder, "masks repair made --model plain --scene scene -o repaired");
+    let found = best_ids(folder, "repaired");
+    let ids: BTreeSet<u16> = found.values().map(|(id, _)| *id).collect();
+    // Cells of the network are 1.5 px here, and small things have few.
+    assert!(ids.len() == 3 && found.values().all(|(_, iou)| *iou > 0.6), "{found:?}");
+    labelgs(folder, "label plain --scene scene --masks made -o labelled.ply");
+    labelgs(folder, &format!("extract labelled.ply --labels {} -o object.ply", found[&1].0));
     let [all, object] =
         ["labelled.ply", "object.ply"].map(|name| read_model(folder.join(name)).expect("a model").gaussians);
     assert!(!object.is_empty() && object.len() < all.len() / 2, "{} of {} Gaussians", object.len(), all.len());
@@ -179,52 +158,4 @@ fn names_of_imported_instances_survive_a_repair() {
         (1..names.labels.len()).map(|number| if number == 1 { "thing".to_owned() } else { format!("thing {number}") });
     let expected: Vec<String> = std::iter::once("first thing".to_owned()).chain(things).collect();
     assert_eq!(found, expected);
-}
-
-#[test]
-fn the_help_of_the_segmenter_needs_no_packages() {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/segment.py");
-    let Ok(output) = std::process::Command::new("python3").arg("-S").arg(script).arg("--help").output() else { return };
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("--weights"), "{}", text(&output.stdout));
-}
-
-#[test]
-fn a_segmenter_that_fails_is_told_with_the_remedy() {
-    let Some(python) = python() else { return };
-    let folder = place();
-    let folder = folder.path();
-    let refused = |flags: &[&str], expected: &[&str]| {
-        let output = segments(python, folder, flags);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{flags:?}: {said}");
-        assert!(said.starts_with("segment.py: ") && said.lines().count() == 1, "{said}");
-        expected.iter().for_each(|part| assert!(said.contains(part), "{part}: {said}"));
-    };
-    let scene = ["scene", "-o", "out", "--with"];
-    let with = |more: &[&'static str]| [&scene[..], more].concat();
-    std::fs::write(folder.join("vit_h.pth"), b"no weights").expect("written");
-    refused(&with(&["sam3"]), &["--with sam3: expected segment_anything"]);
-    refused(&with(&["segment_anything"]), &["--weights is missing", "authors of segment_anything"]);
-    refused(&with(&["sam2", "--weights", "x.pt"]), &["there is no file x.pt"]);
-    refused(&with(&["mobile_sam", "--weights", "vit_h.pth"]), &["package mobile_sam cannot be imported", "install it"]);
-    refused(&with(&["nothing:segment"]), &["package nothing cannot be imported"]);
-    refused(&with(&["stub:nothing"]), &["stub has no function nothing"]);
-    refused(&with(&["stub:number"]), &["stub has no function number"]);
-    refused(&with(&["stub:wrong"]), &["000.png", "the shape (1, 1) and the photo (72, 96)"]);
-    refused(&["scene/images", "-o", "out", "--with", "stub:ids"], &["has no photos in images"]);
-    // Without the folders of packages.
-    refused(
-        &["-S", "scene", "-o", "out", "--with", "stub:ids"],
-        &["package numpy cannot be imported", "python3-numpy"],
-    );
-    assert!(!folder.join("out").exists(), "nothing was written");
-    // Ids of pictures come back as they are, in the order of their size; a second run has nothing to do.
-    assert!(segments(python, folder, &with(&["stub:ids"])).status.success());
-    let output = segments(python, folder, &with(&["stub:wrong"]));
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let [found, truth] =
-        ["out", "scene/masks"].map(|place| read_mask(folder.join(place).join("003.png")).expect("ids"));
-    assert_eq!(found.objects().len(), truth.objects().len());
-    assert!(found.ids.iter().zip(&truth.ids).all(|(a, b)| (*a == 0) == (*b == 0)));
 }
