@@ -14,7 +14,7 @@ const CARD: [(&str, &str); 6] = [
     ("LABELGS_WALK", "group"),
     ("LABELGS_BLEND", "group"),
     ("LABELGS_SORT", "sweep"),
-    ("LABELGS_UPDATE", "lazy"),
+    ("LABELGS_UPDATE", "split"),
 ];
 
 /// Pictures of a model.

@@ -175,6 +175,7 @@ fn a_training_has_memory_for_votes_only_while_it_counts_them() {
         Engine::predict(&gpu, &size, SchedulerOptions::default()).expect("it fits").total
     };
     let (with, without) = (total(100_000, 100), total(100_000, 0));
-    assert!(with > without && with - without < 8 * 100 * 100_000 / 2, "{with} {without}");
+    // Gradients alone are 60 floats a Gaussian.
+    assert!(with > without && with - without < (8 * 100 - 4 * 60) * 100_000, "{with} {without}");
     assert!(total(100_000, 10) - without < 100_000, "few votes fit where the scratch memory of a step was");
 }
