@@ -97,7 +97,8 @@ fn photos_become_objects_by_a_network_alone() {
     let levels = best_ids(folder, "made/objects");
     assert_eq!(levels.len(), 3, "{levels:?}");
 
-    labelgs(folder, "train scene --iterations 100 -o plain");
+    // Flat colours are learned slowly.
+    labelgs(folder, "train scene --iterations 300 -o plain");
     labelgs(folder, "masks repair made --model plain --scene scene -o repaired");
     let found = best_ids(folder, "repaired");
     let ids: BTreeSet<u16> = found.values().map(|(id, _)| *id).collect();

@@ -84,8 +84,11 @@ fn the_selftest_passes_with_four_storage_buffers() {
 fn a_model_that_four_bindings_do_not_hold_is_refused() {
     let Some(_turn) = device() else { return };
     let mut place = Place::new();
+    let (scene, out) = (place.text("many"), place.text("out"));
+    let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "1500"];
+    succeeded(&place.labelgs(&made));
     place.choose(&[FEW, ("LABELGS_LIMIT_SSBO", "160K")]);
-    let output = place.trained("out", &["--iterations", "1"]);
+    let output = place.labelgs(&["train", &scene, "--iterations", "1", "-o", &out]);
     let said = stderr(&output);
     assert!(!output.status.success() && said.contains("storage bindings of this device"), "{said}");
 }

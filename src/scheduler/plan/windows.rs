@@ -115,7 +115,7 @@ pub(super) fn check(
             if needed > u64::from(limits.windows) {
                 let windows = limits.windows;
                 return Err(Error::OutOfMemory {
-                    what: format!("the buffers of {}", pass.label),
+                    what: format!("the set of buffers of {}", pass.label),
                     needed: needed * limits.max_storage_range,
                     limit_name: format!("what the {windows} storage bindings of this device hold"),
                     limit: u64::from(windows) * limits.max_storage_range,
