@@ -3,6 +3,8 @@
 //! [`label_by_votes`] labels a trained model by the votes of all views, [`label_by_lift`] by the rule of the paper.
 //! [`occlusion`] finds which objects hide which, and [`masks`] makes the masks of different views agree.
 
+#[cfg(feature = "network")]
+pub mod click;
 pub mod masks;
 pub mod occlusion;
 pub mod vote;

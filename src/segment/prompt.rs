@@ -29,6 +29,17 @@ impl Prompt {
         Self { on: vec![place], ..Self::default() }
     }
 
+    /// Returns the prompt for a photo of another size, whose pixels are the places times `scale`.
+    pub fn scaled(&self, scale: [f32; 2]) -> Self {
+        let place = |place: &Place| [place[0] * scale[0], place[1] * scale[1]];
+        let places = |places: &[Place]| places.iter().map(place).collect();
+        Self {
+            on: places(&self.on),
+            off: places(&self.off),
+            area: self.area.map(|corners| corners.map(|corner| place(&corner))),
+        }
+    }
+
     /// Returns the points for the decoder, in its pixels, and what each is: 1 on, 0 off, 2 and 3 corners, -1 padding.
     pub(crate) fn tensors(&self, frame: &Frame) -> (Vec<f32>, Vec<f32>) {
         let on = self.on.iter().map(|place| (place, 1.0)).chain(self.off.iter().map(|place| (place, 0.0)));
@@ -107,6 +118,17 @@ impl Frame {
         };
         let picture = RgbImage::from_fn(photo.width, photo.height, at);
         resize(&picture, self.covered.0, self.covered.1, FilterType::Triangle)
+    }
+
+    /// Returns the pixels of a picture of the photo, of any size, in which logits on the grid are positive.
+    pub fn drawn(&self, logits: &[f32], (width, height): (u32, u32)) -> Vec<bool> {
+        let step = [self.size.0 as f32 / width as f32, self.size.1 as f32 / height as f32];
+        let grid = self.grid();
+        let inside = |at: u32| {
+            let place = [((at % width) as f32 + 0.5) * step[0], ((at / width) as f32 + 0.5) * step[1]];
+            self.logit(grid, &|at| logits[at], place) > 0.0
+        };
+        (0..width * height).map(inside).collect()
     }
 
     /// Returns the logit of a mask at a place of the photo, px, between the centres of cells.

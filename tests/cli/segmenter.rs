@@ -109,6 +109,35 @@ fn photos_become_objects_by_a_network_alone() {
     let [all, object] =
         ["labelled.ply", "object.ply"].map(|name| read_model(folder.join(name)).expect("a model").gaussians);
     assert!(!object.is_empty() && object.len() < all.len() / 2, "{} of {} Gaussians", object.len(), all.len());
+    one_click_is_one_object(folder);
+}
+
+/// Clicks on the object of which view 003 shows most, and compares with what all true masks say.
+fn one_click_is_one_object(folder: &Path) {
+    let mask = read_mask(folder.join("scene/masks/003.png")).expect("ids");
+    let pixels = |id: u16| mask.ids.iter().enumerate().filter(move |(_, found)| **found == id).map(|(at, _)| at);
+    let object = mask.objects().into_iter().max_by_key(|&id| pixels(id).count()).expect("an object");
+    let middle = pixels(object).nth(pixels(object).count() / 2).expect("a pixel");
+    let (x, y) = (middle as u32 % mask.width, middle as u32 / mask.width);
+    let said = labelgs(
+        folder,
+        &format!("label plain --scene scene --network net --click 003:{x},{y} --name it -o clicked.ply"),
+    );
+    assert!(said.contains("object 1 (it)"), "{said}");
+    labelgs(folder, "label plain --scene scene --masks scene/masks -o true.ply");
+    let labels = |name: &str| read_model(folder.join(name)).expect("a model").gaussians.labels.expect("labels");
+    let (clicked, truth) = (labels("clicked.ply"), labels("true.ply"));
+    let count = |of: &dyn Fn(bool, bool) -> bool| {
+        clicked.iter().zip(&truth).filter(|(a, b)| of(**a == 1, **b == u32::from(object))).count() as f64
+    };
+    let iou = count(&|a, b| a && b) / count(&|a, b| a || b);
+    assert!(iou > 0.6, "{iou}");
+    // Labels of before stay, and a place that shows nothing is told.
+    labelgs(folder, &format!("label true.ply --scene scene --network net --click 003:{x},{y} -o both.ply"));
+    let both = labels("both.ply");
+    assert!(truth.iter().zip(&both).all(|(before, after)| before == after || *after == 4));
+    let said = refusal(folder, "label plain --scene scene --network net --click 003:999,0 -o no.ply");
+    assert!(said.contains("--click: 999,0 is outside of 003.png, which has 96 x 72 px"), "{said}");
 }
 
 #[test]

@@ -7,7 +7,7 @@
 mod choose;
 mod group;
 mod pattern;
-mod sight;
+pub(crate) mod sight;
 
 use super::associate::Segment;
 use crate::engine::Engine;
@@ -63,4 +63,84 @@ pub fn painted(objects: &[Object], view: usize, masks: &NestedMasks) -> Option<L
         }
     }
     Some(painted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ops::Range;
+
+    /// A scene of Gaussians that all views show in a row, a pixel each, with masks as ranges and how sure they are.
+    fn scene(gaussians: usize, views: &[Vec<(Range<usize>, f64)>]) -> Scene {
+        let sights = views.iter().map(|masks| {
+            let layer = |(number, (range, _)): (usize, &(Range<usize>, f64))| {
+                let id = |at: usize| if range.contains(&at) { number as u16 + 1 } else { 0 };
+                LabelMap { width: gaussians as u32, height: 1, ids: (0..gaussians).map(id).collect() }
+            };
+            let nested = NestedMasks {
+                layers: masks.iter().enumerate().map(layer).collect(),
+                qualities: masks.iter().map(|(_, quality)| *quality).collect(),
+            };
+            Sight::new(&(0..gaussians as i32).collect::<Vec<_>>(), &nested)
+        });
+        Scene::new(sights.collect(), gaussians)
+    }
+
+    /// Returns the Gaussians of the chosen objects, in order.
+    fn chosen(scene: &Scene, views: usize) -> Vec<Range<u32>> {
+        let groups = choose::confirmed(scene.groups(), views);
+        let range = |at: usize| groups[at].rows[0]..groups[at].rows[groups[at].rows.len() - 1] + 1;
+        choose::objects(scene, &groups).into_iter().map(range).collect()
+    }
+
+    #[test]
+    fn a_whole_stands_for_its_parts_and_a_sheet_does_not() {
+        // A thing of 20, of which two parts of 6 are found everywhere; and a sheet under it and another thing, of which
+        // the network is less sure.
+        let view = vec![(10..30, 0.5), (10..16, 0.45), (20..26, 0.45), (0..60, 0.15), (40..55, 0.6)];
+        let scene = scene(80, &vec![view; 4]);
+        assert_eq!(chosen(&scene, 4), vec![10..30, 40..55]);
+    }
+
+    #[test]
+    fn what_other_views_do_not_confirm_is_no_object() {
+        let [both, one] = [vec![(0..10, 0.6), (30..40, 0.9)], vec![(0..10, 0.6)]];
+        let scene = scene(50, &[one.clone(), both, one.clone(), one.clone(), one]);
+        assert_eq!(chosen(&scene, 5), vec![0..10]);
+    }
+
+    #[test]
+    fn a_large_part_that_all_views_confirm_is_an_object_beside_the_rest() {
+        let view = |part: f64| vec![(10..40, 0.6), (30..40, part)];
+        assert_eq!(chosen(&scene(60, &vec![view(0.7); 4]), 4), vec![10..40, 30..40], "it lies on top");
+        assert_eq!(chosen(&scene(60, &vec![view(0.4); 4]), 4), vec![10..40], "not sure enough");
+    }
+
+    #[test]
+    fn a_tight_and_a_loose_mask_of_a_thing_are_one_group() {
+        let scene = scene(60, &vec![vec![(10..30, 0.5), (10..34, 0.6)]; 3]);
+        assert_eq!(scene.groups().len(), 1);
+        assert_eq!(chosen(&scene, 3), vec![10..34]);
+    }
+
+    #[test]
+    fn tiles_of_a_floor_are_no_objects_and_two_mats_on_it_are() {
+        // Tiles of 9 Gaussians in a plane, then a cube of 27 on it.
+        let floor = |tiles: usize| {
+            let mut means: Vec<[f32; 3]> = Vec::new();
+            for tile in 0..tiles {
+                let (x, y) = ((tile % 4) as f32 * 4.0, (tile / 4) as f32 * 4.0);
+                means.extend((0..9).map(|at| [x + (at % 3) as f32, y + (at / 3) as f32, 0.0]));
+            }
+            means.extend((0..27).map(|at| [4.0 + (at % 3) as f32, (at / 3 % 3) as f32, 1.0 + (at / 9) as f32]));
+            let masks = (0..tiles).map(|tile| (tile * 9..tile * 9 + 9, 0.8)).chain([(tiles * 9..tiles * 9 + 27, 0.8)]);
+            (scene(means.len(), &vec![masks.collect(); 3]), means)
+        };
+        let (many, means) = floor(12);
+        let groups = pattern::without_patterns(&many, choose::confirmed(many.groups(), 3), &means);
+        assert_eq!(groups.iter().map(|group| group.rows.len()).collect::<Vec<_>>(), [27]);
+        let (few, means) = floor(2);
+        let groups = pattern::without_patterns(&few, choose::confirmed(few.groups(), 3), &means);
+        assert_eq!(groups.len(), 3);
+    }
 }

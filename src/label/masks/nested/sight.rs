@@ -8,7 +8,7 @@ const OWNED_SHARE_MIN: f32 = 0.5;
 
 /// The Gaussians that are the main ones of pixels of a view.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sight {
+pub(crate) struct Sight {
     /// Row and number of pixels, by row.
     pub seen: Vec<(u32, f32)>,
     /// For each of these, where its masks begin in `owners`; one more at the end.
@@ -23,7 +23,7 @@ pub(super) struct Sight {
 
 impl Sight {
     /// Reads a view: the main Gaussian of each pixel, -1 for none, and masks of that size.
-    pub(super) fn new(main: &[i32], masks: &NestedMasks) -> Self {
+    pub(crate) fn new(main: &[i32], masks: &NestedMasks) -> Self {
         let mut seen: Vec<(u32, f32)> = Vec::new();
         let mut pixels: Vec<(u32, u32)> =
             main.iter().zip(0..).filter_map(|(&row, at)| Some((u32::try_from(row).ok()?, at))).collect();
@@ -65,7 +65,7 @@ impl Sight {
 
     /// Returns how the masks of two views overlap, over the Gaussians that both see: numbers of both masks, the weight that
     /// both own and the weight that either owns.
-    pub(super) fn overlaps(&self, other: &Self) -> Vec<(u16, u16, Overlap)> {
+    pub(crate) fn overlaps(&self, other: &Self) -> Vec<(u16, u16, Overlap)> {
         let (rows, columns) = (self.qualities.len(), other.qualities.len());
         let (mut both, mut first, mut second) = (vec![0.0; rows * columns], vec![0.0; rows], vec![0.0; columns]);
         let (mut a, mut b) = (0, 0);

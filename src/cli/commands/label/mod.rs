@@ -1,5 +1,8 @@
 //! `labelgs label`.
 
+#[cfg(feature = "network")]
+mod click;
+
 use crate::cli::commands::masks::repair::table;
 use crate::cli::support::nested_masks::{MaskFolders, object_masks};
 use crate::cli::support::parsers::{model_file, near};
@@ -20,7 +23,7 @@ use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -36,7 +39,9 @@ pub struct LabelArgs {
     /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
     /// together choose which of the nested masks are objects.
     #[arg(long, value_name = "DIR")]
-    pub masks: PathBuf,
+    #[cfg_attr(feature = "network", arg(required_unless_present = "click"))]
+    #[cfg_attr(not(feature = "network"), arg(required = true))]
+    pub masks: Option<PathBuf>,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
     /// `masks repair`.
     #[arg(long)]
@@ -46,6 +51,9 @@ pub struct LabelArgs {
     pub output: PathBuf,
     #[command(flatten)]
     pub write: WriteArgs,
+    #[cfg(feature = "network")]
+    #[command(flatten)]
+    pub clicks: click::ClickArgs,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
     /// which it is the main Gaussian of a pixel.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
@@ -66,13 +74,19 @@ pub struct LabelArgs {
 
 /// Gives the Gaussians of a trained model their labels.
 pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+    let Some(folder) = &args.masks else {
+        #[cfg(feature = "network")]
+        return click::run(args, context);
+        #[cfg(not(feature = "network"))]
+        return Err(Error::usage("--masks", "is missing"));
+    };
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let masks = MaskFolders::of(&args.masks)?;
+    let masks = MaskFolders::of(folder)?;
     let mut dataset = open_scene(&args.scene, &args.reading, masks.pictures.clone(), [0.0; 3], true)?;
     dataset.train.retain(|view| view.mask.is_some() || masks.lists.is_some());
     if dataset.train.is_empty() {
         return Err(Error::data(
-            &args.masks,
+            folder,
             "",
             "no training view has a mask here; check the names of the masks and --test-every",
         ));
@@ -87,8 +101,8 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         dataset.train.retain(|view| view.mask.is_some());
     }
     let names = match args.per_view || masks.lists.is_some() {
-        true => Some(make_agree(args, near, &gpu, &model, (&mut dataset.train, masks.lists.is_some()))?),
-        false => LabelTable::of_folder(&args.masks)?,
+        true => Some(make_agree(folder, near, &gpu, &model, (&mut dataset.train, masks.lists.is_some()))?),
+        false => LabelTable::of_folder(folder)?,
     };
     let views: Vec<&View> = dataset.train.iter().collect();
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
@@ -124,7 +138,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
 /// Replaces the masks of the views by those whose ids agree, and returns their names. Masks of objects that all views chose do
 /// agree, and are mended.
 fn make_agree(
-    args: &LabelArgs,
+    folder: &Path,
     near: f32,
     gpu: &Arc<Gpu>,
     model: &Gaussians,
@@ -141,7 +155,7 @@ fn make_agree(
         }
         false => agree(&mut engine, model, &borrowed, how, &mut tick)?.0,
     };
-    let names = table(&args.masks, true, &borrowed, &masks)?;
+    let names = table(folder, true, &borrowed, &masks)?;
     views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
     Ok(names)
 }

@@ -1,0 +1,267 @@
+//! An object from a click: what a network sees at a place of one photo, found again in the other views through the model.
+
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::label::masks::nested::{NestedMasks, sight::Sight};
+use crate::label::vote::ballot::{Sweep, Voter, sweep};
+use crate::label::vote::decide::decide;
+use crate::render::{Parts, RenderOptions, Rendered, label_map, render};
+use crate::scene::{Gaussians, LabelMap, Pixels, View};
+use crate::segment::{Answer, Features, Network, Place, Prompt};
+use glam::{DVec2, DVec3};
+
+/// Views that are asked for a first answer, and at most.
+const FIRST_VIEWS: usize = 12;
+const ALL_VIEWS: usize = 24;
+/// Difference of depths, as a share, up to which a view sees the point and not something in front of it.
+const DEPTH_SHARE_MAX: f64 = 0.04;
+/// Overlap of the masks of two views above which both show the object.
+const AGREEING_MIN: f64 = 0.5;
+/// IoU of a mask with what the model shows of the object above which it counts in the second round.
+const CONFIRMING_IOU_MIN: f64 = 0.6;
+/// Opacity below which a place shows no surface.
+const OPAQUE_MIN: f32 = 0.5;
+/// The object, in masks and labels of this work.
+const OBJECT: u16 = 1;
+
+/// A click in a photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Click {
+    /// Index of the view.
+    pub view: usize,
+    /// Place, px of the view.
+    pub place: Place,
+    /// On the object, or on what does not belong to it.
+    pub is_on: bool,
+}
+
+/// What is asked, and of whom.
+pub struct Clicking<'a> {
+    /// The engine, with the model and memory for two columns of votes.
+    pub engine: &'a mut Engine,
+    /// The model.
+    pub model: &'a Gaussians,
+    /// The views with their photos.
+    pub views: &'a [&'a View],
+    /// Near plane, world units.
+    pub near: f32,
+    /// The network.
+    pub network: &'a Network,
+    /// Returns the features of a view's photo.
+    pub features: &'a dyn Fn(&View) -> Result<Features>,
+}
+
+/// A view that is asked.
+struct Asked {
+    view: usize,
+    /// Masks at the size of the view.
+    masks: Vec<LabelMap>,
+    qualities: Vec<f64>,
+    sight: Sight,
+}
+
+impl Clicking<'_> {
+    /// Returns which Gaussians belong to the object. The first click must be on it. `tick` is called for each photo that is
+    /// asked.
+    pub fn object(&mut self, clicks: &[Click], tick: &mut dyn FnMut()) -> Result<Vec<bool>> {
+        let first = clicks.iter().find(|click| click.is_on);
+        let first = *first.ok_or_else(|| Error::usage("click", "no click is on the object; at least one must be"))?;
+        let mut shown: Vec<Option<Rendered>> = vec![None; self.views.len()];
+        let mut points = Vec::new();
+        for click in clicks {
+            points.push((self.point(*click, &mut shown)?, click.is_on));
+        }
+        let target = points.iter().find(|(_, is_on)| *is_on).map_or(DVec3::ZERO, |(point, _)| *point);
+        let order = self.by_direction(first.view, target);
+        let mut asked = Vec::new();
+        for &view in &order {
+            if asked.len() == FIRST_VIEWS {
+                break;
+            }
+            if let Some(prompt) = self.prompt(view, &points, &mut shown)? {
+                asked.push(self.ask(view, &prompt, shown[view].as_ref())?);
+                tick();
+            }
+        }
+        let chosen = agreeing(&asked);
+        self.vote(&chosen)?;
+        // What the model shows now is asked again, in more views.
+        let mut confirmed = Vec::new();
+        for &view in order.iter().take(ALL_VIEWS) {
+            let map = label_map(self.engine, &self.views[view].camera, self.near)?;
+            let Some(mut prompt) = prompt_of(&map) else { continue };
+            let off = points.iter().filter(|(_, is_on)| !is_on);
+            for (point, _) in off {
+                prompt.off.extend(self.place_of(view, *point, &mut shown)?);
+            }
+            let answer = self.ask(view, &prompt, None)?;
+            tick();
+            let best = answer.masks.into_iter().map(|mask| (iou(&mask, &map), mask));
+            if let Some((found, mask)) = best.max_by(|a, b| a.0.total_cmp(&b.0))
+                && found >= CONFIRMING_IOU_MIN
+            {
+                confirmed.push((view, mask));
+            }
+        }
+        // Where no view confirms, the first answer stands.
+        if !confirmed.is_empty() {
+            return self.vote(&confirmed);
+        }
+        self.vote(&chosen)
+    }
+
+    /// Returns the point of the surface at a click, relative to the origin of the model.
+    fn point(&mut self, click: Click, shown: &mut [Option<Rendered>]) -> Result<DVec3> {
+        let view = self.views[click.view];
+        let place = DVec2::new(f64::from(click.place[0]), f64::from(click.place[1]));
+        let depth = self.depth(click.view, place, shown)?.ok_or_else(|| {
+            let problem = format!("{}:{},{} shows nothing of the model", view.name, click.place[0], click.place[1]);
+            Error::usage("click", problem)
+        })?;
+        Ok(view.camera.unproject(place, depth))
+    }
+
+    /// Returns the depth of the surface at a place of a view, if there is one.
+    fn depth(&mut self, view: usize, place: DVec2, shown: &mut [Option<Rendered>]) -> Result<Option<f64>> {
+        let camera = &self.views[view].camera;
+        if shown[view].is_none() {
+            let parts = Parts { depth: true, main: true, labels: false };
+            let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.near, parts) };
+            shown[view] = Some(render(self.engine, camera, &options)?);
+        }
+        let inside =
+            place.x >= 0.0 && place.y >= 0.0 && place.x < f64::from(camera.width) && place.y < f64::from(camera.height);
+        let at = (place.y.max(0.0) as u32 * camera.width + place.x.max(0.0) as u32) as usize;
+        let found = shown[view].as_ref().filter(|_| inside).map(|found| (found.depth[at], found.alpha[at]));
+        Ok(found.filter(|(_, alpha)| *alpha >= OPAQUE_MIN).map(|(depth, alpha)| f64::from(depth / alpha)))
+    }
+
+    /// Returns where a view sees a point, if nothing hides it.
+    fn place_of(&mut self, view: usize, point: DVec3, shown: &mut [Option<Rendered>]) -> Result<Option<Place>> {
+        let camera = &self.views[view].camera;
+        let z = camera.to_camera(point).z;
+        let Some(place) = camera.sees(point) else { return Ok(None) };
+        let depth = self.depth(view, place, shown)?;
+        let is_seen = depth.is_some_and(|depth| (depth - z).abs() <= DEPTH_SHARE_MAX * z);
+        Ok(is_seen.then_some([place.x as f32, place.y as f32]))
+    }
+
+    /// Returns the prompt of a view that sees a point of the object.
+    fn prompt(
+        &mut self,
+        view: usize,
+        points: &[(DVec3, bool)],
+        shown: &mut [Option<Rendered>],
+    ) -> Result<Option<Prompt>> {
+        let mut prompt = Prompt::default();
+        for &(point, is_on) in points {
+            let place = self.place_of(view, point, shown)?;
+            if is_on { prompt.on.extend(place) } else { prompt.off.extend(place) }
+        }
+        Ok((!prompt.on.is_empty()).then_some(prompt))
+    }
+
+    /// Returns the views by the angle at the point between them and one of them.
+    fn by_direction(&self, first: usize, point: DVec3) -> Vec<usize> {
+        let toward = |view: usize| (self.views[view].camera.centre() - point).normalize_or_zero();
+        let mut order: Vec<usize> = (0..self.views.len()).collect();
+        order.sort_by(|&a, &b| {
+            let near = |view: usize| toward(view).dot(toward(first));
+            (b == first).cmp(&(a == first)).then(near(b).total_cmp(&near(a)))
+        });
+        order
+    }
+
+    fn ask(&mut self, view: usize, prompt: &Prompt, shown: Option<&Rendered>) -> Result<Asked> {
+        let (camera, features) = (&self.views[view].camera, (self.features)(self.views[view])?);
+        let prepared = self.network.prepare(&features)?;
+        let scale = [features.photo.0 as f32 / camera.width as f32, features.photo.1 as f32 / camera.height as f32];
+        let Answer { masks, scores } = self.network.ask(&prepared, &prompt.scaled(scale))?;
+        let size = (camera.width, camera.height);
+        let draw = |logits: &Vec<f32>| {
+            let inside = prepared.frame.drawn(logits, size);
+            LabelMap { width: size.0, height: size.1, ids: inside.into_iter().map(u16::from).collect() }
+        };
+        let masks: Vec<LabelMap> = masks.iter().map(draw).collect();
+        let qualities: Vec<f64> = scores.iter().map(|score| f64::from(*score).clamp(0.0, 1.0)).collect();
+        let numbered = masks
+            .iter()
+            .zip(1..)
+            .map(|(mask, number)| LabelMap { ids: mask.ids.iter().map(|id| id * number).collect(), ..mask.clone() });
+        let nested = NestedMasks { layers: numbered.collect(), qualities: qualities.clone() };
+        let sight = shown.map_or_else(Sight::default, |shown| Sight::new(&shown.top_id, &nested));
+        Ok(Asked { view, masks, qualities, sight })
+    }
+
+    /// Labels the model in the engine by masks of views, and returns which Gaussians have the label.
+    fn vote(&mut self, masks: &[(usize, LabelMap)]) -> Result<Vec<bool>> {
+        let pixels: Vec<Pixels<LabelMap>> = masks.iter().map(|(_, mask)| mask.clone().into()).collect();
+        let voters: Vec<Voter> =
+            masks.iter().zip(&pixels).map(|((view, _), mask)| Voter::of(self.views[*view], mask)).collect();
+        let decision = decide(&sweep(self.engine, &voters, Sweep::new(self.near, 0))?, &self.model.means)?;
+        self.engine.set_labels(&decision.labels)?;
+        Ok(decision.labels.iter().map(|&label| label == u32::from(OBJECT)).collect())
+    }
+}
+
+/// Chooses among the masks of the first view, which show a part, the object or more, the one on which the other views agree
+/// most, and returns it with theirs.
+fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
+    let Some((first, others)) = asked.split_first() else { return Vec::new() };
+    let mut best: (f64, Vec<(usize, LabelMap)>) = (-1.0, Vec::new());
+    for (level, mask) in first.masks.iter().enumerate() {
+        let (mut found, mut sum) = (vec![(first.view, mask.clone())], 0.0);
+        for other in others {
+            let overlaps = first.sight.overlaps(&other.sight).into_iter();
+            let own = overlaps.filter(|(ours, ..)| usize::from(*ours) == level);
+            let Some((_, theirs, overlap)) = own.max_by(|a, b| a.2.ratio().total_cmp(&b.2.ratio())) else { continue };
+            if overlap.ratio() >= AGREEING_MIN {
+                sum += overlap.ratio();
+                found.push((other.view, other.masks[usize::from(theirs)].clone()));
+            }
+        }
+        let agreement = first.qualities[level] * (1.0 + sum) / (1 + others.len()) as f64;
+        if agreement > best.0 {
+            best = (agreement, found);
+        }
+    }
+    best.1
+}
+
+fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
+    let count =
+        |of: &dyn Fn(bool, bool) -> bool| a.ids.iter().zip(&b.ids).filter(|(a, b)| of(**a != 0, **b != 0)).count();
+    count(&|a, b| a && b) as f64 / count(&|a, b| a || b).max(1) as f64
+}
+
+/// Returns the box around the pixels of the object and the one of them that is farthest from their border.
+fn prompt_of(map: &LabelMap) -> Option<Prompt> {
+    let (width, height) = (map.width as usize, map.height as usize);
+    let mut distance: Vec<u32> = map.ids.iter().map(|&id| if id == OBJECT { u32::MAX / 2 } else { 0 }).collect();
+    // City-block distance in two passes; the border of the picture counts as outside.
+    for y in 0..height {
+        for x in 0..width {
+            let up = if y > 0 { distance[(y - 1) * width + x] } else { 0 };
+            let left = if x > 0 { distance[y * width + x - 1] } else { 0 };
+            let at = y * width + x;
+            distance[at] = distance[at].min(up + 1).min(left + 1);
+        }
+    }
+    let (mut best, mut corner) = ((0, 0), [[f32::MAX; 2], [0.0_f32; 2]]);
+    for y in (0..height).rev() {
+        for x in (0..width).rev() {
+            let down = if y + 1 < height { distance[(y + 1) * width + x] } else { 0 };
+            let right = if x + 1 < width { distance[y * width + x + 1] } else { 0 };
+            let at = y * width + x;
+            distance[at] = distance[at].min(down + 1).min(right + 1);
+            if distance[at] > 0 && map.ids[at] == OBJECT {
+                best = best.max((distance[at], at));
+                let (left, top) = (x as f32, y as f32);
+                corner[0] = [corner[0][0].min(left), corner[0][1].min(top)];
+                corner[1] = [corner[1][0].max(left + 1.0), corner[1][1].max(top + 1.0)];
+            }
+        }
+    }
+    let place = [(best.1 % width) as f32 + 0.5, (best.1 / width) as f32 + 0.5];
+    (best.0 > 1).then(|| Prompt { on: vec![place], off: Vec::new(), area: Some(corner) })
+}
