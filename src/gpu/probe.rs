@@ -19,8 +19,6 @@ impl Capabilities {
         // SAFETY: the handle belongs to this instance; here and below, the structs match the device's version.
         let core = unsafe { instance.get_physical_device_properties(physical) };
         let version = core.api_version;
-        let api_version =
-            (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
         let extensions = vk_call("vkEnumerateDeviceExtensionProperties", || unsafe {
             instance.enumerate_device_extension_properties(physical)
         })?;
@@ -28,8 +26,8 @@ impl Capabilities {
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
         let hidden = Hidden::by_env()?;
-        let has_statistics = has(ash::khr::pipeline_executable_properties::NAME);
-        let mut features = features(instance, physical, has_size_control, has_statistics);
+        let statistics = has(ash::khr::pipeline_executable_properties::NAME);
+        let mut features = features(instance, physical, has_size_control, statistics);
         hidden.features(&mut features);
         let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
         let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
@@ -62,7 +60,7 @@ impl Capabilities {
             index,
             name: text(core.device_name_as_c_str()),
             kind: kind(core.device_type),
-            api_version,
+            api_version: version_parts(version),
             driver_name: text(twelve.driver_name_as_c_str()),
             driver_info: text(twelve.driver_info_as_c_str()),
             uuid: eleven.device_uuid,
@@ -80,6 +78,11 @@ impl Capabilities {
         }
         Ok(found)
     }
+}
+
+/// Returns major, minor and patch number of a version.
+fn version_parts(version: u32) -> (u32, u32, u32) {
+    (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version))
 }
 
 /// Queries the known features of the device.

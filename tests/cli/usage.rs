@@ -214,7 +214,7 @@ fn a_flag_has_one_heading() {
 }
 
 /// A value other than the default for each setting; none for a flag that needs none.
-const TYPED: [(&str, &str); 59] = [
+const TYPED: [(&str, &str); 60] = [
     ("--iterations", "7"),
     ("--max-resolution", "99"),
     ("--set", "start_size=0.7"),
