@@ -1,7 +1,7 @@
 //! An object from a click: what a network sees at a place of one photo, found again in the other views through the model.
 
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::label::masks::nested::{NestedMasks, sight::Sight};
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::decide;
@@ -65,7 +65,8 @@ impl Clicking<'_> {
     /// asked.
     pub fn object(&mut self, clicks: &[Click], tick: &mut dyn FnMut()) -> Result<Vec<bool>> {
         let first = clicks.iter().find(|click| click.is_on);
-        let first = *first.ok_or_else(|| Error::usage("click", "no click is on the object; at least one must be"))?;
+        let first =
+            *first.ok_or_else(|| Error::usage(Setting("click"), "no click is on the object; at least one must be"))?;
         let mut shown: Vec<Option<Rendered>> = vec![None; self.views.len()];
         let mut points = Vec::new();
         for click in clicks {
@@ -116,7 +117,7 @@ impl Clicking<'_> {
         let place = DVec2::new(f64::from(click.place[0]), f64::from(click.place[1]));
         let depth = self.depth(click.view, place, shown)?.ok_or_else(|| {
             let problem = format!("{}:{},{} shows nothing of the model", view.name, click.place[0], click.place[1]);
-            Error::usage("click", problem)
+            Error::usage(Setting("click"), problem)
         })?;
         Ok(view.camera.unproject(place, depth))
     }
