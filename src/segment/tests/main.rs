@@ -7,7 +7,7 @@ use labelgs_scene::{LabelMap, Photo};
 use labelgs_segment::{FeatureCache, Features, Level, Network, Prompt, Search, masks_of_photo};
 use std::path::Path;
 
-const SEARCH: Search = Search { grid: 5, min_score: 0.7, min_stability: 0.5 };
+const SEARCH: Search = Search { grid: 8, min_score: 0.7, min_stability: 0.5 };
 
 fn network(folder: &Path) -> Network {
     tiny::write(folder);
@@ -87,7 +87,7 @@ fn masks_do_not_depend_on_threads_and_levels_show_them() {
 fn features_on_the_disk_are_those_of_the_network() {
     let folder = tempfile::tempdir().expect("folder");
     let network = network(&folder.path().join("network"));
-    let cache = FeatureCache::new(&folder.path().join("cache"), &network);
+    let cache = FeatureCache::new(Some(&folder.path().join("cache")), &network);
     let photo = photo(80, 60);
     let fresh = cache.of(&network, &photo).expect("features");
     assert_eq!(cache.of(&network, &photo).expect("features"), fresh);
