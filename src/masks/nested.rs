@@ -3,8 +3,8 @@
 use super::mask_folder::png_key;
 use super::rle::Rle;
 use super::sam::{LIST, annotations, is_list, of_photos};
-use labelgs_files::atomic;
 use labelgs_files::names::below;
+use labelgs_files::{atomic, label_table};
 use labelgs_scene::{Error, LabelMap, Result};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -14,8 +14,7 @@ use std::path::{Path, PathBuf};
 pub struct NestedMasks {
     /// Numbers of masks, from 1; 0 where none is. All layers have one size.
     pub layers: Vec<LabelMap>,
-    /// How sure each mask is, 0 to 1: by the power 4 of score times stability, so that a whole outweighs its parts only if it is
-    /// as sure as they are.
+    /// How far each mask is to be trusted ([`quality`]).
     pub qualities: Vec<f64>,
 }
 
@@ -36,13 +35,19 @@ impl NestedMasks {
     }
 }
 
+/// Returns how far a mask is to be trusted, 0 to 1, from its score times its stability. The power sets good masks apart from
+/// middling ones, so that a whole stands for its parts only if it is as sure as they are.
+pub fn quality(sure: f64) -> f64 {
+    sure.clamp(0.0, 1.0).powi(4)
+}
+
 /// True if a folder has lists of masks and no pictures.
 pub fn has_lists(folder: &Path) -> Result<bool> {
     let files = below(folder)?;
     if files.iter().any(|file| png_key(file).is_some()) {
         return Ok(false);
     }
-    let list = files.iter().find(|file| file.ends_with(LIST) && !file.ends_with("labels.json"));
+    let list = files.iter().find(|file| file.ends_with(LIST) && !file.ends_with(label_table::FILE));
     list.map_or(Ok(false), |file| is_list(&folder.join(file)))
 }
 
@@ -72,7 +77,7 @@ pub fn read(path: &Path) -> Result<NestedMasks> {
         if !sure.is_finite() {
             return Err(wrong("has a score that is no finite number".to_owned()));
         }
-        qualities.push(sure.clamp(0.0, 1.0).powi(4));
+        qualities.push(quality(sure));
     }
     Ok(NestedMasks::new(size.unwrap_or_default(), &masks, qualities))
 }

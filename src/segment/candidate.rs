@@ -1,7 +1,8 @@
 //! All masks that a network finds in a photo when it is asked at every point of a grid.
 
 use super::network::{Answer, Network, Prepared};
-use super::prompt::{Frame, Place, Prompt};
+use super::prompt::Prompt;
+use labelgs_masks::nested::quality;
 use labelgs_scene::{Result, crew};
 
 /// Steps of a stored logit per unit.
@@ -24,7 +25,7 @@ pub struct Search {
 
 /// A mask on the grid of the network.
 #[derive(Clone, Debug)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// The cells inside, a bit each, row by row.
     cells: Vec<u64>,
     /// Logits in steps.
@@ -56,10 +57,9 @@ impl Candidate {
         self.logits.len()
     }
 
-    /// Returns how far the network is to be trusted, 0 to 1. The power sets good masks apart from middling ones, so that a
-    /// whole stands for its parts only if it is as sure as they are.
+    /// Returns how far the network is to be trusted, 0 to 1.
     pub fn quality(&self) -> f64 {
-        f64::from(self.score.clamp(0.0, 1.0) * self.stability).powi(4)
+        quality(f64::from(self.score.clamp(0.0, 1.0) * self.stability))
     }
 
     /// Returns the number of cells inside of both.
@@ -79,15 +79,15 @@ impl Candidate {
         self.cells.iter().enumerate().flat_map(move |(at, &word)| bits(word).map(move |bit| at * 64 + bit))
     }
 
-    /// Returns the logit at a place of the photo, px.
-    pub fn logit(&self, frame: &Frame, grid: (usize, usize), place: Place) -> f32 {
-        frame.logit(grid, &|at| f32::from(self.logits[at]), place) / LOGIT_STEPS
+    /// Returns the logit of a cell.
+    pub fn logit(&self, cell: usize) -> f32 {
+        f32::from(self.logits[cell]) / LOGIT_STEPS
     }
 }
 
 /// Asks at every point of the grid, on the threads of the network, and returns the masks that are sure enough, each once,
 /// the best first.
-pub fn candidates(network: &Network, prepared: &Prepared, search: &Search) -> Result<Vec<Candidate>> {
+pub(crate) fn candidates(network: &Network, prepared: &Prepared, search: &Search) -> Result<Vec<Candidate>> {
     let (width, height) = prepared.frame.size;
     let points = search.grid * search.grid;
     let at = |point: usize| {
@@ -102,15 +102,15 @@ pub fn candidates(network: &Network, prepared: &Prepared, search: &Search) -> Re
     };
     let found: Vec<Vec<Candidate>> =
         crew::map("", points, network.threads(), ask).into_iter().collect::<Result<_>>()?;
-    Ok(without_doubles(found.into_iter().flatten().collect(), DOUBLE_IOU))
+    Ok(without_doubles(found.into_iter().flatten().collect()))
 }
 
 /// Returns the masks of which none is the double of a better one, the best first.
-pub fn without_doubles(mut masks: Vec<Candidate>, double: f64) -> Vec<Candidate> {
+fn without_doubles(mut masks: Vec<Candidate>) -> Vec<Candidate> {
     masks.sort_by(|a, b| b.quality().total_cmp(&a.quality()));
     let mut kept: Vec<Candidate> = Vec::new();
     for mask in masks {
-        if kept.iter().all(|other| other.iou(&mask) <= double) {
+        if kept.iter().all(|other| other.iou(&mask) <= DOUBLE_IOU) {
             kept.push(mask);
         }
     }

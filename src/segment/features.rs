@@ -72,20 +72,20 @@ pub fn digest(bytes: &[u8]) -> u64 {
 /// Features of photos on the disk, for one network.
 #[derive(Clone, Debug)]
 pub struct FeatureCache {
-    folder: PathBuf,
+    folder: Option<PathBuf>,
 }
 
 impl FeatureCache {
-    /// Uses a folder; writing creates it.
-    pub fn new(folder: &Path, network: &Network) -> Self {
-        Self { folder: folder.join(format!("features-{}", network.digest)) }
+    /// Uses a folder, which writing creates; without one, nothing is kept.
+    pub fn new(folder: Option<&Path>, network: &Network) -> Self {
+        Self { folder: folder.map(|folder| folder.join(format!("features-{}", network.digest))) }
     }
 
     /// Returns the features of a photo: those on the disk, or fresh ones, which are written there.
     pub fn of(&self, network: &Network, photo: &Photo) -> Result<Features> {
-        let bytes = photo.rgba.as_flattened();
-        let path = self.folder.join(format!("{:016x}-{}x{}.safetensors", digest(bytes), photo.width, photo.height));
-        let size = (photo.width, photo.height);
+        let Some(folder) = &self.folder else { return network.encode(photo) };
+        let (digest, size) = (digest(photo.rgba.as_flattened()), (photo.width, photo.height));
+        let path = folder.join(format!("{digest:016x}-{}x{}.safetensors", size.0, size.1));
         if let Some(found) = Features::read(&path, size) {
             return Ok(found);
         }

@@ -3,7 +3,6 @@
 use super::candidate::{Candidate, Search, candidates};
 use super::features::Features;
 use super::network::Network;
-use super::prompt::Frame;
 use labelgs_masks::nested::FoundMask;
 use labelgs_scene::{LabelMap, Result};
 use std::collections::BTreeSet;
@@ -45,7 +44,8 @@ pub fn masks_of_photo(
 ) -> Result<PhotoMasks> {
     let prepared = network.prepare(features)?;
     let candidates = candidates(network, &prepared, search)?;
-    let inside: Vec<Vec<bool>> = candidates.iter().map(|mask| drawn(mask, &prepared.frame, size)).collect();
+    let inside: Vec<Vec<bool>> =
+        candidates.iter().map(|mask| prepared.frame.drawn(&|cell| mask.logit(cell), size)).collect();
     let paint = |&level: &Level| {
         let chosen: Vec<&[bool]> =
             of_level(&candidates, level).into_iter().map(|mask| inside[mask].as_slice()).collect();
@@ -112,17 +112,6 @@ fn explained(masks: &[Candidate], chosen: &BTreeSet<usize>) -> f64 {
         masks[mask].inside().for_each(|cell| best[cell] = best[cell].max(quality));
     }
     best.iter().sum()
-}
-
-/// Returns the pixels of a mask in a picture of a size.
-fn drawn(mask: &Candidate, frame: &Frame, (width, height): (u32, u32)) -> Vec<bool> {
-    let grid = frame.grid();
-    let step = [frame.size.0 as f32 / width as f32, frame.size.1 as f32 / height as f32];
-    let inside = |at: u32| {
-        let (x, y) = (at % width, at / width);
-        mask.logit(frame, grid, [(x as f32 + 0.5) * step[0], (y as f32 + 0.5) * step[1]]) > 0.0
-    };
-    (0..width * height).map(inside).collect()
 }
 
 /// Paints masks as ids from 1, later ones on top. Masks that others cover have no id.

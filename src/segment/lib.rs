@@ -9,7 +9,7 @@ mod levels;
 mod network;
 mod prompt;
 
-pub use candidate::{Candidate, Search, candidates, without_doubles};
+pub use candidate::Search;
 pub use features::{FeatureCache, Features};
 pub use levels::{Level, PhotoMasks, masks_of_photo};
 pub use network::{Answer, Network, Prepared};

@@ -120,19 +120,19 @@ impl Frame {
         resize(&picture, self.covered.0, self.covered.1, FilterType::Triangle)
     }
 
-    /// Returns the pixels of a picture of the photo, of any size, in which logits on the grid are positive.
-    pub fn drawn(&self, logits: &[f32], (width, height): (u32, u32)) -> Vec<bool> {
+    /// Returns the pixels of a picture of the photo, of any size, in which the logits of cells are positive.
+    pub fn drawn(&self, logits: &dyn Fn(usize) -> f32, (width, height): (u32, u32)) -> Vec<bool> {
         let step = [self.size.0 as f32 / width as f32, self.size.1 as f32 / height as f32];
         let grid = self.grid();
         let inside = |at: u32| {
             let place = [((at % width) as f32 + 0.5) * step[0], ((at / width) as f32 + 0.5) * step[1]];
-            self.logit(grid, &|at| logits[at], place) > 0.0
+            self.logit(grid, logits, place) > 0.0
         };
         (0..width * height).map(inside).collect()
     }
 
     /// Returns the logit of a mask at a place of the photo, px, between the centres of cells.
-    pub fn logit(&self, grid: (usize, usize), logits: &dyn Fn(usize) -> f32, place: Place) -> f32 {
+    fn logit(&self, grid: (usize, usize), logits: &dyn Fn(usize) -> f32, place: Place) -> f32 {
         let along = |axis: usize, cells: usize| {
             let at = place[axis] * self.scale[axis] * GRID as f32 / self.side as f32 - 0.5;
             let at = at.clamp(0.0, (cells - 1) as f32);

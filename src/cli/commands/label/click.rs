@@ -58,11 +58,8 @@ pub(super) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         view.camera = view.camera.resized(width, height);
     });
     let views = dataset.all();
-    let cache = user_cache().map(|folder| FeatureCache::new(&folder, &network));
-    let features = |view: &View| {
-        let photo = view.photo()?;
-        cache.as_ref().map_or_else(|| network.encode(&photo), |cache| cache.of(&network, &photo))
-    };
+    let cache = FeatureCache::new(user_cache().as_deref(), &network);
+    let features = |view: &View| cache.of(&network, &*view.photo()?);
     let start = Instant::now();
     let mut engine = vote_engine(open_gpu(context)?, &model, &views, 2)?;
     let stage = Stage::new("asking the network", 0);

@@ -76,14 +76,14 @@ pub(crate) fn run(args: &MakeArgs, context: &Context) -> Result<()> {
     let dataset = scenes::open_logged(&args.scene, &args.read.options(LoadOptions { test_every: None, ..options }))?;
     let views = dataset.all();
     let files = files_of_photos(views.iter().map(|view| view.name.as_str()), &BTreeMap::new(), &args.scene)?;
-    let cache = user_cache().map(|folder| FeatureCache::new(&folder, &network));
+    let cache = FeatureCache::new(user_cache().as_deref(), &network);
     let mut progress = Progress::new(files.len() as u64, "photos", &context.global);
     let (mut made, mut masks, mut empty) = (0, 0, Vec::new());
     for (done, (file, of)) in files.iter().enumerate() {
         let list = args.output.join(NESTED).join(file).with_extension("json");
         if !list.is_file() {
             let view = views[of[0]];
-            let found = of_photo(args, &network, cache.as_ref(), view)?;
+            let found = of_photo(args, &network, &cache, view)?;
             for ((_, folder), map) in LEVELS.iter().zip(&found.levels) {
                 write_mask(&args.output.join(folder).join(file), map)?;
             }
@@ -134,13 +134,10 @@ fn remember(args: &MakeArgs, network: &Network) -> Result<()> {
     Ok(())
 }
 
-fn of_photo(args: &MakeArgs, network: &Network, cache: Option<&FeatureCache>, view: &View) -> Result<PhotoMasks> {
+fn of_photo(args: &MakeArgs, network: &Network, cache: &FeatureCache, view: &View) -> Result<PhotoMasks> {
     let search = Search { grid: usize::from(args.grid), min_score: args.min_score, min_stability: args.min_stability };
     let photo = view.photo()?;
-    let features = match cache {
-        Some(cache) => cache.of(network, &photo)?,
-        None => network.encode(&photo)?,
-    };
+    let features = cache.of(network, &photo)?;
     let size = bounded_size(features.photo, Some(MASK_PX));
     masks_of_photo(network, &features, &search, &LEVELS.map(|(level, _)| level), size)
 }
