@@ -7,7 +7,7 @@ use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::decide;
 use crate::render::{Parts, RenderOptions, Rendered, label_map, render};
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
-use crate::segment::{Answer, Features, Network, Place, Prompt};
+use crate::segment::{Answer, Features, Network, Place, Prepared, Prompt};
 use glam::{DVec2, DVec3};
 
 /// Views that are asked for a first answer, and at most.
@@ -51,6 +51,13 @@ pub struct Clicking<'a> {
     pub features: &'a dyn Fn(&View) -> Result<Features>,
 }
 
+/// What was worked out of a view.
+#[derive(Default)]
+struct Known {
+    shown: Option<Rendered>,
+    prepared: Option<Prepared>,
+}
+
 /// A view that is asked.
 struct Asked {
     view: usize,
@@ -60,32 +67,45 @@ struct Asked {
     sight: Sight,
 }
 
+impl Asked {
+    fn new(view: usize, (masks, qualities): (Vec<LabelMap>, Vec<f64>), shown: Option<&Rendered>) -> Self {
+        let layer = |(mask, number): (&LabelMap, u16)| LabelMap {
+            ids: mask.ids.iter().map(|id| id * number).collect(),
+            ..mask.clone()
+        };
+        let nested = NestedMasks { layers: masks.iter().zip(1..).map(layer).collect(), qualities };
+        let sight = shown.map_or_else(Sight::default, |shown| Sight::new(&shown.top_id, &nested));
+        Self { view, masks, qualities: nested.qualities, sight }
+    }
+}
+
 impl Clicking<'_> {
-    /// Returns which Gaussians belong to the object. The first click must be on it. `tick` is called for each photo that is
+    /// Returns which Gaussians belong to the object. One click at least must be on it. `tick` is called for each photo that is
     /// asked.
     pub fn object(&mut self, clicks: &[Click], tick: &mut dyn FnMut()) -> Result<Vec<bool>> {
         let first = clicks.iter().find(|click| click.is_on);
         let first =
             *first.ok_or_else(|| Error::usage(Setting("click"), "no click is on the object; at least one must be"))?;
-        let mut shown: Vec<Option<Rendered>> = vec![None; self.views.len()];
+        let mut known: Vec<Known> = self.views.iter().map(|_| Known::default()).collect();
         let mut points = Vec::new();
         for click in clicks {
-            points.push((self.point(*click, &mut shown)?, click.is_on));
+            points.push((self.point(*click, &mut known)?, click.is_on));
         }
-        let target = points.iter().find(|(_, is_on)| *is_on).map_or(DVec3::ZERO, |(point, _)| *point);
+        let target = self.point(first, &mut known)?;
         let order = self.by_direction(first.view, target);
         let mut asked = Vec::new();
         for &view in &order {
             if asked.len() == FIRST_VIEWS {
                 break;
             }
-            if let Some(prompt) = self.prompt(view, &points, &mut shown)? {
-                asked.push(self.ask(view, &prompt, shown[view].as_ref())?);
+            if let Some(prompt) = self.prompt(view, &points, &mut known)? {
+                let (masks, qualities) = self.ask(view, &prompt, &mut known[view])?;
+                asked.push(Asked::new(view, (masks, qualities), known[view].shown.as_ref()));
                 tick();
             }
         }
         let chosen = agreeing(&asked);
-        self.vote(&chosen)?;
+        let rows = self.vote(&chosen)?;
         // What the model shows now is asked again, in more views.
         let mut confirmed = Vec::new();
         for &view in order.iter().take(ALL_VIEWS) {
@@ -93,11 +113,11 @@ impl Clicking<'_> {
             let Some(mut prompt) = prompt_of(&map) else { continue };
             let off = points.iter().filter(|(_, is_on)| !is_on);
             for (point, _) in off {
-                prompt.off.extend(self.place_of(view, *point, &mut shown)?);
+                prompt.off.extend(self.place_of(view, *point, &mut known)?);
             }
-            let answer = self.ask(view, &prompt, None)?;
+            let (masks, _) = self.ask(view, &prompt, &mut known[view])?;
             tick();
-            let best = answer.masks.into_iter().map(|mask| (iou(&mask, &map), mask));
+            let best = masks.into_iter().map(|mask| (iou(&mask, &map), mask));
             if let Some((found, mask)) = best.max_by(|a, b| a.0.total_cmp(&b.0))
                 && found >= CONFIRMING_IOU_MIN
             {
@@ -105,17 +125,14 @@ impl Clicking<'_> {
             }
         }
         // Where no view confirms, the first answer stands.
-        if !confirmed.is_empty() {
-            return self.vote(&confirmed);
-        }
-        self.vote(&chosen)
+        if confirmed.is_empty() { Ok(rows) } else { self.vote(&confirmed) }
     }
 
-    /// Returns the point of the surface at a click, relative to the origin of the model.
-    fn point(&mut self, click: Click, shown: &mut [Option<Rendered>]) -> Result<DVec3> {
+    /// Returns the point of the surface at a click, in the world.
+    fn point(&mut self, click: Click, known: &mut [Known]) -> Result<DVec3> {
         let view = self.views[click.view];
         let place = DVec2::new(f64::from(click.place[0]), f64::from(click.place[1]));
-        let depth = self.depth(click.view, place, shown)?.ok_or_else(|| {
+        let depth = self.depth(click.view, place, known)?.ok_or_else(|| {
             let problem = format!("{}:{},{} shows nothing of the model", view.name, click.place[0], click.place[1]);
             Error::usage(Setting("click"), problem)
         })?;
@@ -123,40 +140,35 @@ impl Clicking<'_> {
     }
 
     /// Returns the depth of the surface at a place of a view, if there is one.
-    fn depth(&mut self, view: usize, place: DVec2, shown: &mut [Option<Rendered>]) -> Result<Option<f64>> {
+    fn depth(&mut self, view: usize, place: DVec2, known: &mut [Known]) -> Result<Option<f64>> {
         let camera = &self.views[view].camera;
-        if shown[view].is_none() {
+        if known[view].shown.is_none() {
             let parts = Parts { depth: true, main: true, labels: false };
             let options = RenderOptions { sh_degree: Some(0), ..RenderOptions::new(self.near, parts) };
-            shown[view] = Some(render(self.engine, camera, &options)?);
+            known[view].shown = Some(render(self.engine, camera, &options)?);
         }
         let inside =
             place.x >= 0.0 && place.y >= 0.0 && place.x < f64::from(camera.width) && place.y < f64::from(camera.height);
         let at = (place.y.max(0.0) as u32 * camera.width + place.x.max(0.0) as u32) as usize;
-        let found = shown[view].as_ref().filter(|_| inside).map(|found| (found.depth[at], found.alpha[at]));
+        let found = known[view].shown.as_ref().filter(|_| inside).map(|found| (found.depth[at], found.alpha[at]));
         Ok(found.filter(|(_, alpha)| *alpha >= OPAQUE_MIN).map(|(depth, alpha)| f64::from(depth / alpha)))
     }
 
     /// Returns where a view sees a point, if nothing hides it.
-    fn place_of(&mut self, view: usize, point: DVec3, shown: &mut [Option<Rendered>]) -> Result<Option<Place>> {
+    fn place_of(&mut self, view: usize, point: DVec3, known: &mut [Known]) -> Result<Option<Place>> {
         let camera = &self.views[view].camera;
         let z = camera.to_camera(point).z;
         let Some(place) = camera.sees(point) else { return Ok(None) };
-        let depth = self.depth(view, place, shown)?;
+        let depth = self.depth(view, place, known)?;
         let is_seen = depth.is_some_and(|depth| (depth - z).abs() <= DEPTH_SHARE_MAX * z);
         Ok(is_seen.then_some([place.x as f32, place.y as f32]))
     }
 
     /// Returns the prompt of a view that sees a point of the object.
-    fn prompt(
-        &mut self,
-        view: usize,
-        points: &[(DVec3, bool)],
-        shown: &mut [Option<Rendered>],
-    ) -> Result<Option<Prompt>> {
+    fn prompt(&mut self, view: usize, points: &[(DVec3, bool)], known: &mut [Known]) -> Result<Option<Prompt>> {
         let mut prompt = Prompt::default();
         for &(point, is_on) in points {
-            let place = self.place_of(view, point, shown)?;
+            let place = self.place_of(view, point, known)?;
             if is_on { prompt.on.extend(place) } else { prompt.off.extend(place) }
         }
         Ok((!prompt.on.is_empty()).then_some(prompt))
@@ -173,25 +185,24 @@ impl Clicking<'_> {
         order
     }
 
-    fn ask(&mut self, view: usize, prompt: &Prompt, shown: Option<&Rendered>) -> Result<Asked> {
-        let (camera, features) = (&self.views[view].camera, (self.features)(self.views[view])?);
-        let prepared = self.network.prepare(&features)?;
-        let scale = [features.photo.0 as f32 / camera.width as f32, features.photo.1 as f32 / camera.height as f32];
+    /// Returns the masks of a view, at its size, and how sure the network is of each.
+    fn ask(&mut self, view: usize, prompt: &Prompt, known: &mut Known) -> Result<(Vec<LabelMap>, Vec<f64>)> {
+        let camera = &self.views[view].camera;
+        let prepared = match known.prepared.take() {
+            Some(prepared) => prepared,
+            None => self.network.prepare(&(self.features)(self.views[view])?)?,
+        };
+        let photo = prepared.frame.size;
+        let scale = [photo.0 as f32 / camera.width as f32, photo.1 as f32 / camera.height as f32];
         let Answer { masks, scores } = self.network.ask(&prepared, &prompt.scaled(scale))?;
         let size = (camera.width, camera.height);
         let draw = |logits: &Vec<f32>| {
-            let inside = prepared.frame.drawn(logits, size);
+            let inside = prepared.frame.drawn(&|cell| logits[cell], size);
             LabelMap { width: size.0, height: size.1, ids: inside.into_iter().map(u16::from).collect() }
         };
-        let masks: Vec<LabelMap> = masks.iter().map(draw).collect();
-        let qualities: Vec<f64> = scores.iter().map(|score| f64::from(*score).clamp(0.0, 1.0)).collect();
-        let numbered = masks
-            .iter()
-            .zip(1..)
-            .map(|(mask, number)| LabelMap { ids: mask.ids.iter().map(|id| id * number).collect(), ..mask.clone() });
-        let nested = NestedMasks { layers: numbered.collect(), qualities: qualities.clone() };
-        let sight = shown.map_or_else(Sight::default, |shown| Sight::new(&shown.top_id, &nested));
-        Ok(Asked { view, masks, qualities, sight })
+        let masks = masks.iter().map(draw).collect();
+        known.prepared = Some(prepared);
+        Ok((masks, scores.iter().map(|score| f64::from(*score).clamp(0.0, 1.0)).collect()))
     }
 
     /// Labels the model in the engine by masks of views, and returns which Gaussians have the label.
@@ -209,16 +220,16 @@ impl Clicking<'_> {
 /// most, and returns it with theirs.
 fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
     let Some((first, others)) = asked.split_first() else { return Vec::new() };
+    let overlaps: Vec<_> = others.iter().map(|other| first.sight.overlaps(&other.sight)).collect();
     let mut best: (f64, Vec<(usize, LabelMap)>) = (-1.0, Vec::new());
     for (level, mask) in first.masks.iter().enumerate() {
         let (mut found, mut sum) = (vec![(first.view, mask.clone())], 0.0);
-        for other in others {
-            let overlaps = first.sight.overlaps(&other.sight).into_iter();
-            let own = overlaps.filter(|(ours, ..)| usize::from(*ours) == level);
+        for (other, overlaps) in others.iter().zip(&overlaps) {
+            let own = overlaps.iter().filter(|(ours, ..)| usize::from(*ours) == level);
             let Some((_, theirs, overlap)) = own.max_by(|a, b| a.2.ratio().total_cmp(&b.2.ratio())) else { continue };
             if overlap.ratio() >= AGREEING_MIN {
                 sum += overlap.ratio();
-                found.push((other.view, other.masks[usize::from(theirs)].clone()));
+                found.push((other.view, other.masks[usize::from(*theirs)].clone()));
             }
         }
         let agreement = first.qualities[level] * (1.0 + sum) / (1 + others.len()) as f64;

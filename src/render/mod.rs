@@ -55,7 +55,7 @@ pub struct RenderOptions {
     pub clear_labels: bool,
 }
 
-/// Opacity below which they are.
+/// Opacity below which a pixel counts as clear.
 const CLEAR: f32 = 0.5;
 
 impl Default for RenderOptions {
