@@ -9,6 +9,7 @@ mod coco;
 mod content;
 mod decode;
 mod detect;
+pub mod explain;
 mod folder;
 mod import;
 mod inspect;

@@ -3,14 +3,11 @@
 use super::candidate::{Candidate, Search, candidates};
 use super::features::Features;
 use super::network::Network;
+use labelgs_masks::explain;
 use labelgs_masks::nested::FoundMask;
 use labelgs_scene::{LabelMap, Result};
 use std::collections::BTreeSet;
 
-/// Share of a mask that lies in a larger one above which it is a part of it.
-const INSIDE_SHARE_MIN: f64 = 0.85;
-/// Least ratio of the areas of a whole and its part.
-const LARGER_RATIO_MIN: f64 = 1.15;
 /// Largest share of a photo that a whole has; larger masks are the surroundings.
 const WHOLE_SHARE_MAX: f64 = 0.4;
 
@@ -78,30 +75,14 @@ fn of_level(masks: &[Candidate], level: Level) -> Vec<usize> {
     }
 }
 
-/// Chooses objects among nested masks, from the parts up: a mask stands if its area times its quality is at least what the best
-/// choice inside of it explains, a sum over cells of the best quality there. No size is asked for: a sheet with everything
-/// on it falls, because the things on it are surer than it is.
+/// Chooses objects among nested masks.
 fn objects(masks: &[Candidate]) -> BTreeSet<usize> {
-    let mut order: Vec<usize> = (0..masks.len()).collect();
-    order.sort_by_key(|&mask| (masks[mask].area, mask));
-    let mut chosen: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); masks.len()];
-    let mut top: BTreeSet<usize> = order.iter().copied().collect();
-    for (at, &mask) in order.iter().enumerate() {
-        let parts = order[..at].iter().filter(|&&part| is_part(&masks[part], &masks[mask]));
-        let mut inside = BTreeSet::new();
-        for part in parts {
-            top.remove(part);
-            inside.extend(&chosen[*part]);
-        }
-        let whole = f64::from(masks[mask].area) * masks[mask].quality();
-        chosen[mask] = if whole >= explained(masks, &inside) { BTreeSet::from([mask]) } else { inside };
-    }
-    top.into_iter().flat_map(|mask| std::mem::take(&mut chosen[mask])).collect()
-}
-
-fn is_part(part: &Candidate, whole: &Candidate) -> bool {
-    f64::from(whole.area) >= LARGER_RATIO_MIN * f64::from(part.area)
-        && f64::from(part.shared(whole)) >= INSIDE_SHARE_MIN * f64::from(part.area)
+    let areas: Vec<f64> = masks.iter().map(|mask| f64::from(mask.area)).collect();
+    let qualities: Vec<f64> = masks.iter().map(Candidate::quality).collect();
+    let pairs = (0..masks.len()).flat_map(|a| (a + 1..masks.len()).map(move |b| (a, b)));
+    let shared = pairs.map(|(a, b)| ((a, b), f64::from(masks[a].shared(&masks[b]))));
+    let parts = explain::parts_of(&areas, shared);
+    explain::objects(&areas, &qualities, &parts, |chosen| explained(masks, chosen))
 }
 
 /// Returns the sum over cells of the best quality of the masks there.

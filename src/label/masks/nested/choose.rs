@@ -1,6 +1,7 @@
 //! The groups that are objects.
 
 use super::group::{Group, Scene};
+use crate::masks::explain;
 use std::collections::BTreeSet;
 
 /// Least quality of an object, and least share of views that confirm it: what other views do not confirm gets no object.
@@ -8,9 +9,6 @@ const QUALITY_MIN: f64 = 0.15;
 const SUPPORT_MIN: f64 = 0.5;
 /// Fewest views with a mask of an object, if as many see it.
 const VIEWS_MIN: usize = 3;
-/// Share of a group inside of a larger one above which it is a part of it, and least ratio of their areas.
-const INSIDE_SHARE_MIN: f64 = 0.85;
-const LARGER_RATIO_MIN: f64 = 1.15;
 /// Share of a group that no better one covers, which it needs to be an object.
 const OWN_SHARE_MIN: f64 = 0.5;
 /// A part is an object beside the rest of its whole if it has this share of it, quality and support: two things that touch in
@@ -29,30 +27,14 @@ pub(super) fn confirmed(groups: Vec<Group>, views: usize) -> Vec<Group> {
     groups.into_iter().filter(holds).collect()
 }
 
-/// Chooses objects among groups: numbers of groups, those that lie on top of others last. As among the masks of one photo, a
-/// whole stands if its area times its quality is at least what the best choice inside of it explains.
+/// Chooses objects among groups: numbers of groups, those that lie on top of others last. Wholes and parts compete as masks of one
+/// photo do ([`explain::objects`]).
 pub(super) fn objects(scene: &Scene, groups: &[Group]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..groups.len()).collect();
-    order.sort_by(|&a, &b| groups[a].area.total_cmp(&groups[b].area).then(a.cmp(&b)));
-    let mut parts: Vec<Vec<usize>> = vec![Vec::new(); groups.len()];
-    let mut top: BTreeSet<usize> = order.iter().copied().collect();
-    for ((a, b), both) in scene.shared(groups) {
-        for (part, whole) in [(a, b), (b, a)] {
-            let (small, large) = (groups[part].area, groups[whole].area);
-            if large >= LARGER_RATIO_MIN * small && both >= INSIDE_SHARE_MIN * small {
-                parts[whole].push(part);
-                top.remove(&part);
-            }
-        }
-    }
-    let mut chosen: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); groups.len()];
-    for &group in &order {
-        let inside: BTreeSet<usize> = parts[group].iter().flat_map(|&part| chosen[part].iter().copied()).collect();
-        let whole = groups[group].area * groups[group].quality;
-        chosen[group] = if whole >= explained(scene, groups, &inside) { BTreeSet::from([group]) } else { inside };
-    }
-    let mut best: Vec<usize> =
-        top.iter().flat_map(|&group| &chosen[group]).copied().collect::<BTreeSet<_>>().into_iter().collect();
+    let areas: Vec<f64> = groups.iter().map(|group| group.area).collect();
+    let qualities: Vec<f64> = groups.iter().map(|group| group.quality).collect();
+    let parts = explain::parts_of(&areas, scene.shared(groups).into_iter());
+    let chosen = explain::objects(&areas, &qualities, &parts, |chosen| explained(scene, groups, chosen));
+    let mut best: Vec<usize> = chosen.into_iter().collect();
     let value = |&group: &usize| groups[group].area * groups[group].quality;
     best.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
     let mut covered = vec![false; scene.weights.len()];
