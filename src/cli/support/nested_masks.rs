@@ -3,9 +3,10 @@
 use crate::cli::support::SceneArgs;
 use crate::engine::Engine;
 use crate::gpu::Gpu;
+use crate::label::masks::agree::Ids;
 use crate::label::masks::nested::{NestedMasks, objects, painted};
 use crate::masks::nested::{files_of_photos, read};
-use crate::scene::{Gaussians, LabelMap, View};
+use crate::scene::{Gaussians, View};
 use crate::scenes::resample::resample_ids;
 use crate::scenes::window::{Window, windows};
 use crate::stage::Stage;
@@ -42,19 +43,28 @@ impl MaskFolders {
             Self { pictures: Some(folder), lists: None }
         })
     }
+
+    /// Returns what the ids of the views' masks mean, once objects are chosen among nested ones.
+    pub(crate) fn ids(&self, per_view: bool) -> Ids {
+        match self.lists {
+            Some(_) => Ids::Chosen,
+            None if per_view => Ids::PerView,
+            None => Ids::Shared,
+        }
+    }
 }
 
-/// Returns the masks of the objects that all views together choose among nested masks; `None` for views without any.
-pub(crate) fn object_masks(
+/// Gives views the masks of the objects that all of them together choose among nested masks; none to views without any.
+pub(crate) fn choose_objects(
     lists: &Path,
     (scene, reading): (&Path, &SceneArgs),
     gpu: &Arc<Gpu>,
     (model, near): (&Gaussians, f32),
-    views: &[&View],
-) -> Result<Vec<Option<LabelMap>>> {
+    views: &mut [View],
+) -> Result<()> {
     let windows = windows(scene, &reading.read.lookup())?;
     let photo = |view: &View| windows.get(&view.name).map_or(view.name.clone(), |window| window.photo.clone());
-    let names: Vec<String> = views.iter().map(|view| photo(view)).collect();
+    let names: Vec<String> = views.iter().map(photo).collect();
     let mut unique: Vec<&str> = names.iter().map(String::as_str).collect();
     unique.sort_unstable();
     unique.dedup();
@@ -66,7 +76,7 @@ pub(crate) fn object_masks(
         }
     };
     let stage = Stage::new("reading masks", views.len());
-    let of_view = |(view, name): (&&View, &String)| -> Result<Option<NestedMasks>> {
+    let of_view = |(view, name): (&View, &String)| -> Result<Option<NestedMasks>> {
         let Some(file) = files.get(name.as_str()) else { return Ok(None) };
         let masks = stage.counted(|| read(file))?;
         let stored = Window::stored(&view.name, &view.camera);
@@ -81,11 +91,14 @@ pub(crate) fn object_masks(
     let mut engine = Engine::of_model(Arc::clone(gpu), model, sizes)?;
     let stage = Stage::new("choosing objects", views.len());
     let pairs: Vec<(&View, Option<&NestedMasks>)> =
-        views.iter().zip(&nested).map(|(view, masks)| (*view, masks.as_ref())).collect();
+        views.iter().zip(&nested).map(|(view, masks)| (view, masks.as_ref())).collect();
     let found = objects(&mut engine, model, &pairs, near, &mut || stage.count())?;
     if found.is_empty() {
         let problem = "no object is found that several views confirm; make masks with more points, or less sure ones";
         return Err(Error::data(lists, "", problem));
     }
-    Ok(nested.iter().enumerate().map(|(view, masks)| painted(&found, view, masks.as_ref()?)).collect())
+    for (index, (view, masks)) in views.iter_mut().zip(&nested).enumerate() {
+        view.mask = masks.as_ref().and_then(|masks| painted(&found, index, masks)).map(Into::into);
+    }
+    Ok(())
 }

@@ -13,13 +13,24 @@ use std::collections::BTreeMap;
 /// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
 pub const MIN_VIEWS: usize = 2;
 
+/// What the ids of masks mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ids {
+    /// The same object in all views, but for faults.
+    Shared,
+    /// Nothing in other views.
+    PerView,
+    /// Objects that all views have chosen ([`nested`](super::nested)): they agree.
+    Chosen,
+}
+
 /// The options of [`agree`].
 #[derive(Clone, Copy, Debug)]
 pub struct Agreement {
     /// Near plane, world units.
     pub near: f32,
-    /// The ids of different views are unrelated.
-    pub per_view: bool,
+    /// What the ids of the masks mean.
+    pub ids: Ids,
     /// Fewest views of an object; objects in fewer views are dropped.
     pub min_views: usize,
     /// Makes masks for views without one.
@@ -27,7 +38,7 @@ pub struct Agreement {
 }
 
 /// Returns the masks of the views (`None` without a mask) and the changes. `engine` holds the model and has memory for
-/// votes; `tick` is called twice per view.
+/// votes; `tick` is called at most twice per view.
 pub fn agree(
     engine: &mut Engine,
     model: &Gaussians,
@@ -35,6 +46,12 @@ pub fn agree(
     how: Agreement,
     tick: &mut dyn FnMut(),
 ) -> Result<(Vec<Option<LabelMap>>, Repairs)> {
+    let mut repairs = Repairs::default();
+    if how.ids == Ids::Chosen {
+        let own: Vec<Option<Pixels<LabelMap>>> = views.iter().map(|view| view.mask.clone()).collect();
+        let masks = settle(engine, model, views, &own, how, (&mut repairs, tick))?;
+        return Ok((masks, repairs));
+    }
     let counting = Sweep::new(how.near, 0);
     let mut owners = Vec::with_capacity(views.len());
     for view in views {
@@ -46,10 +63,9 @@ pub fn agree(
     }
     let mut groups = associate(&owners);
     groups.retain(|group| group.len() >= how.min_views);
-    let naming = if how.per_view { Naming::Fresh } else { Naming::Majority };
+    let naming = if how.ids == Ids::PerView { Naming::Fresh } else { Naming::Majority };
     let areas = areas(views)?;
     let names = name_groups(&groups, &areas, naming);
-    let mut repairs = Repairs::default();
     let renamed: Vec<Option<Pixels<LabelMap>>> = (views.iter().enumerate())
         .map(|(index, view)| Ok(view.mask()?.map(|mask| rename(index, &mask, &names).into())))
         .collect::<Result<_>>()?;
@@ -58,14 +74,9 @@ pub fn agree(
     Ok((masks, repairs))
 }
 
-/// Returns the masks that views have.
-pub fn own_masks(views: &[&View]) -> Vec<Option<Pixels<LabelMap>>> {
-    views.iter().map(|view| view.mask.clone()).collect()
-}
-
 /// Mends masks whose ids agree: all of them give the model labels, and these divide masks that cover several objects and fill
 /// in missed ones. `tick` is called once per view.
-pub fn settle(
+fn settle(
     engine: &mut Engine,
     model: &Gaussians,
     views: &[&View],
@@ -105,7 +116,7 @@ pub fn follow(
     tick: &mut dyn FnMut(),
 ) -> Result<Vec<Option<LabelMap>>> {
     let (trained, repairs) = before;
-    let objects = trained.iter().flatten().filter(|_| !how.per_view).flat_map(LabelMap::objects).collect();
+    let objects = trained.iter().flatten().filter(|_| how.ids == Ids::Shared).flat_map(LabelMap::objects).collect();
     let mut masks = Vec::with_capacity(views.len());
     for (index, view) in (trained.len()..).zip(views) {
         masks.push(match view.mask()? {

@@ -4,7 +4,7 @@
 mod click;
 
 use crate::cli::commands::masks::repair::table;
-use crate::cli::support::nested_masks::{MaskFolders, object_masks};
+use crate::cli::support::nested_masks::{MaskFolders, choose_objects};
 use crate::cli::support::parsers::{model_file, near};
 use crate::cli::support::{
     Context, Progress, SceneArgs, WriteArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit,
@@ -13,8 +13,7 @@ use crate::edit::select::summarise;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
 use crate::gpu::Gpu;
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, own_masks, settle};
-use crate::label::masks::repair::Repairs;
+use crate::label::masks::agree::{Agreement, Ids, MIN_VIEWS, agree};
 use crate::label::vote::model::{Counting, ROUNDS, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::{Gaussians, View};
 use crate::stage::Stage;
@@ -95,14 +94,12 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let start = Instant::now();
     if let Some(lists) = &masks.lists {
-        let views: Vec<&View> = dataset.train.iter().collect();
-        let found = object_masks(lists, (&args.scene, &args.reading), &gpu, (&model, near), &views)?;
-        dataset.train.iter_mut().zip(found).for_each(|(view, mask)| view.mask = mask.map(Into::into));
+        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near), &mut dataset.train)?;
         dataset.train.retain(|view| view.mask.is_some());
     }
-    let names = match args.per_view || masks.lists.is_some() {
-        true => Some(make_agree(folder, near, &gpu, &model, (&mut dataset.train, masks.lists.is_some()))?),
-        false => LabelTable::of_folder(folder)?,
+    let names = match masks.ids(args.per_view) {
+        Ids::Shared => LabelTable::of_folder(folder)?,
+        ids => Some(make_agree(folder, near, &gpu, &model, (&mut dataset.train, ids))?),
     };
     let views: Vec<&View> = dataset.train.iter().collect();
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
@@ -135,26 +132,19 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     context.show(&result, &text)
 }
 
-/// Replaces the masks of the views by those whose ids agree, and returns their names. Masks of objects that all views chose do
-/// agree, and are mended.
+/// Replaces the masks of the views by those whose ids agree, and returns their names.
 fn make_agree(
     folder: &Path,
     near: f32,
     gpu: &Arc<Gpu>,
     model: &Gaussians,
-    (views, are_objects): (&mut [View], bool),
+    (views, ids): (&mut [View], Ids),
 ) -> Result<LabelTable> {
     let borrowed: Vec<&View> = views.iter().collect();
     let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
-    let how = Agreement { near, per_view: true, min_views: MIN_VIEWS, make_missing: false };
+    let how = Agreement { near, ids, min_views: MIN_VIEWS, make_missing: false };
     let stage = Stage::new("comparing masks", 2 * borrowed.len());
-    let mut tick = || stage.count();
-    let masks = match are_objects {
-        true => {
-            settle(&mut engine, model, &borrowed, &own_masks(&borrowed), how, (&mut Repairs::default(), &mut tick))?
-        }
-        false => agree(&mut engine, model, &borrowed, how, &mut tick)?.0,
-    };
+    let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || stage.count())?;
     let names = table(folder, true, &borrowed, &masks)?;
     views.iter_mut().zip(masks).for_each(|(view, mask)| view.mask = mask.map(Into::into));
     Ok(names)

@@ -1,12 +1,12 @@
 //! `labelgs masks repair`.
 
 use super::{files_of_photos, write_mask};
-use crate::cli::support::nested_masks::{MaskFolders, object_masks};
+use crate::cli::support::nested_masks::{MaskFolders, choose_objects};
 use crate::cli::support::parsers::near;
 use crate::cli::support::{Context, Progress, SceneArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::files::atomic;
 use crate::files::label_table::{FILE, LabelEntry, LabelTable};
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow, own_masks, settle};
+use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
@@ -59,9 +59,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     let mut dataset = open_scene(&args.scene, &args.reading, folders.pictures.clone(), [0.0; 3], true)?;
     let (gpu, near) = (open_gpu(context)?, near_plane(&args.model, args.near)?);
     if let Some(lists) = &folders.lists {
-        let views: Vec<&View> = dataset.train.iter().collect();
-        let found = object_masks(lists, (&args.scene, &args.reading), &gpu, (&model, near), &views)?;
-        dataset.train.iter_mut().zip(found).for_each(|(view, mask)| view.mask = mask.map(Into::into));
+        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near), &mut dataset.train)?;
     }
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.iter().all(|view| view.mask.is_none()) {
@@ -83,19 +81,9 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         done += 1;
         progress.set(done, String::new);
     };
-    let how = Agreement {
-        near,
-        per_view: args.per_view || folders.lists.is_some(),
-        min_views: args.min_views,
-        make_missing: args.make_missing,
-    };
-    let (mut masks, mut repairs) = match folders.lists {
-        None => agree(&mut engine, &model, &views, how, &mut tick)?,
-        Some(_) => {
-            let mut repairs = Repairs::default();
-            (settle(&mut engine, &model, &views, &own_masks(&views), how, (&mut repairs, &mut tick))?, repairs)
-        }
-    };
+    let how =
+        Agreement { near, ids: folders.ids(args.per_view), min_views: args.min_views, make_missing: args.make_missing };
+    let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
     masks.extend(others);
     drop(progress);
