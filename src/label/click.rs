@@ -259,21 +259,18 @@ fn prompt_of(map: &LabelMap) -> Option<Prompt> {
             distance[at] = distance[at].min(up + 1).min(left + 1);
         }
     }
-    let (mut best, mut corner) = ((0, 0), [[f32::MAX; 2], [0.0_f32; 2]]);
+    let mut best = (0, 0);
     for y in (0..height).rev() {
         for x in (0..width).rev() {
             let down = if y + 1 < height { distance[(y + 1) * width + x] } else { 0 };
             let right = if x + 1 < width { distance[y * width + x + 1] } else { 0 };
             let at = y * width + x;
             distance[at] = distance[at].min(down + 1).min(right + 1);
-            if distance[at] > 0 && map.ids[at] == OBJECT {
-                best = best.max((distance[at], at));
-                let (left, top) = (x as f32, y as f32);
-                corner[0] = [corner[0][0].min(left), corner[0][1].min(top)];
-                corner[1] = [corner[1][0].max(left + 1.0), corner[1][1].max(top + 1.0)];
-            }
+            best = best.max((distance[at], at));
         }
     }
+    let [left, top, right, bottom] = map.bounds()?.map(|side| side as f32);
+    let area = Some([[left, top], [right, bottom]]);
     let place = [(best.1 % width) as f32 + 0.5, (best.1 / width) as f32 + 0.5];
-    (best.0 > 1).then(|| Prompt { on: vec![place], off: Vec::new(), area: Some(corner) })
+    (best.0 > 1).then(|| Prompt { on: vec![place], off: Vec::new(), area })
 }
