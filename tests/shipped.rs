@@ -29,7 +29,7 @@ fn no_variable_makes_faults_or_hides_what_a_device_has() {
     };
     let plain = devices(&[]);
     for variables in [
-        [("LABELGS_FAULT", "loader:1:INITIALIZATION"), ("LABELGS_HIDE", "scalar,timeline,timestamps")],
+        [("LABELGS_FAULT", "loader:1:INITIALIZATION"), ("LABELGS_HIDE", "timeline,timestamps")],
         [("LABELGS_FAULT", "vulkan:1:DEVICE_LOST:1000"), ("LABELGS_HIDE", "nothing that is known")],
         [("LABELGS_LIMIT_SSBO", "64K"), ("LABELGS_LIMIT_MEMORY", "1K")],
         [("LABELGS_LIMIT_TEXELS", "no size"), ("LABELGS_SUBGROUP_SIZE", "3")],

@@ -10,7 +10,6 @@
 #ifndef LAYOUT_GLSL
 #define LAYOUT_GLSL
 
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -18,7 +17,7 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #extension GL_KHR_shader_subgroup_ballot : require
 
-#define STORAGE(number, access) layout(scalar, set = 0, binding = number) access buffer
+#define STORAGE(number, access) layout(std430, set = 0, binding = number) access buffer
 
 #define READ(number, T, name) STORAGE(number, readonly) name##_block { T name[]; }
 #define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
@@ -33,7 +32,7 @@
 
 // Words of a pass that all its invocations share: passes that differ in them alone are compiled once. On the Rust side they are
 // like specialisation constants.
-layout(push_constant, scalar) uniform PassWords {
+layout(push_constant) uniform PassWords {
     uint COUNT_SOURCE; // what the items are (count.glsl)
     uint LANES;        // of a sort or scan over all workgroups
     uint SHIFT;        // of a digit

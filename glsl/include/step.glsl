@@ -2,19 +2,33 @@
 
 struct StepUniforms {
     vec3 view_row0;         // rows of the rotation of camera_from_world
+    float fx;               // px; a float follows each vec3, which std430 rounds to 16 bytes
     vec3 view_row1;
+    float fy;
     vec3 view_row2;
+    float cx;
     vec3 camera_centre;     // world
-    float fx, fy, cx, cy;   // px
-    float clamp_x_min, clamp_x_max, clamp_y_min, clamp_y_max; // limits of x/z and y/z in the Jacobian
+    float cy;
+    vec3 background;
+    float lambda_dssim;
+    vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
+    float free_near;        // and the near plane on the way; 0: there is none
+    vec3 grow_axis0;        // Gaussians grow at low <= mean < high along these unit vectors; everywhere if both are equal
+    float clamp_x_min;      // limits of x/z and y/z in the Jacobian
+    vec3 grow_axis1;
+    float clamp_x_max;
+    vec3 grow_axis2;
+    float clamp_y_min;
+    vec3 grow_low;
+    float clamp_y_max;
+    vec3 grow_high;
     float near;             // world; a Gaussian counts where z > near
+    vec4 rate_means;        // xyz: position rate, w: opacity rate
     uint width, height;     // px
     uint tiles_x, tile_count;
     uint gaussian_count;
     uint trained_count;     // the Gaussians from this row on are frozen: no pass changes them
     uint layer_count;       // sampled objects of this step: layers 1..layer_count
-    vec3 background;
-    float lambda_dssim;
     float loss_scale;       // 1 / (3 valid pixels)
     float label_weight;     // lambda_2
     float label_alpha;      // weight of the alpha term within the label loss
@@ -24,16 +38,11 @@ struct StepUniforms {
     uint occluder_words;    // words of occluder bits per layer
     uint stamp;             // differs from step to step, never 0
     float adam_correction1, adam_correction2; // 1 / (1 - beta^t)
-    vec4 rate_means;        // xyz: position rate, w: opacity rate
     float rate_scales, rate_quats, rate_sh0, rate_sh_rest;
     float densify_threshold, densify_scale, prune_scale, prune_opacity; // scales in world units
     uint prune_big;
     uint split_long;        // 1: splits along the longest axis, else at random
     uint sum_absolute;      // 1: the statistic sums absolute gradients over tiles
-    vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
-    float free_near;        // and the near plane on the way; 0: there is none
-    vec3 grow_axis0, grow_axis1, grow_axis2; // Gaussians grow at low <= mean < high along these unit vectors;
-    vec3 grow_low, grow_high; // everywhere if both are equal
     uint draws;             // Gaussians to draw for relocation
     float draws_per_weight; // draws over the sum of all weights
     float opacity_weight, scale_weight; // of a Gaussian's opacity and standard deviations in the loss

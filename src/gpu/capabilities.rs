@@ -132,7 +132,6 @@ impl fmt::Display for Subgroup {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Features {
     pub(super) memory_model: bool,
-    pub(super) scalar: bool,
     pub(super) timeline: bool,
     pub(super) robust: bool,
     pub(super) size_control: bool,

@@ -7,9 +7,8 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 9] = [
     "memory_model",
-    "scalar",
     "timeline",
     "robust",
     "size_control",
@@ -42,7 +41,6 @@ impl Hidden {
 
     pub(super) fn features(&self, features: &mut Features) {
         features.memory_model &= !self.has("memory_model");
-        features.scalar &= !self.has("scalar");
         features.timeline &= !self.has("timeline");
         features.robust &= !self.has("robust");
         features.size_control &= !self.has("size_control");

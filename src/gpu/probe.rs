@@ -105,7 +105,6 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
     let on = |flag: vk::Bool32| flag == vk::TRUE;
     Features {
         memory_model: on(twelve.vulkan_memory_model) && on(twelve.vulkan_memory_model_device_scope),
-        scalar: on(twelve.scalar_block_layout),
         timeline: on(twelve.timeline_semaphore),
         robust: on(core.robust_buffer_access),
         size_control: on(control.subgroup_size_control),
@@ -232,7 +231,6 @@ fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
         need(MEMORY, limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
-        flag("scalarBlockLayout", features.scalar, "one layout for shaders and host"),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
         least("workgroup size", 128, limits.max_invocations, "projection"),
         least("storage buffers per shader", WINDOWS_MIN, bindings, "all buffers share them, if they are few"),

@@ -119,7 +119,6 @@ pub(super) fn open(
     let core =
         vk::PhysicalDeviceFeatures::default().robust_buffer_access(options.robust_buffer_access && features.robust);
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default()
-        .scalar_block_layout(true)
         .timeline_semaphore(true)
         .vulkan_memory_model(features.memory_model)
         .vulkan_memory_model_device_scope(features.memory_model);

@@ -39,7 +39,7 @@ fn devices_tells_what_is_needed_and_found() {
     let name = gpu.capabilities().name.clone();
     let table = succeeds(&["devices"]);
     assert!(
-        table.contains(&name) && table.contains("scalarBlockLayout") && table.contains("kernels subgroups of"),
+        table.contains(&name) && table.contains("timelineSemaphore") && table.contains("kernels subgroups of"),
         "{table}"
     );
     let found = json(&succeeds(&["devices", "--json"]));

@@ -26,7 +26,7 @@ toy_shader!(
     [],
     [("to", R, S, 4)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) buffer to_block { uint to[]; };
     void main() { to[gl_GlobalInvocationID.x] = gl_GlobalInvocationID.x; }"
 );
 
@@ -35,7 +35,7 @@ toy_shader!(
     [],
     [("to", W, S, 4)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) writeonly buffer to_block { uint to[]; };
     void main() { to[gl_GlobalInvocationID.x + 256u] = 7u; }"
 );
 

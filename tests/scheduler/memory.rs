@@ -11,7 +11,7 @@ toy_shader!(
     [("to", W, S, 4)],
     "layout(local_size_x = 1) in;
     layout(constant_id = 0) const uint INDEX = 0;
-    layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) writeonly buffer to_block { uint to[]; };
     void main() { to[INDEX] = 7; }"
 );
 

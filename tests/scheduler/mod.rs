@@ -61,8 +61,8 @@ toy_shader!(
     layout(constant_id = 1) const uint FACTOR = 1;
     layout(constant_id = 2) const uint TERM = 0;
     layout(constant_id = 3) const uint COUNT = 0;
-    layout(scalar, set=0, binding=0) readonly buffer from_block { uint from[]; };
-    layout(scalar, set=0, binding=1) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) readonly buffer from_block { uint from[]; };
+    layout(std430, set=0, binding=1) writeonly buffer to_block { uint to[]; };
     void main() { uint i = gl_GlobalInvocationID.x; if (i < COUNT) to[i] = from[i] * FACTOR + TERM; }"
 );
 

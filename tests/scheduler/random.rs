@@ -12,9 +12,9 @@ toy_shader!(
     "layout(local_size_x = 64) in;
     layout(constant_id = 0) const uint BY = 0;
     layout(constant_id = 1) const uint COUNT = 0;
-    layout(scalar, set=0, binding=0) readonly buffer from_block { uint from[]; };
-    layout(scalar, set=0, binding=1) readonly buffer other_block { uint other[]; };
-    layout(scalar, set=0, binding=2) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) readonly buffer from_block { uint from[]; };
+    layout(std430, set=0, binding=1) readonly buffer other_block { uint other[]; };
+    layout(std430, set=0, binding=2) writeonly buffer to_block { uint to[]; };
     void main() {
         uint i = gl_GlobalInvocationID.x;
         if (i < COUNT) to[i] = from[(i + BY) % COUNT] * 5 + other[(i + 2 * BY) % COUNT] + 1;

@@ -7,9 +7,9 @@ toy_shader!(
     [],
     [("uniforms", R, S, 4), ("totals", RW, S, 4), ("report", W, S, 4)],
     "layout(local_size_x = 16) in;
-    layout(scalar, set=0, binding=0) readonly buffer uniforms_block { uint uniforms[]; };
-    layout(scalar, set=0, binding=1) buffer totals_block { uint totals[]; };
-    layout(scalar, set=0, binding=2) writeonly buffer report_block { uint report[]; };
+    layout(std430, set=0, binding=0) readonly buffer uniforms_block { uint uniforms[]; };
+    layout(std430, set=0, binding=1) buffer totals_block { uint totals[]; };
+    layout(std430, set=0, binding=2) writeonly buffer report_block { uint report[]; };
     void main() {
         uint i = gl_GlobalInvocationID.x;
         totals[i] = totals[i] * 3 + uniforms[i % 4];
@@ -22,8 +22,8 @@ toy_shader!(
     [],
     [("uniforms", R, S, 4), ("arguments", W, S, 4)],
     "layout(local_size_x = 1) in;
-    layout(scalar, set=0, binding=0) readonly buffer uniforms_block { uint uniforms[]; };
-    layout(scalar, set=0, binding=1) writeonly buffer arguments_block { uint arguments[]; };
+    layout(std430, set=0, binding=0) readonly buffer uniforms_block { uint uniforms[]; };
+    layout(std430, set=0, binding=1) writeonly buffer arguments_block { uint arguments[]; };
     void main() { arguments[1] = uniforms[0]; arguments[2] = 1; arguments[3] = 1; }"
 );
 
@@ -32,7 +32,7 @@ toy_shader!(
     [],
     [("marks", W, S, 4)],
     "layout(local_size_x = 32) in;
-    layout(scalar, set=0, binding=0) writeonly buffer marks_block { uint marks[]; };
+    layout(std430, set=0, binding=0) writeonly buffer marks_block { uint marks[]; };
     void main() { marks[gl_GlobalInvocationID.x] = 1; }"
 );
 

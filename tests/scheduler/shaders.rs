@@ -14,7 +14,7 @@ toy_shader!(
     layout(set=0, binding=0) uniform utextureBuffer words;
     layout(set=0, binding=1) uniform textureBuffer planes;
     layout(set=0, binding=2) uniform textureBuffer floats;
-    layout(scalar, set=0, binding=3) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=3) writeonly buffer to_block { uint to[]; };
     void main() {
         int i = int(gl_GlobalInvocationID.x);
         vec4 plane = texelFetch(planes, i);
@@ -30,7 +30,7 @@ toy_shader!(
     "#extension GL_EXT_samplerless_texture_functions : require
     layout(local_size_x = 64) in;
     layout(set=0, binding=0) uniform utextureBuffer texels;
-    layout(scalar, set=0, binding=1) writeonly buffer words_block { uint words[]; };
+    layout(std430, set=0, binding=1) writeonly buffer words_block { uint words[]; };
     void main() { uint i = gl_GlobalInvocationID.x; words[i] = 3 * texelFetch(texels, int(i)).x; }"
 );
 
@@ -39,7 +39,7 @@ toy_shader!(
     [("WIDTH", 7, 32)],
     [("to", W, S, 4)],
     "layout(local_size_x_id = 7) in;
-    layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
+    layout(std430, set=0, binding=0) writeonly buffer to_block { uint to[]; };
     void main() { to[gl_GlobalInvocationID.x] = gl_SubgroupSize * 1000 + gl_SubgroupInvocationID; }"
 );
 
@@ -48,8 +48,8 @@ toy_shader!(
     [],
     [("to", W, S, 4)],
     "layout(local_size_x = 1) in;
-    layout(push_constant, scalar) uniform Push { uint index[32]; };
-    layout(scalar, set=0, binding=0) writeonly buffer to_block { uint to[]; };
+    layout(push_constant) uniform Push { uint index[32]; };
+    layout(std430, set=0, binding=0) writeonly buffer to_block { uint to[]; };
     void main() { to[0] = index[31]; }"
 );
 

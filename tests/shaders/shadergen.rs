@@ -19,13 +19,13 @@ const GOOD: &str = r#"#version 460
 // good — do a little of everything.
 // Work: one invocation per element.
 
-struct Inner { vec2 a; float b; };
-struct Counters { vec3 x; uint n; Inner inner[2]; mat3 m; int k; };
+struct Inner { vec2 a; float b, c; };
+struct Counters { vec3 x; uint n; Inner inner[2]; mat4 m; int k; uint l; uvec2 o; };
 
 READ1(0, Counters, counters);
 FETCH4(1, means);
 FETCHU(2, labels);
-INOUT(3, vec3, colors);
+INOUT(3, vec4, colors);
 WRITE(7, uvec2, keys);
 layout(constant_id = 0) const uint WIDTH = 8;
 layout(constant_id = 1) const float SCALE = 0.25;
@@ -36,7 +36,7 @@ layout(local_size_x_id = 0, local_size_y_id = 6) in;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     float sum = subgroupAdd(fetch4(means, i).x) * (CLAMP ? ALPHA_MIN : SCALE) + float(OFFSET);
-    colors[i] += sum * counters.m * counters.x * counters.inner[1].b;
+    colors[i] += sum * counters.m * vec4(counters.x, counters.inner[1].b);
     keys[i] = uvec2(fetchu(labels, i), WIDTH + counters.n + SEGMENT);
 }
 "#;
@@ -97,10 +97,10 @@ fn a_good_shader_is_reflected_in_full() {
         .map(|binding| (binding.name.as_str(), binding.binding, binding.access, binding.element_bytes))
         .collect();
     let expected = [
-        ("counters", 0, Access::Read, 80),
+        ("counters", 0, Access::Read, 128),
         ("means", 1, Access::Read, 16),
         ("labels", 2, Access::Read, 4),
-        ("colors", 3, Access::ReadWrite, 12),
+        ("colors", 3, Access::ReadWrite, 16),
         ("keys", 7, Access::Write, 8),
     ];
     assert_eq!(shape, expected);
@@ -124,8 +124,15 @@ fn a_good_shader_is_reflected_in_full() {
     assert_eq!(base.interface.local_size, expected);
     let counters = &base.interface.structs["Counters"];
     let offsets: Vec<_> = counters.fields.iter().map(|field| (field.offset, field.ty.rust.as_str())).collect();
-    let expected =
-        [(0, "[f32; 3]"), (12, "u32"), (16, "[super::structs::Inner; 2]"), (40, "[[f32; 3]; 3]"), (76, "i32")];
+    let expected = [
+        (0, "[f32; 3]"),
+        (12, "u32"),
+        (16, "[super::structs::Inner; 2]"),
+        (48, "[[f32; 4]; 4]"),
+        (112, "i32"),
+        (116, "u32"),
+        (120, "[u32; 2]"),
+    ];
     assert_eq!(offsets, expected);
     for text in [
         "macros: &[\"TEXEL\"]",
@@ -184,7 +191,7 @@ fn text_that_does_not_compile_is_found_with_its_line() {
 
 #[test]
 fn another_set_than_0_is_found() {
-    let body = "layout(scalar, set = 1, binding = 1) buffer other_block { uint other[]; };";
+    let body = "layout(std430, set = 1, binding = 1) buffer other_block { uint other[]; };";
     probe(body, "other[0] = 1u;", &["glsl/test/probe.comp:8", "`other` is in set 1; only set 0"]);
 }
 
@@ -204,29 +211,36 @@ fn a_binding_number_used_twice_is_found() {
 
 #[test]
 fn a_block_without_exactly_one_member_is_found() {
-    let body = "layout(scalar, set = 0, binding = 1) buffer pair_block { uint first; uint second[]; };";
+    let body = "layout(std430, set = 0, binding = 1) buffer pair_block { uint first; uint second[]; };";
     probe(body, "first = second[0];", &["probe.comp:8", "`pair_block` has 2 members", "exactly one"]);
 }
 
 #[test]
-fn a_block_that_is_not_scalar_is_found() {
-    let body = "layout(std430, set = 0, binding = 1) buffer normals_block { vec3 normals[]; };";
-    probe(body, "normals[0] = vec3(1);", &["16 bytes apart and 12 bytes long", "layout(scalar)"]);
+fn padding_is_found() {
+    probe("WRITE(1, vec3, normals);", "normals[0] = vec3(1);", &["16 bytes apart and 12 bytes long", "std430"]);
+    let body = "struct Gap { float first; vec2 second; };\nWRITE1(1, Gap, gap);";
+    probe(body, "gap.first = 1.0;", &["`second` of `Gap` is at byte 8, not 4", "follow each vec3"]);
+    let body = "struct Odd { vec2 first; float second; };\nWRITE1(1, Odd, odd);";
+    probe(
+        body,
+        "odd.second = 1.0;",
+        &["`Odd` ends at byte 12, which std430 rounds up to multiples of 8", "at the end"],
+    );
 }
 
 #[test]
 fn other_resources_than_buffers_are_found() {
     let image = "layout(set = 0, binding = 1, rgba8) uniform image2D canvas;";
     probe(image, "imageStore(canvas, ivec2(0), vec4(1));", &["`canvas` is neither a storage block nor"]);
-    let uniform = "layout(scalar, set = 0, binding = 1) uniform rates_block { float rate; };";
+    let uniform = "layout(set = 0, binding = 1) uniform rates_block { float rate; };";
     probe(uniform, "words[0] = uint(rate);", &["uniform blocks are not supported"]);
-    let push = "layout(push_constant, scalar) uniform push_block { uint many[4]; } push;";
+    let push = "layout(push_constant) uniform push_block { uint many[4]; } push;";
     probe(push, "words[0] = push.many[3];", &["glsl/test/probe.comp", "one push_constant block"]);
 }
 
 #[test]
 fn a_block_both_readonly_and_writeonly_is_found() {
-    let body = "layout(scalar, set = 0, binding = 1) readonly writeonly buffer odd_block { uint odd[]; };";
+    let body = "layout(std430, set = 0, binding = 1) readonly writeonly buffer odd_block { uint odd[]; };";
     probe(body, "words[0] = odd.length();", &["`odd` is readonly and writeonly"]);
 }
 

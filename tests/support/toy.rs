@@ -5,10 +5,7 @@ use labelgs::shaders::{Access, BindingDesc, BindingKind, LocalSize, ShaderDesc, 
 
 /// Compiles GLSL (without the version line) and describes its bindings: (name, access, kind, bytes of an element).
 pub fn shader(name: &'static str, glsl: &str, bindings: &[(&'static str, Access, BindingKind, u32)]) -> ShaderDesc {
-    let source = format!(
-        "#version 460\n#extension GL_EXT_scalar_block_layout : require\n\
-         #extension GL_KHR_shader_subgroup_basic : require\n{glsl}"
-    );
+    let source = format!("#version 460\n#extension GL_KHR_shader_subgroup_basic : require\n{glsl}");
     let compiler = shaderc::Compiler::new().expect("shaderc starts");
     let mut options = shaderc::CompileOptions::new().expect("shaderc has options");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);

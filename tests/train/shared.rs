@@ -37,9 +37,9 @@ toy_shader!(
     [],
     [("step_rows", R, S, 4), ("shared_parameters", R, S, 16), ("v_shared", W, S, 16)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
-    layout(scalar, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
-    layout(scalar, set=0, binding=2) writeonly buffer v_shared_block { vec4 v_shared[]; };
+    layout(std430, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
+    layout(std430, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
+    layout(std430, set=0, binding=2) writeonly buffer v_shared_block { vec4 v_shared[]; };
     void main() {
         uint k = gl_GlobalInvocationID.x;
         uint row = k < 6u ? step_rows[k] : ~0u;
@@ -52,9 +52,9 @@ toy_shader!(
     [],
     [("step_rows", R, S, 4), ("shared_parameters", R, S, 16), ("image", RW, S, 16)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
-    layout(scalar, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
-    layout(scalar, set=0, binding=2) buffer image_block { vec4 image[]; };
+    layout(std430, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
+    layout(std430, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
+    layout(std430, set=0, binding=2) buffer image_block { vec4 image[]; };
     void main() {
         uint p = gl_GlobalInvocationID.x;
         if (p < 3744u) image[p].rgb += shared_parameters[step_rows[1]].rgb;
@@ -66,9 +66,9 @@ toy_shader!(
     [],
     [("step_rows", R, S, 4), ("shared_parameters", R, S, 16), ("image", RW, S, 16)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
-    layout(scalar, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
-    layout(scalar, set=0, binding=2) buffer image_block { vec4 image[]; };
+    layout(std430, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
+    layout(std430, set=0, binding=1) readonly buffer shared_block { vec4 shared_parameters[]; };
+    layout(std430, set=0, binding=2) buffer image_block { vec4 image[]; };
     void main() {
         uint p = gl_GlobalInvocationID.x;
         if (p < 3744u) image[p].rgb -= shared_parameters[step_rows[1]].rgb;
@@ -80,9 +80,9 @@ toy_shader!(
     [],
     [("step_rows", R, S, 4), ("v_image", R, S, 16), ("v_shared", W, S, 16)],
     "layout(local_size_x = 64) in;
-    layout(scalar, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
-    layout(scalar, set=0, binding=1) readonly buffer v_image_block { vec4 v_image[]; };
-    layout(scalar, set=0, binding=2) writeonly buffer v_shared_block { vec4 v_shared[]; };
+    layout(std430, set=0, binding=0) readonly buffer step_rows_block { uint step_rows[]; };
+    layout(std430, set=0, binding=1) readonly buffer v_image_block { vec4 v_image[]; };
+    layout(std430, set=0, binding=2) writeonly buffer v_shared_block { vec4 v_shared[]; };
     shared vec3 sums[64];
     void main() {
         uint lane = gl_LocalInvocationID.x;

@@ -44,9 +44,9 @@ pub struct Binding {
 pub struct Type {
     /// Rust text, such as `[f32; 3]` or `super::structs::Counters`.
     pub rust: String,
-    /// Bytes under scalar layout.
+    /// Bytes without padding.
     pub bytes: u32,
-    /// Alignment under scalar layout.
+    /// Alignment in std430.
     pub align: u32,
 }
 
@@ -68,7 +68,7 @@ pub struct Struct {
     pub name: String,
     /// Members in order.
     pub fields: Vec<Field>,
-    /// Bytes under scalar layout.
+    /// Bytes; there is no padding.
     pub bytes: u32,
 }
 

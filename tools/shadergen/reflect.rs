@@ -5,6 +5,9 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass, Word};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+/// What to do about padding, which the Rust side has none of.
+const WHOLE: &str = "let a scalar follow each vec3, and add scalars at the end";
+
 /// A module with lookup tables.
 struct Reflector<'a> {
     module: &'a Module,
@@ -161,7 +164,8 @@ impl<'a> Reflector<'a> {
     fn tight(&mut self, name: &str, stride: u32, element: &Type) {
         if stride != element.bytes {
             let rule = format!(
-                "elements of `{name}` are {stride} bytes apart and {} bytes long; the block needs layout(scalar)",
+                "elements of `{name}` are {stride} bytes apart and {} bytes long; std430 pads vec3 and structs to whole \
+                 vectors",
                 element.bytes
             );
             self.problem(name, rule);
@@ -197,11 +201,20 @@ impl<'a> Reflector<'a> {
             let field = self.member_names.get(&(id, member)).copied().unwrap_or("").to_owned();
             let ty = self.ty(&field, word(instruction, member as usize))?;
             let offset = self.member_decoration(id, member, Decoration::Offset).unwrap_or(0);
+            if offset != end {
+                self.problem(&field, format!("`{field}` of `{name}` is at byte {offset}, not {end}; {WHOLE}"));
+            }
             align = align.max(ty.align);
             end = offset + ty.bytes;
             fields.push(Field { name: field, ty, offset });
         }
-        Some(Struct { name: name.to_owned(), fields, bytes: end.next_multiple_of(align) })
+        if !end.is_multiple_of(align) {
+            self.problem(
+                name,
+                format!("`{name}` ends at byte {end}, which std430 rounds up to multiples of {align}; {WHOLE}"),
+            );
+        }
+        Some(Struct { name: name.to_owned(), fields, bytes: end })
     }
 
     /// The Rust type of a GLSL type; problems are reported for `name`.
@@ -210,9 +223,13 @@ impl<'a> Reflector<'a> {
         match instruction.class.opcode {
             Op::TypeFloat => scalar('f', word(instruction, 0)),
             Op::TypeInt => scalar(if word(instruction, 1) == 1 { 'i' } else { 'u' }, word(instruction, 0)),
-            Op::TypeVector | Op::TypeMatrix => {
-                let element = self.ty(name, word(instruction, 0))?;
-                Some(array(&element, word(instruction, 1)))
+            Op::TypeVector => {
+                let (element, length) = (self.ty(name, word(instruction, 0))?, word(instruction, 1));
+                Some(Type { align: element.align * length.next_power_of_two(), ..array(&element, length) })
+            }
+            Op::TypeMatrix => {
+                let column = self.ty(name, word(instruction, 0))?;
+                Some(array(&column, word(instruction, 1)))
             }
             Op::TypeArray => {
                 let element = self.ty(name, word(instruction, 0))?;

@@ -1,5 +1,4 @@
 #version 460
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_samplerless_texture_functions : require
 // copy — bytes a second from one large buffer to another, as the engine's kernels move them.
 
@@ -8,10 +7,10 @@ layout(local_size_x = 64) in;
 layout(set = 0, binding = 0) uniform textureBuffer from;
 #define FROM(i) texelFetch(from, int(i))
 #else
-layout(scalar, set = 0, binding = 0) readonly buffer from_block { vec4 from[]; };
+layout(std430, set = 0, binding = 0) readonly buffer from_block { vec4 from[]; };
 #define FROM(i) from[i]
 #endif
-layout(scalar, set = 0, binding = 1) writeonly buffer to_block { vec4 to[]; };
+layout(std430, set = 0, binding = 1) writeonly buffer to_block { vec4 to[]; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;

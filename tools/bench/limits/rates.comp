@@ -1,5 +1,4 @@
 #version 460
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 // rates — how often a second the device does one thing: multiplies and adds, exp2, divides, loads 16 bytes of shared memory
 // or adds to a word of a buffer. Eight chains do not wait for each other.
@@ -7,7 +6,7 @@
 layout(constant_id = 0) const uint OPERATION = 0; // 0 v * a + b, 1 exp2, 2 division, 3 load, 4 and 5 atomic additions
 layout(constant_id = 1) const uint ROUNDS = 4096;
 layout(local_size_x = 64) in;
-layout(scalar, set = 0, binding = 0) buffer to_block { uint to[]; };
+layout(std430, set = 0, binding = 0) buffer to_block { uint to[]; };
 shared vec4 bank[64];
 
 void main() {

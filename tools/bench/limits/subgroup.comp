@@ -1,5 +1,4 @@
 #version 460
-#extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_shuffle : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -8,7 +7,7 @@
 layout(constant_id = 0) const uint OPERATION = 0; // 0 shuffle, 1 ballot
 layout(constant_id = 1) const uint ROUNDS = 4096;
 layout(local_size_x = 64) in;
-layout(scalar, set = 0, binding = 0) writeonly buffer to_block { uint to[]; };
+layout(std430, set = 0, binding = 0) writeonly buffer to_block { uint to[]; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
