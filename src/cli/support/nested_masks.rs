@@ -10,7 +10,8 @@ use crate::scene::{Gaussians, View};
 use crate::scenes::resample::resample_ids;
 use crate::scenes::window::{Window, windows};
 use crate::stage::Stage;
-use crate::{Error, Result};
+use crate::words::counted;
+use crate::{Error, Result, Setting};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -54,12 +55,13 @@ impl MaskFolders {
     }
 }
 
-/// Gives views the masks of the objects that all of them together choose among nested masks; none to views without any.
+/// Gives views the masks of the objects that all of them together choose among nested masks; none to views without any. Objects
+/// in fewer than `min_views` views are left out.
 pub(crate) fn choose_objects(
     lists: &Path,
     (scene, reading): (&Path, &SceneArgs),
     gpu: &Arc<Gpu>,
-    (model, near): (&Gaussians, f32),
+    (model, near, min_views): (&Gaussians, f32, Option<usize>),
     views: &mut [View],
 ) -> Result<()> {
     let windows = windows(scene, &reading.read.lookup())?;
@@ -92,9 +94,14 @@ pub(crate) fn choose_objects(
     let stage = Stage::new("choosing objects", views.len());
     let pairs: Vec<(&View, Option<&NestedMasks>)> =
         views.iter().zip(&nested).map(|(view, masks)| (view, masks.as_ref())).collect();
-    let found = objects(&mut engine, model, &pairs, near, &mut || stage.count())?;
+    let found = objects(&mut engine, model, &pairs, (near, min_views), &mut || stage.count())?;
     if found.is_empty() {
-        let problem = "no object is found that several views confirm; make masks with more points, or less sure ones";
+        let problem = match min_views {
+            Some(least) => format!("no object has masks in {}; lower {}", counted(least, "view"), Setting("min_views")),
+            None => {
+                "no object is found that several views confirm; make masks with more points, or less sure ones".into()
+            }
+        };
         return Err(Error::data(lists, "", problem));
     }
     for (index, (view, masks)) in views.iter_mut().zip(&nested).enumerate() {

@@ -94,7 +94,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let start = Instant::now();
     if let Some(lists) = &masks.lists {
-        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near), &mut dataset.train)?;
+        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near, None), &mut dataset.train)?;
         dataset.train.retain(|view| view.mask.is_some());
     }
     let names = match masks.ids(args.per_view) {

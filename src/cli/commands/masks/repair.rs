@@ -37,9 +37,10 @@ pub struct RepairArgs {
     /// The ids of each view are its own, as from a segmenter of single photos.
     #[arg(long)]
     pub per_view: bool,
-    /// Least number of views that show an object; objects in fewer views are left out.
-    #[arg(long, value_name = "N", default_value_t = MIN_VIEWS)]
-    pub min_views: usize,
+    /// Least number of views with a mask of an object; objects in fewer views are left out. Default: 2, and 3 for objects among
+    /// nested masks.
+    #[arg(long, value_name = "N")]
+    pub min_views: Option<usize>,
     /// Make masks for photos without one, except those that are held out.
     #[arg(long)]
     pub make_missing: bool,
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
     let mut dataset = open_scene(&args.scene, &args.reading, folders.pictures.clone(), [0.0; 3], true)?;
     let (gpu, near) = (open_gpu(context)?, near_plane(&args.model, args.near)?);
     if let Some(lists) = &folders.lists {
-        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near), &mut dataset.train)?;
+        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near, args.min_views), &mut dataset.train)?;
     }
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.iter().all(|view| view.mask.is_none()) {
@@ -81,8 +82,8 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         done += 1;
         progress.set(done, String::new);
     };
-    let how =
-        Agreement { near, ids: folders.ids(args.per_view), min_views: args.min_views, make_missing: args.make_missing };
+    let min_views = args.min_views.unwrap_or(MIN_VIEWS);
+    let how = Agreement { near, ids: folders.ids(args.per_view), min_views, make_missing: args.make_missing };
     let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
     masks.extend(others);
@@ -168,7 +169,8 @@ fn report(
         text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
     }
     for &(view, id) in left_out.iter().filter(|_| !args.per_view) {
-        text += &format!("{}: {id} is left out, fewer than {} views show the object\n", name(view), args.min_views);
+        let least = args.min_views.unwrap_or(MIN_VIEWS);
+        text += &format!("{}: {id} is left out, fewer than {least} views show the object\n", name(view));
     }
     for &(view, id) in filled {
         text += &format!("{}: {id} was missing\n", name(view));

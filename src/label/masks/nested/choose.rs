@@ -7,8 +7,6 @@ use std::collections::BTreeSet;
 /// Least quality of an object, and least share of views that confirm it: what other views do not confirm gets no object.
 const QUALITY_MIN: f64 = 0.15;
 const SUPPORT_MIN: f64 = 0.5;
-/// Fewest views with a mask of an object, if as many see it.
-const VIEWS_MIN: usize = 3;
 /// Share of a group that no better one covers, which it needs to be an object.
 const OWN_SHARE_MIN: f64 = 0.5;
 /// A part is an object beside the rest of its whole if it has this share of it, quality and support: two things that touch in
@@ -19,9 +17,8 @@ const APART_SUPPORT_MIN: f64 = 0.9;
 /// Share that two such parts may have in common.
 const APART_SHARED_MAX: f64 = 0.3;
 
-/// Returns the groups that other views confirm.
-pub(super) fn confirmed(groups: Vec<Group>, views: usize) -> Vec<Group> {
-    let least = VIEWS_MIN.min(views);
+/// Returns the groups of which enough views have masks: half of those that see it, and `least`.
+pub(super) fn confirmed(groups: Vec<Group>, least: usize) -> Vec<Group> {
     let holds =
         |group: &Group| group.quality >= QUALITY_MIN && group.support >= SUPPORT_MIN && group.best.len() >= least;
     groups.into_iter().filter(holds).collect()

@@ -51,8 +51,8 @@ impl Scene {
         Self { sights, rows, weights }
     }
 
-    /// Returns the groups of masks in at least two views.
-    pub(super) fn groups(&self) -> Vec<Group> {
+    /// Returns the groups of masks, of at least `least` of them.
+    pub(super) fn groups(&self, least: usize) -> Vec<Group> {
         let segments: Vec<Segment> = (self.sights.iter().enumerate())
             .flat_map(|(view, sight)| (0..sight.qualities.len()).map(move |mask| (view, mask as u16)))
             .collect();
@@ -84,7 +84,7 @@ impl Scene {
             links[b].insert(a, overlap);
         }
         let joined = join(&segments, links, JOINED_MIN);
-        let groups = joined.into_par_iter().filter(|group| group.len() > 1).map(|group| self.group(group));
+        let groups = joined.into_par_iter().filter(|group| group.len() >= least).map(|group| self.group(group));
         self.merged(groups.collect::<Vec<_>>().into_iter().flatten().collect())
     }
 

@@ -19,6 +19,9 @@ use sight::Sight;
 
 pub use crate::masks::nested::NestedMasks;
 
+/// Fewest views with a mask of an object where nothing else is asked for, if as many have masks.
+pub const MIN_VIEWS: usize = 3;
+
 /// An object: the best mask of it in each view that has one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
@@ -27,12 +30,13 @@ pub struct Object {
 }
 
 /// Finds the objects in nested masks of views, of the size of the views; `None` for views without. Those that lie on top of
-/// others come last. `engine` holds the model; `tick` is called once per view.
+/// others come last. Each has masks in `min_views` views or more, else in [`MIN_VIEWS`]. `engine` holds the model; `tick` is
+/// called once per view.
 pub fn objects(
     engine: &mut Engine,
     model: &Gaussians,
     views: &[(&View, Option<&NestedMasks>)],
-    near: f32,
+    (near, min_views): (f32, Option<usize>),
     tick: &mut dyn FnMut(),
 ) -> Result<Vec<Object>> {
     let mut sights = Vec::with_capacity(views.len());
@@ -45,7 +49,10 @@ pub fn objects(
     }
     let scene = Scene::new(sights, model.len());
     let with_masks = views.iter().filter(|(_, masks)| masks.is_some()).count();
-    let groups = pattern::without_patterns(&scene, choose::confirmed(scene.groups(), with_masks), &model.means);
+    let least = min_views.unwrap_or(MIN_VIEWS.min(with_masks));
+    // Masks of one view alone are many, and no object unless they are asked for.
+    let groups = choose::confirmed(scene.groups(least.min(2)), least);
+    let groups = pattern::without_patterns(&scene, groups, &model.means);
     let chosen = choose::objects(&scene, &groups).into_iter();
     Ok(chosen.map(|group| Object { masks: groups[group].best.clone().into_iter().collect() }).collect())
 }
@@ -88,7 +95,7 @@ mod tests {
 
     /// Returns the Gaussians of the chosen objects, in order.
     fn chosen(scene: &Scene, views: usize) -> Vec<Range<u32>> {
-        let groups = choose::confirmed(scene.groups(), views);
+        let groups = choose::confirmed(scene.groups(views.min(2)), views);
         let range = |at: usize| groups[at].rows[0]..groups[at].rows[groups[at].rows.len() - 1] + 1;
         choose::objects(scene, &groups).into_iter().map(range).collect()
     }
@@ -106,7 +113,21 @@ mod tests {
     fn what_other_views_do_not_confirm_is_no_object() {
         let [both, one] = [vec![(0..10, 0.6), (30..40, 0.9)], vec![(0..10, 0.6)]];
         let scene = scene(50, &[one.clone(), both, one.clone(), one.clone(), one]);
-        assert_eq!(chosen(&scene, 5), vec![0..10]);
+        assert_eq!(chosen(&scene, 3), vec![0..10]);
+    }
+
+    #[test]
+    fn an_object_needs_as_many_views_as_are_asked_for() {
+        let [all, one] = [vec![(0..10, 0.6), (20..30, 0.7), (40..45, 0.8)], vec![(0..10, 0.6)]];
+        let two = all[..2].to_vec();
+        // What lies at 20 is seen by two views, what lies at 40 by one: others show nothing there.
+        let mut scene = scene(50, &[all, two, one]);
+        let hide = |sight: &mut Sight, from: u32| sight.seen.retain(|&(row, _)| row < from);
+        hide(&mut scene.sights[1], 40);
+        hide(&mut scene.sights[2], 20);
+        assert_eq!(chosen(&scene, 3), vec![0..10]);
+        assert_eq!(chosen(&scene, 2).len(), 2);
+        assert_eq!(chosen(&scene, 1).len(), 3);
     }
 
     #[test]
@@ -119,7 +140,7 @@ mod tests {
     #[test]
     fn a_tight_and_a_loose_mask_of_a_thing_are_one_group() {
         let scene = scene(60, &vec![vec![(10..30, 0.5), (10..34, 0.6)]; 3]);
-        assert_eq!(scene.groups().len(), 1);
+        assert_eq!(scene.groups(2).len(), 1);
         assert_eq!(chosen(&scene, 3), vec![10..34]);
     }
 
@@ -137,10 +158,10 @@ mod tests {
             (scene(means.len(), &vec![masks.collect(); 3]), means)
         };
         let (many, means) = floor(12);
-        let groups = pattern::without_patterns(&many, choose::confirmed(many.groups(), 3), &means);
+        let groups = pattern::without_patterns(&many, choose::confirmed(many.groups(2), 3), &means);
         assert_eq!(groups.iter().map(|group| group.rows.len()).collect::<Vec<_>>(), [27]);
         let (few, means) = floor(2);
-        let groups = pattern::without_patterns(&few, choose::confirmed(few.groups(), 3), &means);
+        let groups = pattern::without_patterns(&few, choose::confirmed(few.groups(2), 3), &means);
         assert_eq!(groups.len(), 3);
     }
 }
