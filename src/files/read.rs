@@ -124,3 +124,10 @@ pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     };
     all().map_err(Error::read(path))
 }
+
+/// Returns the memory that programs can still get without swapping, bytes, where Linux tells.
+pub fn free_memory() -> Option<u64> {
+    let text = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
+}

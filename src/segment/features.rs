@@ -2,10 +2,17 @@
 
 use super::network::Network;
 use half::f16;
-use labelgs_files::atomic;
+use labelgs_files::{atomic, read};
 use labelgs_scene::{Photo, Result};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// Most bytes of features on the disk, of all networks: two thousand photos of MobileSAM.
+const BYTES_MAX: u64 = 4 << 30;
+/// Beginning of the names of the networks' folders.
+const FOLDER: &str = "features-";
 
 /// The features of a photo, in 16 bits: so they are the same, fresh or from the disk.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +41,7 @@ impl Features {
 
     /// Reads features that [`Features::write`] wrote; `None` if there are none that can be read.
     pub fn read(path: &Path, photo: (u32, u32)) -> Option<Self> {
-        let bytes = labelgs_files::read::bytes(path).ok()?;
+        let bytes = read::bytes(path).ok()?;
         let file = SafeTensors::deserialize(&bytes).ok()?;
         let tensor = |at: usize| {
             let tensor = file.tensor(&at.to_string()).ok().filter(|tensor| tensor.dtype() == Dtype::F16)?;
@@ -73,12 +80,20 @@ pub fn digest(bytes: &[u8]) -> u64 {
 #[derive(Clone, Debug)]
 pub struct FeatureCache {
     folder: Option<PathBuf>,
+    bytes_max: u64,
 }
 
 impl FeatureCache {
-    /// Uses a folder, which writing creates; without one, nothing is kept.
+    /// Uses a folder, which writing creates; without one, nothing is kept. Where the features of all networks there take more than
+    /// 4 GiB, those that were not used for longest are deleted.
     pub fn new(folder: Option<&Path>, network: &Network) -> Self {
-        Self { folder: folder.map(|folder| folder.join(format!("features-{}", network.digest))) }
+        let folder = folder.map(|folder| folder.join(format!("{FOLDER}{}", network.digest)));
+        Self { folder, bytes_max: BYTES_MAX }
+    }
+
+    /// Sets the most bytes that features may take.
+    pub fn bounded(self, bytes_max: u64) -> Self {
+        Self { bytes_max, ..self }
     }
 
     /// Returns the features of a photo: those on the disk, or fresh ones, which are written there.
@@ -87,10 +102,39 @@ impl FeatureCache {
         let (digest, size) = (digest(photo.rgba.as_flattened()), (photo.width, photo.height));
         let path = folder.join(format!("{digest:016x}-{}x{}.safetensors", size.0, size.1));
         if let Some(found) = Features::read(&path, size) {
+            // A file that cannot be marked as used is deleted sooner.
+            let _ = File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
             return Ok(found);
         }
         let features = network.encode(photo)?;
         features.write(&path)?;
+        if let Some(folder) = folder.parent() {
+            bound(folder, self.bytes_max, &path);
+        }
         Ok(features)
+    }
+}
+
+/// Deletes the features that were not used for longest, but for `newest`, until those that are left take `bytes_max` at most.
+/// What cannot be listed or deleted stays: other processes use the folder too.
+fn bound(folder: &Path, bytes_max: u64, newest: &Path) {
+    let of_network = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(FOLDER));
+    let networks = read::folder(folder).unwrap_or_default().into_iter().filter(of_network);
+    let files = networks.flat_map(|network| read::folder(&network).unwrap_or_default());
+    let mut used: Vec<(SystemTime, u64, PathBuf)> = files
+        .filter_map(|path| {
+            let found = fs::metadata(&path).ok()?;
+            Some((found.modified().ok()?, found.len(), path))
+        })
+        .collect();
+    used.sort_unstable();
+    let mut bytes: u64 = used.iter().map(|(_, bytes, _)| bytes).sum();
+    for (_, of_file, path) in used.iter().filter(|(.., path)| path != newest) {
+        if bytes <= bytes_max {
+            return;
+        }
+        if fs::remove_file(path).is_ok() {
+            bytes -= of_file;
+        }
     }
 }

@@ -12,5 +12,5 @@ mod prompt;
 pub use candidate::Search;
 pub use features::{FeatureCache, Features};
 pub use levels::{Level, PhotoMasks, masks_of_photo};
-pub use network::{Answer, Network, Prepared};
+pub use network::{Answer, Network, Prepared, threads_for};
 pub use prompt::{Frame, Place, Prompt};

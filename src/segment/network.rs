@@ -14,6 +14,17 @@ use std::sync::Arc;
 const MEAN: [f32; 3] = [123.675, 116.28, 103.53];
 const DEVIATION: [f32; 3] = [58.395, 57.12, 57.375];
 
+/// Memory of an encoder that looks at a photo of 1024 px, and of each thread that asks a decoder, bytes.
+const ENCODER_BYTES: u64 = 400 << 20;
+const THREAD_BYTES: u64 = 60 << 20;
+
+/// Returns the number of threads for a network: one for each processor, fewer if `free` bytes of memory are too few for them.
+pub fn threads_for(processors: usize, free: Option<u64>) -> usize {
+    let fitting = free.map(|bytes| bytes.saturating_sub(ENCODER_BYTES) / THREAD_BYTES);
+    let fitting = fitting.map_or(processors, |count| usize::try_from(count).unwrap_or(processors));
+    processors.min(fitting).max(1)
+}
+
 /// A segmentation network whose weights the user names.
 pub struct Network {
     encoder: Part,

@@ -4,7 +4,7 @@
 mod tiny;
 
 use labelgs_scene::{LabelMap, Photo};
-use labelgs_segment::{FeatureCache, Features, Level, Network, Prompt, Search, masks_of_photo};
+use labelgs_segment::{FeatureCache, Features, Level, Network, Prompt, Search, masks_of_photo, threads_for};
 use std::path::Path;
 
 const SEARCH: Search = Search { grid: 8, min_score: 0.7, min_stability: 0.5 };
@@ -98,6 +98,47 @@ fn features_on_the_disk_are_those_of_the_network() {
     #[expect(clippy::disallowed_methods, reason = "a test damages a file")]
     std::fs::write(&files[0], b"half").expect("written");
     assert_eq!(cache.of(&network, &photo).expect("features"), fresh);
+}
+
+#[test]
+fn threads_fit_into_the_memory_that_is_left() {
+    assert_eq!(threads_for(16, None), 16);
+    assert_eq!(threads_for(16, Some(8 << 30)), 16);
+    assert_eq!(threads_for(16, Some(900 << 20)), 8);
+    assert_eq!(threads_for(16, Some(100 << 20)), 1);
+}
+
+#[test]
+fn features_that_were_not_used_for_longest_make_room() {
+    let folder = tempfile::tempdir().expect("folder");
+    let network = network(&folder.path().join("network"));
+    let root = folder.path().join("cache");
+    let cache = FeatureCache::new(Some(&root), &network);
+    let photos: Vec<Photo> = [80, 96, 112].map(|width| photo(width, 60)).into();
+    let known = |width: &str| walk(&root).iter().any(|path| path.to_string_lossy().contains(&format!("-{width}x60.")));
+    let old = |age: u64| {
+        for path in walk(&root) {
+            let file = std::fs::File::options().append(true).open(path).expect("a file");
+            let time = file.metadata().and_then(|found| found.modified()).expect("a time");
+            file.set_modified(time - std::time::Duration::from_secs(age)).expect("older");
+        }
+    };
+    cache.of(&network, &photos[0]).expect("features");
+    let bytes = std::fs::metadata(&walk(&root)[0]).expect("a file").len();
+    old(10);
+    cache.of(&network, &photos[1]).expect("features");
+    old(10);
+    // Looked at again: the second is what was not used for longest.
+    cache.of(&network, &photos[0]).expect("features");
+    // Another file of the folder is not counted.
+    #[expect(clippy::disallowed_methods, reason = "a test makes a file")]
+    std::fs::write(root.join("pipelines-x.bin"), vec![0; 3 * bytes as usize]).expect("written");
+    cache.bounded(2 * bytes).of(&network, &photos[2]).expect("features");
+    assert!(known("80") && !known("96") && known("112"), "{:?}", walk(&root));
+    assert!(root.join("pipelines-x.bin").is_file());
+    let cache = FeatureCache::new(Some(&root), &network).bounded(1);
+    cache.of(&network, &photos[1]).expect("features");
+    assert!(!known("80") && known("96") && !known("112"), "the newest stays");
 }
 
 #[expect(clippy::disallowed_methods, reason = "a test lists what was written")]

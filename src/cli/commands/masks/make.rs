@@ -10,7 +10,7 @@ use crate::masks::nested;
 use crate::records::pipeline_file::user_cache;
 use crate::scene::{LabelMap, View};
 use crate::scenes::{self, LoadOptions};
-use crate::segment::{FeatureCache, Level, Network, PhotoMasks, Search, masks_of_photo};
+use crate::segment::{FeatureCache, Level, Network, PhotoMasks, Search, masks_of_photo, threads_for};
 use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
@@ -50,7 +50,8 @@ pub struct MakeArgs {
     /// Least stability of a mask: its area where the network is surer, over that where it is less sure.
     #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = share)]
     pub min_stability: f32,
-    /// Threads. Default: as many as there are processors. Each takes about 60 MB besides the network.
+    /// Threads. Default: as many as there are processors, fewer where memory is short: a photo takes about 400 MB, and each thread
+    /// 60 MB.
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
     #[command(flatten)]
@@ -69,7 +70,7 @@ struct Made {
 
 /// Makes the masks.
 pub(crate) fn run(args: &MakeArgs, context: &Context) -> Result<()> {
-    let threads = args.threads.unwrap_or_else(rayon::current_num_threads);
+    let threads = args.threads.unwrap_or_else(|| threads_for(rayon::current_num_threads(), read::free_memory()));
     let network = Network::open(&args.network, threads)?;
     remember(args, &network)?;
     let options = LoadOptions { undistort: false, max_resolution: Some(network.side()), ..LoadOptions::default() };
