@@ -10,6 +10,8 @@ use labelgs::formats::read_model;
 use labelgs::masks::read_mask;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
@@ -97,8 +99,7 @@ fn photos_become_objects_by_a_network_alone() {
     let levels = best_ids(folder, "made/objects");
     assert_eq!(levels.len(), 3, "{levels:?}");
 
-    // Flat colours are learned slowly.
-    labelgs(folder, "train scene --iterations 300 -o plain");
+    from_photos_to_labels(folder);
     labelgs(folder, "masks repair made --model plain --scene scene -o repaired");
     let found = best_ids(folder, "repaired");
     let ids: BTreeSet<u16> = found.values().map(|(id, _)| *id).collect();
@@ -110,6 +111,44 @@ fn photos_become_objects_by_a_network_alone() {
         ["labelled.ply", "object.ply"].map(|name| read_model(folder.join(name)).expect("a model").gaussians);
     assert!(!object.is_empty() && object.len() < all.len() / 2, "{} of {} Gaussians", object.len(), all.len());
     one_click_is_one_object(folder);
+}
+
+/// Trains, makes masks and labels in one command, once killed when it makes masks; leaves the model without labels in `plain`.
+fn from_photos_to_labels(folder: &Path) {
+    // Flat colours are learned slowly.
+    let train = "train scene --network net --iterations 300 -o";
+    let mut killed = std::process::Command::new(env!("CARGO_BIN_EXE_labelgs"));
+    killed.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", folder.join("cache")).current_dir(folder);
+    let mut killed = killed.args(format!("{train} out").split(' ')).stderr(Stdio::null()).spawn().expect("it runs");
+    while !folder.join("out/masks/nested").is_dir() {
+        assert!(killed.try_wait().expect("a child").is_none(), "it ends before it is killed");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    killed.kill().and_then(|()| killed.wait()).expect("killed");
+    let ply = "point_cloud/iteration_300/point_cloud.ply";
+    std::fs::create_dir_all(folder.join("plain/point_cloud/iteration_300")).expect("a folder");
+    for file in ["config.toml", ply] {
+        std::fs::copy(folder.join("out").join(file), folder.join("plain").join(file)).expect("copied");
+    }
+    labelgs(folder, &format!("{train} out --resume"));
+    labelgs(folder, &format!("{train} whole"));
+    let bytes = |run: &str, file: &str| std::fs::read(folder.join(run).join(file)).expect("a file");
+    for file in [ply, "labels.json", "masks/nested/007.json", "masks/agreed/007.png"] {
+        assert!(bytes("out", file) == bytes("whole", file), "{file}");
+    }
+    let found = best_ids(folder, "out/masks/agreed");
+    assert!(found.len() == 3 && found.values().all(|(_, iou)| *iou > 0.5), "{found:?}");
+    // It is a run with masks like others: list, metrics and report have its objects.
+    let metrics: serde_json::Value = serde_json::from_slice(&bytes("out", "metrics.json")).expect("JSON");
+    let objects = metrics["objects"].as_array().expect("objects").len();
+    assert!(objects >= 3 && metrics["test"]["iou_map"].as_f64().is_some_and(|iou| iou > 0.5), "{metrics}");
+    let listed: serde_json::Value = serde_json::from_str(&labelgs(folder, "list out --json")).expect("JSON");
+    let labels = listed["labels"].as_array().map_or(0, |rows| rows.iter().filter(|row| row["label"] != 0).count());
+    assert_eq!(labels, objects, "{listed}");
+    let report = String::from_utf8(bytes("out", "report.html")).expect("text");
+    assert!(report.contains("out/masks/agreed") && !report.contains("There are none"));
+    let refused = refusal(folder, &format!("{train} other --masks scene/masks"));
+    assert!(refused.contains("--network") && refused.contains("--masks"), "{refused}");
 }
 
 /// Clicks on the object of which view 003 shows most, and compares with what all true masks say.

@@ -30,6 +30,12 @@ pub(crate) fn note_only() {
     AT_ONCE.store(false, Ordering::SeqCst);
 }
 
+/// Makes the next signal end the process again, when there is no unsaved work. Fails if one came before.
+pub(crate) fn end_at_once() -> Result<()> {
+    AT_ONCE.store(true, Ordering::SeqCst);
+    check()
+}
+
 /// Returns true if a signal came.
 pub(crate) fn is_noted() -> bool {
     STATUS.load(Ordering::SeqCst) != 0

@@ -3,7 +3,7 @@
 use super::{files_of_photos, write_mask};
 use crate::cli::support::nested_masks::{NESTED, OBJECTS};
 use crate::cli::support::parsers::share;
-use crate::cli::support::{Context, Progress, ReadArgs, quoted};
+use crate::cli::support::{Context, FileArgs, Progress, ReadArgs, quoted};
 use crate::files::resize::bounded_size;
 use crate::files::{atomic, read};
 use crate::masks::nested;
@@ -15,14 +15,19 @@ use crate::words::counted;
 use crate::{Error, Result};
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// File that says how the masks of a folder were made.
 const FILE: &str = "masks.json";
 /// Longest side of a mask, px: twice the grid of the network, so that outlines are as smooth as it draws them.
 const MASK_PX: u32 = 512;
+
+/// Defaults of the flags.
+const GRID: u16 = 12;
+const MIN_SCORE: f32 = 0.7;
+const MIN_STABILITY: f32 = 0.5;
 
 /// The levels of nested masks, and the folders of their id pictures.
 const LEVELS: [(Level, &str); 3] = [(Level::Objects, OBJECTS), (Level::Parts, "parts"), (Level::Wholes, "wholes")];
@@ -42,13 +47,13 @@ pub struct MakeArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Points per side of a photo at which the network is asked.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=128))]
+    #[arg(long, value_name = "N", default_value_t = GRID, value_parser = clap::value_parser!(u16).range(1..=128))]
     pub grid: u16,
     /// Least score of a mask by the network's own word.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.7, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = MIN_SCORE, value_parser = share)]
     pub min_score: f32,
     /// Least stability of a mask: its area where the network is surer, over that where it is less sure.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = MIN_STABILITY, value_parser = share)]
     pub min_stability: f32,
     /// Threads. Default: as many as there are processors, fewer where memory is short: a photo takes about 400 MB, and each thread
     /// 60 MB.
@@ -56,6 +61,22 @@ pub struct MakeArgs {
     pub threads: Option<usize>,
     #[command(flatten)]
     pub read: ReadArgs,
+}
+
+impl MakeArgs {
+    /// Makes the arguments with their defaults.
+    pub(in crate::cli) fn new(scene: &Path, network: &Path, output: PathBuf, files: FileArgs) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            network: network.to_owned(),
+            output,
+            grid: GRID,
+            min_score: MIN_SCORE,
+            min_stability: MIN_STABILITY,
+            threads: None,
+            read: ReadArgs { files, poses: None },
+        }
+    }
 }
 
 /// How masks were made, beside them.
@@ -68,11 +89,27 @@ struct Made {
     min_stability: f32,
 }
 
-/// Makes the masks.
+/// Makes the masks and says what comes next.
 pub(crate) fn run(args: &MakeArgs, context: &Context) -> Result<()> {
+    let (json, text) = make(args, context)?;
+    let [scene, output] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
+    let next = format!(
+        "{text}next:\n  labelgs train {scene} -o plain\n  labelgs label plain --scene {scene} --masks {output} -o labelled.ply\n"
+    );
+    context.show(&json, &next)
+}
+
+/// Opens the network, and the folder for masks that are made by it.
+pub(in crate::cli) fn opened(args: &MakeArgs) -> Result<Network> {
     let threads = args.threads.unwrap_or_else(|| threads_for(rayon::current_num_threads(), read::free_memory()));
     let network = Network::open(&args.network, threads)?;
     remember(args, &network)?;
+    Ok(network)
+}
+
+/// Makes the masks. Returns what was done, as JSON and in words.
+pub(in crate::cli) fn make(args: &MakeArgs, context: &Context) -> Result<(Value, String)> {
+    let network = opened(args)?;
     let options = LoadOptions { undistort: false, max_resolution: Some(network.side()), ..LoadOptions::default() };
     let dataset = scenes::open_logged(&args.scene, &args.read.options(LoadOptions { test_every: None, ..options }))?;
     let views = dataset.all();
@@ -103,14 +140,8 @@ pub(crate) fn run(args: &MakeArgs, context: &Context) -> Result<()> {
     }
     let output = args.output.display().to_string();
     let left = files.len() - made;
-    let [scene, quoted_output] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
-    let text = format!(
-        "{output}: {} in {}, {left} were there\nnext:\n  labelgs train {scene} -o plain\n  labelgs label plain --scene {scene} \
-         --masks {quoted_output} -o labelled.ply\n",
-        counted(masks, "mask"),
-        counted(made, "photo"),
-    );
-    context.show(&json!({ "schema_version": 1, "output": output, "photos": made, "left": left, "masks": masks }), &text)
+    let text = format!("{output}: {} in {}, {left} were there\n", counted(masks, "mask"), counted(made, "photo"));
+    Ok((json!({ "schema_version": 1, "output": output, "photos": made, "left": left, "masks": masks }), text))
 }
 
 /// Writes how the masks are made, or refuses a folder whose masks were made otherwise.

@@ -52,8 +52,23 @@ pub struct RepairArgs {
     pub reading: SceneArgs,
 }
 
-/// Writes masks whose ids agree in all views.
+impl RepairArgs {
+    /// Makes the arguments with their defaults, for a model and its scene.
+    #[cfg(feature = "network")]
+    pub(in crate::cli) fn new(masks: &Path, of: (&Path, &Path), output: PathBuf, reading: SceneArgs) -> Self {
+        let [masks, model, scene] = [masks, of.0, of.1].map(Path::to_owned);
+        Self { masks, model, scene, output, per_view: false, min_views: None, make_missing: false, near: None, reading }
+    }
+}
+
+/// Writes masks whose ids agree in all views, and says what changed.
 pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
+    let (json, text) = repair(args, context)?;
+    context.show(&json, &text)
+}
+
+/// Writes masks whose ids agree in all views. Returns what changed, as JSON and in words.
+pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Value, String)> {
     atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
     let folders = MaskFolders::of(&args.masks)?;
@@ -97,7 +112,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
         }
     }
     table.write(&args.output.join(FILE))?;
-    report(&all, &masks, &repairs, args, context)
+    Ok(report(&all, &masks, &repairs, args))
 }
 
 /// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
@@ -133,13 +148,7 @@ pub(in crate::cli) fn table(
     Ok(LabelTable::new(entries.into_values().collect()))
 }
 
-fn report(
-    views: &[&View],
-    masks: &[Option<LabelMap>],
-    repairs: &Repairs,
-    args: &RepairArgs,
-    context: &Context,
-) -> Result<()> {
+fn report(views: &[&View], masks: &[Option<LabelMap>], repairs: &Repairs, args: &RepairArgs) -> (Value, String) {
     let name = |view: usize| views[view].name.as_str();
     let masks_with_id = |found: &[(usize, u16)]| -> Vec<Value> {
         found.iter().map(|&(view, id)| json!({ "view": name(view), "id": id })).collect()
@@ -186,5 +195,5 @@ fn report(
         filled.len(),
         made.len()
     );
-    context.show(&result, &text)
+    (result, text)
 }

@@ -1,6 +1,8 @@
 //! `labelgs train`.
 
 pub(crate) mod args;
+#[cfg(feature = "network")]
+mod network;
 
 use crate::Result;
 use crate::cli::commands::train::args::TrainArgs;
@@ -16,8 +18,19 @@ use crate::words::counted;
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
     let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
     let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
-    let summary = if args.watch.view { shown(args, request, context)? } else { train(request, context)? };
+    #[cfg(feature = "network")]
+    let summary = match &args.network {
+        Some(folder) => network::run(args, folder, request, context)?,
+        None => trained(args, request, context)?,
+    };
+    #[cfg(not(feature = "network"))]
+    let summary = trained(args, request, context)?;
     context.show(&summary.to_json(), &sentence(&summary))
+}
+
+/// Trains, with a page if one is asked for.
+fn trained(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
+    if args.watch.view { shown(args, request, context) } else { train(request, context) }
 }
 
 /// Trains with progress on the terminal. A signal ends the run after it saved its state.
