@@ -131,21 +131,24 @@ fn from_photos_to_labels(folder: &Path) {
         std::fs::copy(folder.join("out").join(file), folder.join("plain").join(file)).expect("copied");
     }
     labelgs(folder, &format!("{train} out --resume"));
-    labelgs(folder, &format!("{train} whole"));
-    let bytes = |run: &str, file: &str| std::fs::read(folder.join(run).join(file)).expect("a file");
-    for file in [ply, "labels.json", "masks/nested/007.json", "masks/agreed/007.png"] {
-        assert!(bytes("out", file) == bytes("whole", file), "{file}");
+    let bytes = |file: &str| std::fs::read(folder.join("out").join(file)).expect("a file");
+    let files = [ply, "labels.json", "masks/agreed/007.png"];
+    let resumed = files.map(bytes);
+    let metrics: serde_json::Value = serde_json::from_slice(&bytes("metrics.json")).expect("JSON");
+    // From the first step again, and not killed.
+    labelgs(folder, &format!("{train} out"));
+    for (file, before) in files.iter().zip(resumed) {
+        assert!(bytes(file) == before, "{file}");
     }
     let found = best_ids(folder, "out/masks/agreed");
     assert!(found.len() == 3 && found.values().all(|(_, iou)| *iou > 0.5), "{found:?}");
     // It is a run with masks like others: list, metrics and report have its objects.
-    let metrics: serde_json::Value = serde_json::from_slice(&bytes("out", "metrics.json")).expect("JSON");
     let objects = metrics["objects"].as_array().expect("objects").len();
     assert!(objects >= 3 && metrics["test"]["iou_map"].as_f64().is_some_and(|iou| iou > 0.5), "{metrics}");
     let listed: serde_json::Value = serde_json::from_str(&labelgs(folder, "list out --json")).expect("JSON");
     let labels = listed["labels"].as_array().map_or(0, |rows| rows.iter().filter(|row| row["label"] != 0).count());
     assert_eq!(labels, objects, "{listed}");
-    let report = String::from_utf8(bytes("out", "report.html")).expect("text");
+    let report = String::from_utf8(bytes("report.html")).expect("text");
     assert!(report.contains("out/masks/agreed") && !report.contains("There are none"));
     let refused = refusal(folder, &format!("{train} other --masks scene/masks"));
     assert!(refused.contains("--network") && refused.contains("--masks"), "{refused}");
