@@ -31,8 +31,6 @@ pub(crate) struct Info {
     pub schema_version: u32,
     pub scene: String,
     pub masks: Option<String>,
-    /// The masks came after the training.
-    pub labelled_after: bool,
     pub train_views: u64,
     pub test_views: u64,
     /// Whenever the run was started or went on, in turn.
@@ -123,7 +121,6 @@ impl Info {
             schema_version: 1,
             scene: request.scene.display().to_string(),
             masks: masks.map(|masks| masks.display().to_string()),
-            labelled_after: false,
             train_views: dataset.train.len() as u64,
             test_views: dataset.test.len() as u64,
             ended: None,

@@ -11,8 +11,6 @@ mod every;
 mod finish;
 pub(crate) mod history;
 pub(crate) mod info;
-#[cfg(feature = "network")]
-pub(crate) mod labelling;
 pub mod models;
 mod objects;
 pub(crate) mod observer;

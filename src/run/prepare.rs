@@ -126,13 +126,7 @@ fn lookup(settings: &Settings, inputs: &Inputs) -> Lookup {
     Lookup { allow_outside: inputs.allow_outside, images: inputs.images.clone(), poses: settings.read.poses }
 }
 
-/// Reads the scene of a run.
-pub(super) fn read_scene(
-    request: &Request,
-    settings: &Settings,
-    inputs: &Inputs,
-    block: Option<&Block>,
-) -> Result<Dataset> {
+fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Option<&Block>) -> Result<Dataset> {
     let mut options = settings.load_options(inputs.masks.clone());
     options.ignore = inputs.ignore.clone();
     options.max_bad_photos = inputs.max_bad_photos.unwrap_or(options.max_bad_photos);

@@ -125,14 +125,13 @@ fn from_photos_to_labels(folder: &Path) {
         std::thread::sleep(Duration::from_millis(5));
     }
     killed.kill().and_then(|()| killed.wait()).expect("killed");
-    let ply = "point_cloud/iteration_300/point_cloud.ply";
     std::fs::create_dir_all(folder.join("plain/point_cloud/iteration_300")).expect("a folder");
-    for file in ["config.toml", ply] {
-        std::fs::copy(folder.join("out").join(file), folder.join("plain").join(file)).expect("copied");
+    for file in ["config.toml", "point_cloud/iteration_300/point_cloud.ply"] {
+        std::fs::copy(folder.join("out/plain").join(file), folder.join("plain").join(file)).expect("copied");
     }
     labelgs(folder, &format!("{train} out --resume"));
     let bytes = |file: &str| std::fs::read(folder.join("out").join(file)).expect("a file");
-    let files = [ply, "labels.json", "masks/agreed/007.png"];
+    let files = ["point_cloud/iteration_100/point_cloud.ply", "labels.json", "masks/agreed/007.png"];
     let resumed = files.map(bytes);
     let metrics: serde_json::Value = serde_json::from_slice(&bytes("metrics.json")).expect("JSON");
     // From the first step again, and not killed.

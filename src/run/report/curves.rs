@@ -100,7 +100,7 @@ fn marks(run: &Ran, colour: Option<usize>) -> Vec<Mark> {
         Mark { step: f64::from(step), text, colour }
     };
     let mut marks = vec![mark(train.densify_until(), "growth ends")];
-    if run.info.masks.is_some() && !run.info.labelled_after {
+    if run.info.masks.is_some() {
         marks.push(mark(train.labels_from(), "labels begin"));
     }
     if train.full_size_from() > 0 {

@@ -28,9 +28,9 @@ pub struct TrainArgs {
     /// Folder of id masks, one per view by name. Without masks the model has no labels.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
-    /// Folder with a segmentation network, as for `masks make`, for a scene without masks: it is trained without, masks are
-    /// made in OUT/masks, all views choose objects among them, and the model gets labels. With --resume, a stopped run goes on
-    /// in the stage where it was.
+    /// Folder with a segmentation network, as for `masks make`, for a scene without masks: a model is trained in
+    /// OUT/plain, masks are made in OUT/masks, all views choose objects among them, and the model is trained on with these, for
+    /// a third of the steps. With --resume, a stopped run goes on in the stage where it was.
     #[cfg(feature = "network")]
     #[arg(long, value_name = "DIR", conflicts_with_all = ["masks", "block", "occluders"])]
     pub network: Option<PathBuf>,

@@ -16,16 +16,20 @@ use crate::words::counted;
 
 /// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
-    let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
     #[cfg(feature = "network")]
     let summary = match &args.network {
-        Some(folder) => network::run(args, folder, request, context)?,
-        None => trained(args, request, context)?,
+        Some(folder) => network::run(args, folder, context)?,
+        None => once(args, context)?,
     };
     #[cfg(not(feature = "network"))]
-    let summary = trained(args, request, context)?;
+    let summary = once(args, context)?;
     context.show(&summary.to_json(), &sentence(&summary))
+}
+
+fn once(args: &TrainArgs, context: &Context) -> Result<Summary> {
+    let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
+    let request = args.how.request((&args.scene, &args.output), args.masks.clone(), &settings)?;
+    trained(args, request, context)
 }
 
 /// Trains, with a page if one is asked for.

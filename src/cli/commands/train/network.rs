@@ -4,49 +4,73 @@ use super::args::TrainArgs;
 use super::trained;
 use crate::cli::commands::masks::make::{self, MakeArgs};
 use crate::cli::commands::masks::repair::{self, RepairArgs};
-use crate::cli::support::{Context, ReadArgs, SceneArgs, open_gpu, signals};
+use crate::cli::support::{Context, ReadArgs, SceneArgs, signals};
 use crate::files::run_folder::Lock;
-use crate::run::labelling::{label, trained_masks};
-use crate::run::{Request, Settings, Start, Summary};
+use crate::records::checkpoint_folder;
+use crate::run::{Request, Settings, Summary};
 use crate::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Folder of the run with the masks, and the folder there with those that agree.
+/// Folders in that of the run: the run without masks, the masks, and there those that agree.
+const PLAIN: &str = "plain";
 const MASKS: &str = "masks";
 const AGREED: &str = "agreed";
+/// Steps without masks for each one with them.
+const PLAIN_STEPS: u32 = 3;
 
-/// Trains without masks, makes masks, chooses objects among them, and labels the model.
-pub(super) fn run(args: &TrainArgs, network: &Path, request: Request, context: &Context) -> Result<Summary> {
+/// Trains without masks, makes masks, chooses objects among them, and trains the model on with these.
+pub(super) fn run(args: &TrainArgs, network: &Path, context: &Context) -> Result<Summary> {
     let out = args.output.as_path();
-    if let (Start::Newest(_), Some(masks)) = (&request.start, trained_masks(out)?) {
-        let problem = format!("{} was trained with masks, {masks}, which label it; leave it out", out.display());
-        return Err(Error::usage("--network", problem));
+    let (plain, agreed) = (out.join(PLAIN), out.join(MASKS).join(AGREED));
+    let typed = args.how.settings(None)?;
+    let is_last = args.how.resume && agreed.is_dir() && !checkpoint_folder::list(out)?.is_empty();
+    if !is_last {
+        std::fs::create_dir_all(out).map_err(Error::write(out))?;
+        let _lock = Lock::take(out)?;
+        let stopped = masks(args, network, (&plain, &agreed), context)?;
+        if let Some(summary) = stopped {
+            return Ok(summary);
+        }
     }
-    let make = MakeArgs::new(&args.scene, network, out.join(MASKS), args.how.files.clone());
+    tracing::info!("4 of 4: training with masks");
+    let settings = |checkpoint: Option<&Settings>| {
+        let mut settings = args.how.settings(checkpoint)?;
+        settings.train.iterations = typed.train.iterations.div_ceil(PLAIN_STEPS);
+        Ok(settings)
+    };
+    let request = args.how.request((&args.scene, out), Some(agreed), &settings)?;
+    trained(args, Request { init: Some(plain), ..request }, context)
+}
+
+/// Trains without masks and makes those that agree. Returns the result of the training if it was stopped.
+fn masks(
+    args: &TrainArgs,
+    network: &Path,
+    (plain, agreed): (&Path, &PathBuf),
+    context: &Context,
+) -> Result<Option<Summary>> {
+    let make = MakeArgs::new(&args.scene, network, args.output.join(MASKS), args.how.files.clone());
     // What cannot be used fails before hours of training.
     make::opened(&make)?;
+    // Those of an earlier run would be taken for ours after a kill.
+    if agreed.is_dir() {
+        std::fs::remove_dir_all(agreed).map_err(Error::write(agreed))?;
+    }
     tracing::info!("1 of 4: training without masks");
-    let label_request = Request { inputs: request.inputs.clone(), ..Request::new(&args.scene, out) };
-    let summary = trained(args, request, context)?;
+    let settings = |checkpoint: Option<&Settings>| args.how.settings(checkpoint);
+    let summary = trained(args, args.how.request((&args.scene, plain), None, &settings)?, context)?;
     if summary.stopped {
-        return Ok(summary);
+        return Ok(Some(summary));
     }
     // Nothing is lost from here on: what is there is used again.
     signals::end_at_once()?;
-    let _lock = Lock::take(out)?;
-    let poses = Settings::of_model(out)?.map(|settings| settings.read.poses);
+    let poses = Settings::of_model(plain)?.map(|settings| settings.read.poses);
     let read = ReadArgs { poses, ..make.read.clone() };
     tracing::info!("2 of 4: making masks");
     let (_, text) = make::make(&MakeArgs { read: read.clone(), ..make.clone() }, context)?;
     tracing::info!("{}", text.trim_end());
     tracing::info!("3 of 4: choosing objects");
-    let agreed = make.output.join(AGREED);
-    if agreed.is_dir() {
-        std::fs::remove_dir_all(&agreed).map_err(Error::write(&agreed))?;
-    }
-    let reading = SceneArgs { ignore: args.how.ignore.clone(), read, ..SceneArgs::default() }.of_run(out)?;
-    let repair = RepairArgs::new(&make.output, (out, &args.scene), agreed, reading);
-    repair::repair(&repair, context)?;
-    tracing::info!("4 of 4: labelling the model");
-    label(&label_request, &repair.output, open_gpu(context)?, summary)
+    let reading = SceneArgs { ignore: args.how.ignore.clone(), read, ..SceneArgs::default() }.of_run(plain)?;
+    repair::repair(&RepairArgs::new(&make.output, (plain, &args.scene), agreed.clone(), reading), context)?;
+    Ok(None)
 }
