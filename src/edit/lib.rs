@@ -1,10 +1,11 @@
 //! Chooses and changes the labels of a model, without a device.
 //!
 //! A [`Catalogue`] resolves ids and names, and [`choose()`] resolves points, boxes and masks in a view. [`extract`],
-//! [`remove`], [`recolour`], [`relabel`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
+//! [`remove`], [`recolour`], [`relabel`], [`add()`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
 //! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
 //! moves a model; [`summarise`] lists the labels.
 
+pub mod add;
 pub mod catalogue;
 pub mod change;
 pub mod choose;
@@ -17,6 +18,7 @@ pub mod rename;
 pub mod select;
 pub mod simplify;
 
+pub use add::add;
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};

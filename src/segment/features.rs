@@ -96,12 +96,21 @@ impl FeatureCache {
         Self { bytes_max, ..self }
     }
 
+    /// Returns the file of a photo's features, if they are kept.
+    fn file(&self, photo: &Photo) -> Option<PathBuf> {
+        let digest = digest(photo.rgba.as_flattened());
+        Some(self.folder.as_ref()?.join(format!("{digest:016x}-{}x{}.safetensors", photo.width, photo.height)))
+    }
+
+    /// Returns true if the features of a photo are on the disk.
+    pub fn holds(&self, photo: &Photo) -> bool {
+        self.file(photo).is_some_and(|path| path.is_file())
+    }
+
     /// Returns the features of a photo: those on the disk, or fresh ones, which are written there.
     pub fn of(&self, network: &Network, photo: &Photo) -> Result<Features> {
-        let Some(folder) = &self.folder else { return network.encode(photo) };
-        let (digest, size) = (digest(photo.rgba.as_flattened()), (photo.width, photo.height));
-        let path = folder.join(format!("{digest:016x}-{}x{}.safetensors", size.0, size.1));
-        if let Some(found) = Features::read(&path, size) {
+        let Some(path) = self.file(photo) else { return network.encode(photo) };
+        if let Some(found) = Features::read(&path, (photo.width, photo.height)) {
             // A file that cannot be marked as used is deleted sooner.
             let _ = File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
             return Ok(found);

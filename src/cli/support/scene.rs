@@ -2,12 +2,15 @@
 
 use crate::cli::support::args::SceneArgs;
 use crate::cli::support::context::Context;
+use crate::cli::support::model_fit::warn_of_misfit;
 use crate::error::{Error, Result, Setting};
 use crate::gpu::{Gpu, GpuOptions, PipelineStore};
-use crate::records::pipeline_file::PipelineFolder;
+use crate::label::click::Photos;
+use crate::records::pipeline_file::{PipelineFolder, user_cache};
 use crate::run::Settings;
-use crate::scene::{Dataset, View};
+use crate::scene::{Dataset, Gaussians, View};
 use crate::scenes::{self, LoadOptions};
+use crate::segment::Network;
 use crate::train::setup::near_plane::NEAR;
 use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
@@ -47,6 +50,21 @@ pub(crate) fn open_scene(
     let masked_only = reading.masked_only;
     let options = LoadOptions { masks, ignore, max_resolution, test_every, background, masked_only, photos, ..base };
     scenes::open_logged(path, &reading.read.options(options))
+}
+
+/// Reads the photos of a scene for a network, which is asked for objects in a model; warns if they do not fit it. Returns the
+/// views too, in the sizes in which places are typed.
+pub(crate) fn open_photos(
+    (path, model): (&Path, &Gaussians),
+    (scene, reading): (&Path, &SceneArgs),
+    network: &Path,
+) -> Result<(Photos, Dataset)> {
+    let network = Network::open(network, rayon::current_num_threads())?;
+    let typed = open_scene(scene, reading, None, [0.0; 3], false)?;
+    let options = LoadOptions { max_resolution: Some(network.side()), ..LoadOptions::default() };
+    let photos = scenes::open_logged(scene, &reading.read.options(options))?;
+    warn_of_misfit(path, model, &photos)?;
+    Ok((Photos::new(network, user_cache().as_deref(), &typed, photos)?, typed))
 }
 
 /// Returns the views for `test`, `train`, `all` or a list of names.

@@ -1,86 +1,76 @@
-//! `labelgs label --click`: an object from places in photos.
+//! `labelgs label --click` and `--box`: an object from places in photos.
 
 use super::LabelArgs;
-use crate::cli::support::parsers::{At, at};
-use crate::cli::support::{Context, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
-use crate::files::label_table::{LabelEntry, LabelTable};
-use crate::files::resize::bounded_size;
+use crate::cli::support::parsers::{At, BoxAt, at, box_at};
+use crate::cli::support::scene::{find_view, open_photos};
+use crate::cli::support::{Context, near_plane, open_gpu, open_model};
+use crate::edit::add::add;
+use crate::edit::merge::Merged;
+use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
-use crate::label::click::{Click, Clicking};
-use crate::label::vote::model::vote_engine;
-use crate::records::pipeline_file::user_cache;
-use crate::scene::{Dataset, Gaussians, UNLABELLED, View};
-use crate::scenes::{self, LoadOptions};
-use crate::segment::{FeatureCache, Network};
+use crate::label::click::{Area, Click, Clicking, Hints, Photos, Progress};
+use crate::scene::Dataset;
 use crate::stage::Stage;
 use crate::words::counted;
 use crate::{Error, Result};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Longest side of the views in which an object is drawn and compared, px.
-const DRAWN_PX: u32 = 512;
-
-/// Clicks instead of masks.
+/// Clicks or a box instead of masks.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Clicks")]
+#[command(group = ArgGroup::new("places").args(["click", "area"]).multiple(true).requires("network").conflicts_with("masks"))]
 pub struct ClickArgs {
     /// Label what a network sees at pixel x,y of a view, and keep all other labels; 0,0 is the top left pixel of the photo, or of
     /// the smaller photo that --max-resolution makes. More clicks, also in other views, are on the same object.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "network", conflicts_with = "masks")]
+    #[arg(long, value_name = "VIEW:x,y", value_parser = at)]
     pub click: Vec<At>,
     /// A pixel that does not belong to the object. May be given several times.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "click")]
+    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "places")]
     pub not: Vec<At>,
+    /// Label what a network sees in a box of a view: first column and row, and one past the last. With clicks it is around the
+    /// same object.
+    #[arg(id = "area", long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at)]
+    pub area: Option<BoxAt>,
     /// Folder with the segmentation network, as for `masks make`.
-    #[arg(long, value_name = "DIR", requires = "click")]
+    #[arg(long, value_name = "DIR", requires = "places")]
     pub network: Option<PathBuf>,
     /// Name of the object.
-    #[arg(long, value_name = "NAME", requires = "click")]
+    #[arg(long, value_name = "NAME", requires = "places")]
     pub name: Option<String>,
 }
 
 /// Labels one object.
 pub(super) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let folder = args.clicks.network.as_ref().ok_or_else(|| Error::usage("--click", "needs --network"))?;
-    let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let network = Network::open(folder, rayon::current_num_threads())?;
-    let asked = open_scene(&args.scene, &args.reading, None, [0.0; 3], false)?;
-    let options = LoadOptions { max_resolution: Some(network.side()), ..LoadOptions::default() };
-    let mut dataset = scenes::open_logged(&args.scene, &args.reading.read.options(options))?;
-    warn_of_misfit(&args.model, &model, &dataset)?;
-    let clicks = clicks(args, &asked, &dataset)?;
-    let views = dataset.train.iter_mut().chain(&mut dataset.test);
-    views.for_each(|view| {
-        let (width, height) = bounded_size(view.camera.size(), Some(DRAWN_PX));
-        view.camera = view.camera.resized(width, height);
-    });
-    let views = dataset.all();
-    let cache = FeatureCache::new(user_cache().as_deref(), &network);
-    let features = |view: &View| cache.of(&network, &*view.photo()?);
+    let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
+    let (photos, typed) = open_photos((&args.model, &model), (&args.scene, &args.reading), folder)?;
+    let hints = hints(&args.clicks, &typed, &photos)?;
     let start = Instant::now();
-    let mut engine = vote_engine(open_gpu(context)?, &model, &views, 2)?;
+    let mut clicking = Clicking::new(open_gpu(context)?, &model, &photos, near)?;
     let stage = Stage::new("asking the network", 0);
-    let mut photos = 0;
-    let mut clicking =
-        Clicking { engine: &mut engine, model: &model, views: &views, near, network: &network, features: &features };
-    let rows = clicking.object(&clicks, &mut || {
-        photos += 1;
-        stage.count();
+    let (mut questions, mut before) = (0, 0);
+    let rows = clicking.object(&hints, &mut |progress| {
+        if let Progress::Asked { done, .. } = progress {
+            (before..done).for_each(|_| stage.count());
+            questions += done.saturating_sub(before);
+            before = done;
+        }
+        Ok(())
     })?;
     drop(stage);
     let table = LabelTable::find_for_model(&args.model).map(|path| LabelTable::read(&path)).transpose()?;
-    let (label, table) = label(&mut model, &rows, table, args.clicks.name.clone())?;
-    export_model(&args.output, &model, Some(&table), args.write.options(&args.model, &args.output)?)?;
-    let count = rows.iter().filter(|is_in| **is_in).count() as u64;
+    let Merged { model, table, into: label } = add(&model, table, &rows, args.clicks.name.as_deref())?;
+    export_model(&args.output, &model, table.as_ref(), args.write.options(&args.model, &args.output)?)?;
+    let count = rows.iter().filter(|is_in| **is_in).count();
     let (output, seconds) = (args.output.display().to_string(), start.elapsed().as_secs_f64());
-    let name = table.name(label).map_or(String::new(), |name| format!(" ({name})"));
+    let name = args.clicks.name.as_ref().map_or(String::new(), |name| format!(" ({name})"));
     let text = format!(
         "{output}: {} are object {label}{name}, by {} in {seconds:.1} s\n",
-        counted(count as usize, "Gaussian"),
-        counted(photos, "question")
+        counted(count, "Gaussian"),
+        counted(questions, "question")
     );
     context.show(
         &json!({ "schema_version": 1, "output": output, "label": label, "gaussians": count, "seconds": seconds }),
@@ -88,53 +78,25 @@ pub(super) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     )
 }
 
-/// Finds the views of the clicks, and their places at the size at which objects are drawn. `asked` has the size in which they were
-/// typed.
-fn clicks(args: &LabelArgs, asked: &Dataset, dataset: &Dataset) -> Result<Vec<Click>> {
-    let all = dataset.all();
-    let typed = args.clicks.click.iter().map(|at| (at, true)).chain(args.clicks.not.iter().map(|at| (at, false)));
-    let click = |(at, is_on): (&At, bool)| {
-        let flag = if is_on { "--click" } else { "--not" };
-        let view = crate::cli::support::scene::find_view(asked, &at.view)?;
+/// Finds the views of clicks and box. `typed` has the size in which they were typed.
+fn hints(args: &ClickArgs, typed: &Dataset, photos: &Photos) -> Result<Hints> {
+    let in_view = |flag: &'static str, name: &str, [x, y]: [u32; 2]| {
+        let view = find_view(typed, name)?;
         let (width, height) = view.camera.size();
-        if at.pixel[0] >= width || at.pixel[1] >= height {
-            let [x, y] = at.pixel;
-            return Err(Error::usage(
-                flag,
-                format!("{x},{y} is outside of {}, which has {width} x {height} px", view.name),
-            ));
+        if x >= width || y >= height {
+            let problem = format!("{x},{y} is outside of {}, which has {width} x {height} px", view.name);
+            return Err(Error::usage(flag, problem));
         }
-        let index = all.iter().position(|other| other.name == view.name);
-        let index = index.ok_or_else(|| Error::Bug(format!("{} is read once only", view.name)))?;
-        let size = bounded_size(all[index].camera.size(), Some(DRAWN_PX));
-        let along = |axis: usize, from: u32, to: u32| (at.pixel[axis] as f32 + 0.5) * to as f32 / from as f32;
-        Ok(Click { view: index, place: [along(0, width, size.0), along(1, height, size.1)], is_on })
+        photos.index(&view.name)
     };
-    typed.map(click).collect()
-}
-
-/// Gives some Gaussians a label of their own; returns it, and the names with its entry.
-fn label(
-    model: &mut Gaussians,
-    rows: &[bool],
-    table: Option<LabelTable>,
-    name: Option<String>,
-) -> Result<(u32, LabelTable)> {
-    if !rows.contains(&true) {
-        return Err(Error::usage(
-            "--click",
-            "the network found nothing there that the model shows; click in another view",
-        ));
-    }
-    let count = model.len();
-    let labels = model.labels.get_or_insert_with(|| vec![UNLABELLED; count]);
-    let mut entries = table.map(|table| table.labels).unwrap_or_default();
-    let used = labels.iter().copied().chain(entries.iter().map(|entry| entry.id)).max().unwrap_or(0);
-    let new = used + 1;
-    labels.iter_mut().zip(rows).filter(|(_, is_in)| **is_in).for_each(|(label, _)| *label = new);
-    if let Some(confidence) = &mut model.label_confidence {
-        confidence.iter_mut().zip(rows).filter(|(_, is_in)| **is_in).for_each(|(share, _)| *share = 1.0);
-    }
-    entries.push(LabelEntry { name, ..LabelEntry::new(new) });
-    Ok((new, LabelTable::new(entries)))
+    let on = args.click.iter().map(|at| ("--click", at));
+    let click = |(flag, at): (&'static str, &At)| {
+        Ok(Click { view: in_view(flag, &at.view, at.pixel)?, pixel: at.pixel, is_on: flag == "--click" })
+    };
+    let clicks = on.chain(args.not.iter().map(|at| ("--not", at))).map(click).collect::<Result<_>>()?;
+    let area = |BoxAt { view, corners }: &BoxAt| {
+        let last = [corners[2] - 1, corners[3] - 1];
+        Ok(Area { view: in_view("--box", view, last)?, corners: *corners })
+    };
+    Ok(Hints { clicks, area: args.area.as_ref().map(area).transpose()? })
 }

@@ -38,7 +38,7 @@ pub struct LabelArgs {
     /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
     /// together choose which of the nested masks are objects.
     #[arg(long, value_name = "DIR")]
-    #[cfg_attr(feature = "network", arg(required_unless_present = "click"))]
+    #[cfg_attr(feature = "network", arg(required_unless_present = "places"))]
     #[cfg_attr(not(feature = "network"), arg(required = true))]
     pub masks: Option<PathBuf>,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by

@@ -1,0 +1,100 @@
+//! The photos that are asked for an object, and where places in them are.
+
+use crate::error::{Error, Result};
+use crate::files::resize::bounded_size;
+use crate::scene::{Dataset, LabelMap, View};
+use crate::segment::{Answer, FeatureCache, Network, Place, Prepared, Prompt};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Longest side of the views in which an object is drawn and compared, px.
+const DRAWN_PX: u32 = 512;
+
+/// The photos of a scene, and the network that is asked about them.
+pub struct Photos {
+    network: Network,
+    cache: FeatureCache,
+    /// At the size at which objects are drawn.
+    pub(super) views: Vec<View>,
+    /// Size of each view in which places are typed.
+    typed: Vec<(u32, u32)>,
+}
+
+/// Masks of an answer at the size of a view, and how sure the network is of each.
+pub(super) type Masks = (Vec<LabelMap>, Vec<f64>);
+
+impl Photos {
+    /// Takes the views of `typed`, in whose sizes places are given, and their photos of `read`, which are as large as the
+    /// network sees them. Features of photos are kept in `folder`, if there is one.
+    pub fn new(network: Network, folder: Option<&Path>, typed: &Dataset, read: Dataset) -> Result<Self> {
+        let sizes = typed.all();
+        let mut views: Vec<View> = read.train.into_iter().chain(read.test).collect();
+        views.sort_by(|a, b| a.name.cmp(&b.name));
+        let size = |view: &View| {
+            let same = sizes.iter().find(|other| other.name == view.name);
+            let missing = || Error::Bug(format!("{} is read once only", view.name));
+            same.map(|view| view.camera.size()).ok_or_else(missing)
+        };
+        let typed = views.iter().map(size).collect::<Result<_>>()?;
+        for view in &mut views {
+            let (width, height) = bounded_size(view.camera.size(), Some(DRAWN_PX));
+            view.camera = view.camera.resized(width, height);
+        }
+        let cache = FeatureCache::new(folder, &network);
+        Ok(Self { network, cache, views, typed })
+    }
+
+    /// Returns the index of the view with exactly this name.
+    pub fn index(&self, name: &str) -> Result<usize> {
+        let missing = || Error::usage("view", format!("no photo is called {name}"));
+        self.views.iter().position(|view| view.name == name).ok_or_else(missing)
+    }
+
+    /// Returns the name of a view.
+    pub fn name(&self, view: usize) -> &str {
+        &self.views[view].name
+    }
+
+    /// Returns the size in which places of a view are given, px.
+    pub fn size(&self, view: usize) -> (u32, u32) {
+        self.typed[view]
+    }
+
+    /// Returns the place of a typed corner of a pixel in the drawn view; add halves for its middle.
+    pub(super) fn drawn(&self, view: usize, [x, y]: [f32; 2]) -> Place {
+        let ((width, height), to) = (self.typed[view], self.views[view].camera.size());
+        [x * to.0 as f32 / width as f32, y * to.1 as f32 / height as f32]
+    }
+
+    /// Returns the typed pixel at a place of the drawn view.
+    pub(super) fn pixel(&self, view: usize, [x, y]: Place) -> [u32; 2] {
+        let ((width, height), from) = (self.typed[view], self.views[view].camera.size());
+        let along = |at: f32, from: u32, to: u32| ((at * to as f32 / from as f32).max(0.0) as u32).min(to - 1);
+        [along(x, from.0, width), along(y, from.1, height)]
+    }
+
+    /// Returns true if the network has not looked at the photo of a view yet.
+    pub(super) fn is_new(&self, view: usize) -> Result<bool> {
+        Ok(!self.cache.holds(&*self.views[view].photo()?))
+    }
+
+    /// Returns what the network makes of a photo, and the time of that.
+    pub(super) fn prepare(&self, view: usize) -> Result<(Prepared, Duration)> {
+        let start = Instant::now();
+        let features = self.cache.of(&self.network, &*self.views[view].photo()?)?;
+        Ok((self.network.prepare(&features)?, start.elapsed()))
+    }
+
+    /// Asks for masks at the size of the view.
+    pub(super) fn ask(&self, view: usize, prepared: &Prepared, prompt: &Prompt) -> Result<Masks> {
+        let (photo, size) = (prepared.frame.size, self.views[view].camera.size());
+        let scale = [photo.0 as f32 / size.0 as f32, photo.1 as f32 / size.1 as f32];
+        let Answer { masks, scores } = self.network.ask(prepared, &prompt.scaled(scale))?;
+        let draw = |logits: &Vec<f32>| {
+            let inside = prepared.frame.drawn(&|cell| logits[cell], size);
+            LabelMap { width: size.0, height: size.1, ids: inside.into_iter().map(u16::from).collect() }
+        };
+        let scores = scores.iter().map(|score| f64::from(*score).clamp(0.0, 1.0)).collect();
+        Ok((masks.iter().map(draw).collect(), scores))
+    }
+}

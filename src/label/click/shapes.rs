@@ -1,0 +1,117 @@
+//! Masks of an object in single views: which of several views agree, how much two overlap, and where one is thickest.
+
+use super::OBJECT;
+use super::photos::Masks;
+use crate::label::masks::nested::{NestedMasks, sight::Sight};
+use crate::render::Rendered;
+use crate::scene::LabelMap;
+use crate::segment::{Place, Prompt};
+
+/// Overlap of the masks of two views above which both show the object.
+const AGREEING_MIN: f64 = 0.5;
+/// Most places of a mask.
+const PLACES_MAX: usize = 64;
+
+/// The masks of a view that was asked.
+pub(super) struct Asked {
+    view: usize,
+    /// Masks at the size of the view.
+    masks: Vec<LabelMap>,
+    qualities: Vec<f64>,
+    sight: Sight,
+}
+
+impl Asked {
+    pub(super) fn new(view: usize, (masks, qualities): Masks, shown: Option<&Rendered>) -> Self {
+        let layer = |(mask, number): (&LabelMap, u16)| LabelMap {
+            ids: mask.ids.iter().map(|id| id * number).collect(),
+            ..mask.clone()
+        };
+        let nested = NestedMasks { layers: masks.iter().zip(1..).map(layer).collect(), qualities };
+        let sight = shown.map_or_else(Sight::default, |shown| Sight::new(&shown.top_id, &nested));
+        Self { view, masks, qualities: nested.qualities, sight }
+    }
+}
+
+/// Chooses among the masks of the first view, which show a part, the object or more, the one on which the other views agree
+/// most, and returns it with theirs.
+pub(super) fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
+    let Some((first, others)) = asked.split_first() else { return Vec::new() };
+    let overlaps: Vec<_> = others.iter().map(|other| first.sight.overlaps(&other.sight)).collect();
+    let mut best: (f64, Vec<(usize, LabelMap)>) = (-1.0, Vec::new());
+    for (level, mask) in first.masks.iter().enumerate() {
+        let (mut found, mut sum) = (vec![(first.view, mask.clone())], 0.0);
+        for (other, overlaps) in others.iter().zip(&overlaps) {
+            let own = overlaps.iter().filter(|(ours, ..)| usize::from(*ours) == level);
+            let Some((_, theirs, overlap)) = own.max_by(|a, b| a.2.ratio().total_cmp(&b.2.ratio())) else { continue };
+            if overlap.ratio() >= AGREEING_MIN {
+                sum += overlap.ratio();
+                found.push((other.view, other.masks[usize::from(*theirs)].clone()));
+            }
+        }
+        let agreement = first.qualities[level] * (1.0 + sum) / (1 + others.len()) as f64;
+        if agreement > best.0 {
+            best = (agreement, found);
+        }
+    }
+    best.1
+}
+
+/// Returns the intersection of two masks over their union.
+pub(super) fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
+    let count =
+        |of: &dyn Fn(bool, bool) -> bool| a.ids.iter().zip(&b.ids).filter(|(a, b)| of(**a != 0, **b != 0)).count();
+    count(&|a, b| a && b) as f64 / count(&|a, b| a || b).max(1) as f64
+}
+
+/// Returns the box around the pixels of the object and the one of them that is farthest from their border.
+pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
+    let depths = depths(map);
+    let deepest = (0..).zip(&depths).max_by_key(|(at, depth)| (**depth, *at));
+    let (at, _) = deepest.filter(|(_, depth)| **depth > 1)?;
+    let inside = (0_usize..).zip(&depths).filter(|(_, depth)| **depth > 0).map(|(at, _)| place(map, at));
+    let mut corners = [[f32::MAX; 2], [0.0_f32; 2]];
+    for [x, y] in inside {
+        corners[0] = [corners[0][0].min(x - 0.5), corners[0][1].min(y - 0.5)];
+        corners[1] = [corners[1][0].max(x + 0.5), corners[1][1].max(y + 0.5)];
+    }
+    Some(Prompt { on: vec![place(map, at)], off: Vec::new(), area: Some(corners) })
+}
+
+/// Returns places all over a mask, from the one that is farthest from its border outwards.
+pub(super) fn places(map: &LabelMap) -> Vec<Place> {
+    let depths = depths(map);
+    let mut inside: Vec<usize> = (0..depths.len()).filter(|&at| depths[at] > 0).collect();
+    inside.sort_by_key(|&at| std::cmp::Reverse(depths[at]));
+    inside.iter().step_by(inside.len().div_ceil(PLACES_MAX).max(1)).map(|&at| place(map, at)).collect()
+}
+
+/// Returns the middle of a pixel.
+fn place(map: &LabelMap, at: usize) -> Place {
+    let width = map.width as usize;
+    [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5]
+}
+
+/// Returns the city-block distance of each pixel of the object to the next one outside, 0 there. The border of the picture counts
+/// as outside.
+fn depths(map: &LabelMap) -> Vec<u32> {
+    let (width, height) = (map.width as usize, map.height as usize);
+    let mut distance: Vec<u32> = map.ids.iter().map(|&id| if id == OBJECT { u32::MAX / 2 } else { 0 }).collect();
+    for y in 0..height {
+        for x in 0..width {
+            let up = if y > 0 { distance[(y - 1) * width + x] } else { 0 };
+            let left = if x > 0 { distance[y * width + x - 1] } else { 0 };
+            let at = y * width + x;
+            distance[at] = distance[at].min(up + 1).min(left + 1);
+        }
+    }
+    for y in (0..height).rev() {
+        for x in (0..width).rev() {
+            let down = if y + 1 < height { distance[(y + 1) * width + x] } else { 0 };
+            let right = if x + 1 < width { distance[y * width + x + 1] } else { 0 };
+            let at = y * width + x;
+            distance[at] = distance[at].min(down + 1).min(right + 1);
+        }
+    }
+    distance
+}
