@@ -2,6 +2,7 @@
 
 use super::Words;
 use super::message::Edit;
+use crate::edit::add::add;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::change::recolour;
 use crate::edit::merge::{Merged, merge};
@@ -61,6 +62,12 @@ impl<'a> Work<'a> {
         !self.done.is_empty()
     }
 
+    /// Returns what tells models of other Gaussians apart: the file of the last change of their number.
+    pub(super) fn rows_of(&self) -> &Path {
+        let removed = self.done.iter().rev().find(|done| matches!(done.edit, Edit::Remove { .. }));
+        removed.map_or(self.typed, |done| &done.output)
+    }
+
     /// The file that the model as it is now has or would have.
     fn present(&self) -> &Path {
         self.done.last().map_or(self.typed, |done| &done.output)
@@ -73,7 +80,9 @@ impl<'a> Work<'a> {
         }
         let output = self.folder.join(format!("{:03}.ply", self.next));
         let command = self.words.edit(edit, self.present(), &output);
-        Catalogue::new(&self.model, self.table.clone()).check("labels", &labels_of(edit))?;
+        if !matches!(edit, Edit::Label { .. }) {
+            Catalogue::new(&self.model, self.table.clone()).check("labels", &labels_of(edit))?;
+        }
         let (model, table) = changed(&self.model, self.table.as_ref(), edit)?;
         if let Edit::Export { .. } = edit {
             if model.is_empty() {
@@ -142,6 +151,7 @@ impl<'a> Work<'a> {
 fn labels_of(edit: &Edit) -> BTreeSet<u32> {
     match edit {
         Edit::Rename { label, .. } => BTreeSet::from([*label]),
+        Edit::Label { .. } => BTreeSet::new(),
         Edit::Merge { labels } | Edit::Recolour { labels, .. } | Edit::Remove { labels } | Edit::Export { labels } => {
             labels.iter().copied().collect()
         }
@@ -159,6 +169,9 @@ fn changed(model: &Gaussians, table: Option<&LabelTable>, edit: &Edit) -> Result
     match edit {
         Edit::Rename { name, .. } => merged(Some(name)),
         Edit::Merge { .. } => merged(None),
+        Edit::Label { rows, name, .. } => {
+            add(model, table.cloned(), rows, name.as_deref()).map(|Merged { model, table, .. }| (model, table))
+        }
         Edit::Recolour { colour, mix, .. } => Ok((recolour(model, &labels, *colour, *mix), table.cloned())),
         Edit::Remove { .. } => {
             Ok((remove(model, &listed)?, table.map(|table| keep(table, |id| !labels.contains(&id)))))

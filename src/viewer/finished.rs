@@ -1,16 +1,21 @@
 //! Shows a finished model, and changes its labels.
 
 use super::edits::Work;
+use super::finder::Finder;
 use super::hub::{ClientId, Hub};
-use super::message::Message;
+use super::message::{Find, Message};
+use super::object::{Object, pointed};
 use super::painter::{Painter, Source};
 use super::views::{Score, Views, describe_scores};
 use super::{Viewer, Words, rows};
+use crate::edit::add::add;
+use crate::edit::merge::Merged;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
 use crate::engine::Engine;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::files::label_table::LabelTable;
 use crate::gpu::Gpu;
+use crate::label::click::Photos;
 use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Camera, Dataset, Gaussians, Overview};
 use glam::DVec3;
@@ -36,6 +41,8 @@ pub struct Finished<'a> {
     pub options: RenderOptions,
     /// Commands to show.
     pub words: &'a dyn Words,
+    /// Photos that are asked for an object that a page points at; without them pages cannot point at objects.
+    pub photos: Option<Photos>,
 }
 
 /// Serves a finished model until `goes_on` says no. Changes that are in no file yet are saved then; returns their file. As
@@ -51,7 +58,10 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
     let frame = views.frame().unwrap_or_else(|| frame_of(&finished.model));
     let name = gpu.capabilities().name.clone();
     hub.set_views(Arc::clone(&views));
-    let scene = scene(&views, frame, &finished.path.display().to_string(), (&name, false));
+    let mut scene = scene(&views, frame, &finished.path.display().to_string(), (&name, false));
+    scene["finds"] = finished.photos.is_some().into();
+    let near = finished.options.near;
+    let finder = finished.photos.map(|photos| Finder::new(Arc::clone(&gpu), photos, near, Arc::clone(&viewer.hub)));
     let drawing = Drawing {
         engine: Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?,
         options: finished.options,
@@ -63,6 +73,8 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         painter: Painter::new(Arc::clone(&views), is_cpu),
         drawing,
         work: Work::new(finished.path, finished.model, finished.table, finished.words),
+        object: finder.map(Object::new),
+        object_label: None,
         hidden: Vec::new(),
         solo: Vec::new(),
         scores: Vec::new(),
@@ -179,6 +191,9 @@ struct Session<'a> {
     painter: Painter,
     drawing: Drawing,
     work: Work<'a>,
+    object: Option<Object>,
+    /// The label with which the object is drawn until it has one.
+    object_label: Option<u32>,
     hidden: Vec<u32>,
     solo: Vec<u32>,
     scores: Vec<Score>,
@@ -195,8 +210,17 @@ impl Session<'_> {
                 (self.hidden, self.solo) = (hidden, solo);
                 self.redraw().map(|()| String::new())
             }
-            Message::Edit { what } => self.work.apply(&what).and_then(|said| self.redraw().map(|()| said)),
-            Message::Undo => self.work.undo().and_then(|()| self.redraw()).map(|()| String::new()),
+            Message::Edit { what } => self.work.apply(&what).and_then(|said| self.changed().map(|()| said)),
+            // The object that is pointed at is the last change.
+            Message::Undo if self.object.as_ref().is_some_and(Object::is_there) => {
+                self.changed().map(|()| String::new())
+            }
+            Message::Undo => self.work.undo().and_then(|()| self.changed()).map(|()| String::new()),
+            Message::Object { what } => self.find(id, &what).map(|()| String::new()),
+            Message::News { number, news } => {
+                let is_other = self.object.as_mut().is_some_and(|object| object.hear(number, news, self.hub));
+                if is_other { self.redraw() } else { Ok(()) }.map(|()| String::new())
+            }
             Message::Write => self.work.write(),
             Message::Train { .. } | Message::Share { .. } => Ok("No training runs.".to_owned()),
             Message::Ack { .. } | Message::Alive => return Ok(()),
@@ -211,7 +235,36 @@ impl Session<'_> {
         Ok(())
     }
 
+    /// Draws a model that has changed. An object that is pointed at is one of the model before.
+    fn changed(&mut self) -> Result<()> {
+        self.object.as_mut().map(Object::drop);
+        self.redraw()
+    }
+
+    /// Does what a page asks of the object that it points at.
+    fn find(&mut self, id: ClientId, find: &Find) -> Result<()> {
+        let none = || Error::usage("object", "start `labelgs view` with --network to find objects");
+        let object = self.object.as_mut().ok_or_else(none)?;
+        let drawing = &mut self.drawing;
+        let pointed = pointed(find, |from, pixels| self.painter.spot(from, pixels, drawing))?;
+        match (find, pointed) {
+            (_, Some(pointed)) => object.point(id, pointed, (&self.work.model, self.work.rows_of())),
+            (Find::Keep { name }, _) => {
+                self.work.apply(&object.edit(name)?)?;
+                let label = self.object_label;
+                self.changed()?;
+                self.publish();
+                self.hub.reply(id, &json!({ "kind": "kept", "label": label }));
+                Ok(())
+            }
+            _ => self.changed(),
+        }
+    }
+
     fn publish(&self) {
+        if let Some(object) = &self.object {
+            self.hub.publish("object", &object.describe(self.object_label));
+        }
         self.hub.publish("labels", &rows::of_model(&self.work.model, self.work.table.as_ref()));
         self.hub.publish("edits", &self.work.describe());
         self.hub.publish("shown", &json!({ "kind": "shown", "hidden": self.hidden, "solo": self.solo }));
@@ -220,13 +273,24 @@ impl Session<'_> {
     /// Puts the visible part of the model on the device: what rendering all but the hidden labels, or only the chosen
     /// ones, would draw. Labels that are gone do not count.
     fn redraw(&mut self) -> Result<()> {
-        let model = &self.work.model;
+        let with;
+        let rows = self.object.as_ref().and_then(Object::rows);
+        let found = rows.map(|rows| add(&self.work.model, self.work.table.clone(), rows, None)).transpose()?;
+        self.object_label = found.as_ref().map(|found| found.into);
+        let model = match found {
+            Some(Merged { model, .. }) => {
+                with = model;
+                &with
+            }
+            None => &self.work.model,
+        };
         let there: std::collections::BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
         self.hidden.retain(|label| there.contains(label));
         self.solo.retain(|label| there.contains(label));
         let part;
         let shown = if !self.solo.is_empty() {
-            part = extract(model, &self.solo, MIN_LABEL_CONFIDENCE)?;
+            let solo: Vec<u32> = self.solo.iter().copied().chain(self.object_label).collect();
+            part = extract(model, &solo, MIN_LABEL_CONFIDENCE)?;
             &part
         } else if self.hidden.is_empty() {
             model

@@ -114,6 +114,12 @@ impl Hub {
         self.wake.notify_all();
     }
 
+    /// Takes a message of another thread of the server.
+    pub(super) fn note(&self, message: Message) {
+        self.lock().tasks.push_back((0, message));
+        self.wake.notify_all();
+    }
+
     /// Waits for work, at most `most`. Pages have turns; everything else comes before pictures.
     pub(super) fn next(&self, most: Duration) -> Option<(ClientId, Message)> {
         let end = Instant::now() + most;

@@ -3,8 +3,10 @@
 //! A frame is a header of little-endian numbers and its pictures, each after its length: what a browser decodes by
 //! itself, PNG or JPEG.
 
+use super::finder::News;
 use crate::scenes::camera_json::CameraFile;
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// Largest message of a page, bytes.
 pub(super) const BYTES_MAX: usize = 256 << 10;
@@ -91,6 +93,16 @@ pub enum Edit {
         /// The labels.
         labels: Vec<u32>,
     },
+    /// Gives an object that was found a label.
+    #[serde(skip)]
+    Label {
+        /// Which Gaussians it is.
+        rows: Arc<[bool]>,
+        /// Its name, if any.
+        name: Option<String>,
+        /// What was pointed at: flags of `labelgs label`, and what follows them.
+        flags: Vec<(&'static str, String)>,
+    },
     /// Writes the Gaussians as a model of their own; the shown model stays.
     Export {
         /// The labels.
@@ -102,11 +114,7 @@ impl Edit {
     /// Returns what is wrong with the values, if anything.
     pub(super) fn problem(&self) -> Option<String> {
         match self {
-            Self::Rename { name, .. } if name.trim().is_empty() => Some("a name has at least one letter".to_owned()),
-            Self::Rename { name, .. } if name.len() > NAME_MAX => Some(format!("a name has at most {NAME_MAX} bytes")),
-            Self::Rename { name, .. } if name.contains(char::is_control) => {
-                Some("a name is one line of text without control characters".to_owned())
-            }
+            Self::Rename { name, .. } | Self::Label { name: Some(name), .. } => name_problem(name),
             Self::Recolour { colour, mix, .. }
                 if !colour.iter().chain([mix]).all(|value| (0.0..=1.0).contains(value)) =>
             {
@@ -116,6 +124,47 @@ impl Edit {
             _ => None,
         }
     }
+}
+
+fn name_problem(name: &str) -> Option<String> {
+    if name.trim().is_empty() {
+        Some("a name has at least one letter".to_owned())
+    } else if name.len() > NAME_MAX {
+        Some(format!("a name has at most {NAME_MAX} bytes"))
+    } else if name.contains(char::is_control) {
+        Some("a name is one line of text without control characters".to_owned())
+    } else {
+        None
+    }
+}
+
+/// What a page asks of the object that it points at.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "object", rename_all = "lowercase", deny_unknown_fields)]
+pub(super) enum Find {
+    /// It is at a pixel, or that does not belong to it.
+    Click {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// Column and row.
+        pixel: [u32; 2],
+        /// On the object.
+        on: bool,
+    },
+    /// It is in a box.
+    Box {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// First column and row, and the last.
+        corners: [u32; 4],
+    },
+    /// It becomes a label.
+    Keep {
+        /// Its name; empty for none.
+        name: String,
+    },
+    /// It is forgotten.
+    Drop,
 }
 
 /// What a page can ask of a training.
@@ -163,6 +212,19 @@ pub(super) enum Message {
     Edit {
         /// The change.
         what: Edit,
+    },
+    /// Points at an object, or says what becomes of it.
+    Object {
+        /// What.
+        what: Find,
+    },
+    /// News of that object, from the thread that looks for it.
+    #[serde(skip)]
+    News {
+        /// Number of its task.
+        number: u64,
+        /// What.
+        news: News,
     },
     /// Takes back the last change.
     Undo,

@@ -8,11 +8,13 @@
 //! the newest camera wins, one frame is in work and one on the wire. `guard` decides who may ask.
 
 mod edits;
+mod finder;
 mod finished;
 mod guard;
 mod http;
 mod hub;
 mod message;
+mod object;
 mod pace;
 mod page;
 mod painter;

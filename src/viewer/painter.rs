@@ -1,14 +1,17 @@
 //! Draws frames and answers picks, for a finished model and for one in training alike.
 
+use super::finder::Spot;
 use super::hub::{ClientId, Hub};
 use super::message::{Frame, Look, PIXELS_MAX, Pane, Viewpoint};
 use super::pace::Pace;
 use super::pictures::{self, Beside};
 use super::views::{Posed, Score, Views};
 use crate::error::{Error, Result};
+use crate::files::resize::bounded_size;
 use crate::render::{Parts, Rendered};
 use crate::scene::{Camera, Pixels, View};
 use crate::scenes::camera_json::camera_of;
+use glam::DVec2;
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -16,6 +19,11 @@ use std::time::Instant;
 
 /// Time of a moving frame, s: on a graphics card, and on a processor.
 const TARGETS: [f64; 2] = [0.04, 0.08];
+
+/// Longest side of a picture in which the surface is looked up, px.
+const SURFACE_PX: u32 = 1024;
+/// Opacity below which a place shows no surface.
+const OPAQUE_MIN: f32 = 0.5;
 
 /// What draws.
 pub(super) trait Source {
@@ -137,6 +145,33 @@ impl Painter {
             "opacity": rendered.alpha[index],
             "confidence": confidence,
         }))
+    }
+
+    /// Returns what is at pixels of a full picture: in the photo of a view, or on the surface.
+    pub(super) fn spot(&self, from: &Viewpoint, pixels: &[[u32; 2]], source: &mut dyn Source) -> Result<Spot> {
+        let (full, posed) = camera(&self.views, from)?;
+        if let Some(View { name, .. }) = posed.filter(|posed| posed.photo.is_some()) {
+            let share = |[x, y]: &[u32; 2]| {
+                [(f64::from(*x) + 0.5) / f64::from(full.width), (f64::from(*y) + 0.5) / f64::from(full.height)]
+            };
+            return Ok(Spot::Photo(name.clone(), pixels.iter().map(share).collect()));
+        }
+        let (width, height) = bounded_size(full.size(), Some(SURFACE_PX));
+        let small = full.resized(width, height);
+        let rendered = source.render(&small, Parts::DEPTH)?;
+        let depths = rendered.mean_depth()?;
+        let point = |[x, y]: &[u32; 2]| {
+            let along = |at: u32, from: u32, to: u32| (f64::from(at) + 0.5) * f64::from(to) / f64::from(from);
+            let place = DVec2::new(along(*x, full.width, width), along(*y, full.height, height));
+            let at = (place.y as u32).min(height - 1) * width + (place.x as u32).min(width - 1);
+            let (depth, alpha) = (f64::from(depths[at as usize]), rendered.alpha[at as usize]);
+            (alpha >= OPAQUE_MIN && depth > 0.0).then(|| small.unproject(place, depth))
+        };
+        let points: Vec<_> = pixels.iter().filter_map(point).collect();
+        if points.is_empty() {
+            return Err(Error::usage("click", "nothing of the model is here"));
+        }
+        Ok(Spot::Surface(points, full.centre()))
     }
 
     pub(super) fn score(&self, index: usize, source: &mut dyn Source) -> Result<Score> {

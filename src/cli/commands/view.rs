@@ -2,6 +2,7 @@
 
 use crate::cli::support::model_edit::open;
 use crate::cli::support::parsers::{near, share};
+use crate::cli::support::scene::open_photos;
 use crate::cli::support::{
     Context, SceneArgs, TableArg, near_plane, open_gpu, open_scene, quoted, signals, warn_of_misfit,
 };
@@ -31,6 +32,9 @@ pub struct ViewArgs {
     /// Folder of id masks, to score the label maps with.
     #[arg(long, value_name = "DIR", requires = "scene")]
     pub masks: Option<PathBuf>,
+    /// Folder with the segmentation network, as for `masks make`: then a click in the page finds an object.
+    #[arg(long, value_name = "DIR", requires = "scene")]
+    pub network: Option<PathBuf>,
     #[command(flatten)]
     pub table: TableArg,
     /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
@@ -111,16 +115,26 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
         // Without their photos.
         None => Dataset { train: views_of_model(&args.model)?, ..Dataset::default() },
     };
-    if args.scene.is_some() {
-        warn_of_misfit(&args.model, &model, &dataset)?;
-    }
+    let photos = match (&args.scene, &args.network) {
+        // Places are in pixels of whole photos, as in the commands that are shown.
+        (Some(scene), Some(network)) => {
+            let reading = SceneArgs { max_resolution: None, ..args.reading.clone() };
+            Some(open_photos((&args.model, &model), (scene, &reading), network)?.0)
+        }
+        (Some(_), None) => {
+            warn_of_misfit(&args.model, &model, &dataset)?;
+            None
+        }
+        (None, _) => None,
+    };
     let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
     let gpu = open_gpu(context)?;
     let viewer = args.server.start(1.0)?;
     let address = viewer.address();
     context.show(&json!({ "schema_version": 1, "address": address }), &format!("{address}\n"))?;
-    let words = Typed { scene: args.scene.clone(), masks: args.masks.clone() };
-    let finished = Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words };
+    let words = Typed { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
+    let finished =
+        Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words, photos };
     signals::note_only();
     let saved = show(&viewer, finished, gpu, &|| !signals::is_noted())?;
     if let Some(saved) = saved {
@@ -149,6 +163,7 @@ fn open_browser(address: &str) {
 pub(crate) struct Typed {
     pub(crate) scene: Option<PathBuf>,
     pub(crate) masks: Option<PathBuf>,
+    pub(crate) network: Option<PathBuf>,
 }
 
 impl Words for Typed {
@@ -160,6 +175,13 @@ impl Words for Typed {
             Edit::Recolour { labels, colour: [r, g, b], mix } => {
                 ("recolour", format!("--labels {} --colour {r},{g},{b} --mix {mix}", ids(labels)))
             }
+            Edit::Label { name, flags, .. } => {
+                let mut all = format!("--scene {}", self.scene.as_deref().map(path).unwrap_or_default());
+                all += &format!(" --network {}", self.network.as_deref().map(path).unwrap_or_default());
+                flags.iter().for_each(|(flag, at)| all += &format!(" --{flag}={}", quoted(at)));
+                all += &name.as_ref().map_or(String::new(), |name| format!(" --name={}", quoted(name)));
+                ("label", all)
+            }
             Edit::Remove { labels } => ("remove", format!("--labels {}", ids(labels))),
             Edit::Export { labels } => ("extract", format!("--labels {}", ids(labels))),
         };
@@ -170,7 +192,9 @@ impl Words for Typed {
         let flag = |name: &str, value: &Option<PathBuf>| {
             value.as_ref().map_or(String::new(), |value| format!(" --{name} {}", path(value)))
         };
-        format!("labelgs view {}{}{}", path(model), flag("scene", &self.scene), flag("masks", &self.masks))
+        let [scene, masks, network] = [("scene", &self.scene), ("masks", &self.masks), ("network", &self.network)]
+            .map(|(name, value)| flag(name, value));
+        format!("labelgs view {}{scene}{masks}{network}", path(model))
     }
 }
 

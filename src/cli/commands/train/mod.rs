@@ -46,7 +46,7 @@ pub(crate) fn train(request: Request, context: &Context) -> Result<Summary> {
 fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
     let viewer = args.watch.server.start(args.watch.view_share)?;
     tracing::info!("the training is shown at {}", viewer.address());
-    let words = Typed { scene: Some(args.scene.clone()), masks: args.masks.clone() };
+    let words = Typed { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
     let mut terminal = Terminal { context, progress: None };
     let title = args.output.display().to_string();
     observed(request, context, &mut Watched::new(&viewer, &mut terminal, title, &words))
