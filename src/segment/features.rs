@@ -117,7 +117,7 @@ impl FeatureCache {
         }
         let features = network.encode(photo)?;
         features.write(&path)?;
-        if let Some(folder) = folder.parent() {
+        if let Some(folder) = self.folder.as_deref().and_then(Path::parent) {
             bound(folder, self.bytes_max, &path);
         }
         Ok(features)

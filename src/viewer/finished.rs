@@ -218,8 +218,12 @@ impl Session<'_> {
             Message::Undo => self.work.undo().and_then(|()| self.changed()).map(|()| String::new()),
             Message::Object { what } => self.find(id, &what).map(|()| String::new()),
             Message::News { number, news } => {
-                let is_other = self.object.as_mut().is_some_and(|object| object.hear(number, news, self.hub));
-                if is_other { self.redraw() } else { Ok(()) }.map(|()| String::new())
+                if self.object.as_mut().is_some_and(|object| object.hear(number, news, self.hub)) {
+                    self.redraw()?;
+                }
+                // The labels of the model are the same.
+                self.publish_object();
+                return Ok(());
             }
             Message::Write => self.work.write(),
             Message::Train { .. } | Message::Share { .. } => Ok("No training runs.".to_owned()),
@@ -261,10 +265,14 @@ impl Session<'_> {
         }
     }
 
-    fn publish(&self) {
+    fn publish_object(&self) {
         if let Some(object) = &self.object {
             self.hub.publish("object", &object.describe(self.object_label));
         }
+    }
+
+    fn publish(&self) {
+        self.publish_object();
         self.hub.publish("labels", &rows::of_model(&self.work.model, self.work.table.as_ref()));
         self.hub.publish("edits", &self.work.describe());
         self.hub.publish("shown", &json!({ "kind": "shown", "hidden": self.hidden, "solo": self.solo }));

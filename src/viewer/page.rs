@@ -15,6 +15,7 @@ const FILES: &[(&str, &str, &[u8])] = &[
     ("/stage.js", SCRIPT, include_bytes!("page/stage.js")),
     ("/labels.js", SCRIPT, include_bytes!("page/labels.js")),
     ("/edits.js", SCRIPT, include_bytes!("page/edits.js")),
+    ("/object.js", SCRIPT, include_bytes!("page/object.js")),
     ("/views.js", SCRIPT, include_bytes!("page/views.js")),
     ("/training.js", SCRIPT, include_bytes!("page/training.js")),
     ("/dom.js", SCRIPT, include_bytes!("page/dom.js")),

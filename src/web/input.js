@@ -15,7 +15,10 @@ const MOVES = {
 const TURNS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export class Input {
-  /** `stage` has the element `box` and draws after `change`; `actions` has what keys and clicks do besides moving. */
+  /**
+   * `stage` has the element `box` and draws after `change`; `actions` has what keys and clicks do besides moving, and may have
+   * a `tool` that takes clicks of both buttons and drags of the left one.
+   */
   constructor(stage, rig, actions) {
     Object.assign(this, { stage, rig, actions, held: new Set(), pointers: new Map(), isFlight: false });
     this.moved = 0;
@@ -37,11 +40,13 @@ export class Input {
   }
 
   down(event) {
-    if (event.target.closest?.(".wipe, .veil")) return;
+    if (event.target.closest?.(".wipe, .veil, form")) return;
     this.stage.box.focus({ preventScroll: true });
     this.stage.box.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, this.at(event));
     this.moved = 0;
+    this.start = this.at(event);
+    this.tool = this.pointers.size === 1 ? this.actions.tool?.(event) ?? null : this.endTool();
     if (event.button === 1) event.preventDefault();
   }
 
@@ -56,6 +61,10 @@ export class Input {
     this.stage.box.classList.add("dragging");
     if (this.pointers.size === 2) return this.pinch(event.pointerId, last, now);
     const isPan = event.buttons & 6 || event.shiftKey;
+    if (this.tool && !isPan) {
+      this.isBoxed = true;
+      return this.tool.drag(this.start, now);
+    }
     if (isPan) {
       const ratio = this.rig.size[1] / this.stage.box.clientHeight;
       this.rig.pan(dx * ratio, dy * ratio);
@@ -74,9 +83,20 @@ export class Input {
     this.stage.change(true);
   }
 
+  /** A second finger takes the drag over. */
+  endTool(to = null) {
+    if (this.isBoxed) this.tool?.box(this.start, to);
+    this.isBoxed = false;
+    return null;
+  }
+
   up(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     this.stage.box.classList.remove("dragging");
+    if (this.isBoxed) return this.endTool(event.type === "pointercancel" ? null : this.at(event));
+    if (this.tool && event.type !== "pointercancel" && this.moved <= CLICK && event.button !== 1) {
+      return this.tool.click(this.at(event), event.button === 0);
+    }
     if (event.type === "pointercancel" || this.moved > CLICK || event.button !== 0) return;
     const at = this.at(event);
     const now = performance.now();

@@ -1,11 +1,8 @@
 //! From photos to objects, by a network and by instances of single photos.
 
-#[path = "../../src/segment/tests/tiny.rs"]
-mod tiny;
-
+use crate::support::segmenter::{largest_object, paint, tiny};
 use assert_cmd::Command;
 use labelgs::files::LabelTable;
-use labelgs::files::image::write_png_rgb8;
 use labelgs::formats::read_model;
 use labelgs::masks::read_mask;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,17 +40,6 @@ fn place() -> tempfile::TempDir {
     folder
 }
 
-/// Paints each photo in a flat colour for each object, which the tiny network can tell apart.
-fn paint(folder: &Path) {
-    const COLOURS: [[u8; 3]; 4] = [[40, 40, 40], [255, 40, 40], [40, 255, 40], [60, 60, 255]];
-    for view in 0..12 {
-        let mask = read_mask(folder.join(format!("scene/masks/{view:03}.png"))).expect("ids");
-        let pixels: Vec<[u8; 3]> = mask.ids.iter().map(|&id| COLOURS[usize::from(id)]).collect();
-        write_png_rgb8(folder.join(format!("scene/images/{view:03}.png")), mask.width, mask.height, &pixels)
-            .expect("painted");
-    }
-}
-
 /// Returns for each true object the id with the largest IoU in some masks, and that IoU.
 fn best_ids(folder: &Path, masks: &str) -> BTreeMap<u16, (u16, f64)> {
     let mut counts: BTreeMap<(u16, u16), u32> = BTreeMap::new();
@@ -82,7 +68,7 @@ fn photos_become_objects_by_a_network_alone() {
     let Some(_gpu) = crate::support::device() else { return };
     let folder = place();
     let folder = folder.path();
-    paint(folder);
+    paint(&folder.join("scene"));
     tiny::write(&folder.join("net"));
     let make = "masks make scene --network net -o made --grid 5";
     let said = labelgs(folder, make);
@@ -155,11 +141,7 @@ fn from_photos_to_labels(folder: &Path) {
 
 /// Clicks on the object of which view 003 shows most, and compares with what all true masks say.
 fn one_click_is_one_object(folder: &Path) {
-    let mask = read_mask(folder.join("scene/masks/003.png")).expect("ids");
-    let pixels = |id: u16| mask.ids.iter().enumerate().filter(move |(_, found)| **found == id).map(|(at, _)| at);
-    let object = mask.objects().into_iter().max_by_key(|&id| pixels(id).count()).expect("an object");
-    let middle = pixels(object).nth(pixels(object).count() / 2).expect("a pixel");
-    let (x, y) = (middle as u32 % mask.width, middle as u32 / mask.width);
+    let (object, [x, y]) = largest_object(&folder.join("scene"), "003");
     let said = labelgs(
         folder,
         &format!("label plain --scene scene --network net --click 003:{x},{y} --name it -o clicked.ply"),
@@ -167,17 +149,27 @@ fn one_click_is_one_object(folder: &Path) {
     assert!(said.contains("object 1 (it)"), "{said}");
     labelgs(folder, "label plain --scene scene --masks scene/masks -o true.ply");
     let labels = |name: &str| read_model(folder.join(name)).expect("a model").gaussians.labels.expect("labels");
-    let (clicked, truth) = (labels("clicked.ply"), labels("true.ply"));
-    // The model is coarse after so few steps: of what was clicked, most is this object, and no other one.
-    let of = |label: u32| clicked.iter().zip(&truth).filter(|(a, b)| **a == 1 && **b == label).count();
-    let (own, others) = (of(u32::from(object)), (1..=3).map(of).sum::<usize>());
-    assert!(own > 20 && 10 * own >= 9 * others, "{own} of {others}");
+    let truth = labels("true.ply");
+    // The model is coarse after so few steps: of what was found, most is this object, and no other one.
+    let judge = |name: &str| {
+        let found = labels(name);
+        let of = |label: u32| found.iter().zip(&truth).filter(|(a, b)| **a == 1 && **b == label).count();
+        let (own, others) = (of(u32::from(object)), (1..=3).map(of).sum::<usize>());
+        assert!(own > 20 && 10 * own >= 9 * others, "{name}: {own} of {others}");
+    };
+    judge("clicked.ply");
+    // A box with its middle there.
+    let corners = format!("003:{},{},{},{}", x - 5, y - 5, x + 6, y + 6);
+    labelgs(folder, &format!("label plain --scene scene --network net --box {corners} -o boxed.ply"));
+    judge("boxed.ply");
     // Labels of before stay, and a place that shows nothing is told.
     labelgs(folder, &format!("label true.ply --scene scene --network net --click 003:{x},{y} -o both.ply"));
     let both = labels("both.ply");
     assert!(truth.iter().zip(&both).all(|(before, after)| before == after || *after == 4));
     let said = refusal(folder, "label plain --scene scene --network net --click 003:999,0 -o no.ply");
     assert!(said.contains("--click: 999,0 is outside of 003.png, which has 96 x 72 px"), "{said}");
+    let said = refusal(folder, "label plain --scene scene --network net --box 003:90,60,97,72 -o no.ply");
+    assert!(said.contains("--box: 96,71 is outside of 003.png"), "{said}");
 }
 
 #[test]

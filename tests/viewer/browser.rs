@@ -2,7 +2,7 @@
 
 use super::chromium::{Browser, Tab};
 use super::server::{HOSTILE, Picture, Place, Server, model};
-use super::{events, page_file};
+use super::{events, object, page_file};
 use crate::support::device;
 use labelgs::formats::write_model;
 use labelgs::scenes::LoadOptions;
@@ -15,7 +15,7 @@ use std::time::Duration;
 pub const WIDE: (u32, u32) = (1280, 800);
 
 /// The picture of the still camera is there.
-const SETTLED: &str = "window.labelgs?.stage.frame?.exact && labelgs.stage.asked === null && labelgs.stage.isStill \
+pub const SETTLED: &str = "window.labelgs?.stage.frame?.exact && labelgs.stage.asked === null && labelgs.stage.isStill \
                        && !labelgs.stage.isDirty";
 
 #[test]
@@ -50,6 +50,7 @@ fn the_page_works_in_a_browser() {
     a_server_goes_away_and_comes_back(&mut browser, &place);
     a_training_in_the_page(&mut browser, &place);
     a_report_tells_the_values_of_the_step(&mut browser, &place);
+    object::a_click_finds_an_object(&mut browser, &place);
 }
 
 /// The pixels of the last frame.

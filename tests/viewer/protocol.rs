@@ -390,7 +390,7 @@ fn an_interrupted_viewer_loses_no_change() {
 }
 
 /// Takes what the viewer wrote away, runs the commands that it showed, and compares the bytes.
-fn same_by_commands(place: &Place, commands: &[&str], stem: &str) {
+pub(super) fn same_by_commands(place: &Place, commands: &[&str], stem: &str) {
     let read = |ending: &str| std::fs::read(place.path(&format!("{stem}.{ending}"))).expect("a file");
     let own = (read("ply"), read("labels.json"));
     let program = std::path::Path::new(env!("CARGO_BIN_EXE_labelgs")).parent().expect("a folder");

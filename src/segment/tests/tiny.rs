@@ -1,4 +1,5 @@
-//! A promptable network of 1.5 kB: what has the colour of the place that was asked for, within a threshold.
+//! A promptable network of 2 kB: what has the colour of the first place that was asked for, or of the middle of a box, within a
+//! threshold.
 
 use std::path::Path;
 
@@ -99,6 +100,7 @@ pub fn decoder(points: &str) -> Vec<u8> {
     model(&[
         longs("first", &[0]),
         longs("second", &[1]),
+        longs("third", &[2]),
         longs("axis", &[1]),
         longs("yx", &[1, 0]),
         longs("pair", &[1, 2]),
@@ -110,8 +112,19 @@ pub fn decoder(points: &str) -> Vec<u8> {
         floats("threshold", &[1], &[THRESHOLD]),
         floats("sharp", &[1], &[100.0]),
         floats("scales", &[4], &[1.0, 1.0, 4.0, 4.0]),
+        floats("one", &[1], &[1.0]),
+        floats("half", &[1], &[0.5]),
         floats("score", &[1, 1], &[0.95]),
-        node("Slice", &[points, "first", "second", "axis"], "point", &[]),
+        // Of a box that comes first, the second corner is next: a label of 2 becomes 1, all others 0.
+        node("Slice", &[points, "first", "second", "axis"], "asked", &[]),
+        node("Slice", &[points, "second", "third", "axis"], "next", &[]),
+        node("Slice", &["point_labels", "first", "second", "axis"], "kind", &[]),
+        node("Sub", &["kind", "one"], "lower", &[]),
+        node("Max", &["lower", "least"], "is_corner", &[]),
+        node("Sub", &["next", "asked"], "across", &[]),
+        node("Mul", &["across", "half"], "halfway", &[]),
+        node("Mul", &["halfway", "is_corner"], "shift", &[]),
+        node("Add", &["asked", "shift"], "point", &[]),
         node("Div", &["point", "cell"], "cells", &[]),
         node("Max", &["cells", "least"], "above", &[]),
         node("Min", &["above", "most"], "within", &[]),

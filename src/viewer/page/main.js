@@ -5,6 +5,7 @@ import { $, choose, copy, el, toast } from "./dom.js";
 import { Input } from "./input.js";
 import { Labels } from "./labels.js";
 import { Link } from "./link.js";
+import { Finding } from "./object.js";
 import { PANES, Stage } from "./stage.js";
 import { Rig } from "./camera.js";
 import { Training } from "./training.js";
@@ -19,11 +20,9 @@ const link = new Link(hear, (frame) => stage.show(frame), connection);
 stage.link = link;
 const labels = new Labels(link, () => {
   edits.refresh();
-  const mark = edits.chosen.filter((id) => id !== 0).slice(0, 4096);
-  if (mark.join() === stage.mark.join()) return;
-  stage.mark = mark;
-  stage.change();
+  mark();
 });
+const finding = new Finding(link, stage, rig, () => mark());
 const edits = new Edits(link, labels);
 const views = new Views(rig, snap);
 const training = new Training(link);
@@ -33,6 +32,8 @@ function hear(message) {
     case "scene": return begin(message);
     case "labels": return labels.setRows(message);
     case "shown": labels.setShown(message); return stage.change();
+    case "object": return finding.setState(message);
+    case "kept": return labels.select([message.label]);
     case "edits": edits.setState(message); return stage.change();
     case "scores": views.setScores(message); return training.setScores(message, scene?.views ?? []);
     case "training": return training.setState(message);
@@ -47,6 +48,18 @@ function hear(message) {
   }
 }
 
+/** Draws an outline around the selection and the object that was found. */
+function mark() {
+  const found = finding.mark === null ? [] : [finding.mark];
+  const all = [...edits.chosen.filter((id) => id !== 0).slice(0, 4095), ...found];
+  // The object keeps its label while it grows.
+  const what = `${all.join()} ${found.length > 0 ? JSON.stringify([finding.state.count, finding.state.flags, finding.state.first]) : ""}`;
+  if (what === mark.last) return;
+  mark.last = what;
+  stage.mark = all;
+  stage.change();
+}
+
 function begin(message) {
   // The same scene again after a break keeps the camera.
   const isSame = scene !== null && JSON.stringify(scene.views) === JSON.stringify(message.views) && scene.title === message.title;
@@ -59,6 +72,7 @@ function begin(message) {
   labels.isFixed = message.training;
   edits.isFixed = message.training;
   for (const option of $("pane-a").options) if (option.value === "confidence") option.disabled = message.training;
+  finding.setScene(message);
   rig.reset(message, isSame);
   views.setScene(message.views);
   labels.render();
@@ -184,6 +198,7 @@ const input = new Input(stage, rig, {
     spot(at);
     moved();
   }),
+  tool: (event) => (finding.isOn && !event.altKey ? finding : null),
   released: { Space: () => { stage.isPhotoHeld = false; stage.paint(); stage.captions(); } },
   keys: {
     KeyV: () => fly(!input.isFlight),
@@ -208,7 +223,9 @@ const input = new Input(stage, rig, {
     "Ctrl+KeyS": () => edits.save(),
     F2: () => edits.rename(),
     Delete: () => edits.remove(),
-    Escape: () => labels.select([]),
+    KeyO: () => finding.choose(!finding.isOn),
+    Enter: () => finding.keep(),
+    Escape: () => (finding.isThere ? finding.drop() : labels.select([])),
     KeyK: () => training.ask("pause"),
     "?": act.help,
     ...Object.fromEntries(PANES.map(([pane], index) => [`Digit${index + 1}`, () => setPane(0, pane)])),
@@ -219,7 +236,7 @@ labels.onFrame = frameLabels;
 const KEYS = [
   ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
   ["Double click", "set the pivot at the depth below"], ["Click", "select the object; Shift adds, Ctrl takes away"],
-  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
+  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["O", "find an object: click on it, right click takes away, drag a box; Enter keeps, Esc drops; Alt+drag turns"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
   ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
   ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M, Delete", "rename, merge, remove"],
   ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S, Ctrl+Z", "export the selection, save the model, undo"], ["C", "copy the camera"], ["K", "pause a training, or go on"],
@@ -252,4 +269,4 @@ fly(false);
 stage.captions();
 
 // For whoever drives the page from outside.
-window.labelgs = { rig, stage, link, labels, edits, views, training, input };
+window.labelgs = { rig, stage, link, labels, edits, views, training, input, finding };

@@ -215,14 +215,15 @@ export class Stage {
     $("pane-b").closest("label").hidden = this.layout === "one";
   }
 
-  /** The pixel of the full picture under a point of the stage, CSS px; null outside. */
-  pixel(x, y) {
+  /** The pixel of the full picture under a point of the stage, CSS px; outside the nearest one if `isNear`, else null. */
+  pixel(x, y, isNear = false) {
     const ratio = this.canvas.width / this.box.clientWidth;
     const at = [x * ratio, y * ratio];
     const column = this.isPair && at[0] >= this.canvas.width / 2 ? 1 : 0;
     const area = this.area(column);
     const camera = this.rig.file();
     const pixel = [(at[0] - area.x) / area.width * camera.W, (at[1] - area.y) / area.height * camera.H];
+    if (isNear) return pixel.map((at, axis) => Math.floor(Math.max(0, Math.min(at, (axis === 0 ? camera.W : camera.H) - 1))));
     const isInside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera.W && pixel[1] < camera.H;
     return isInside ? pixel.map(Math.floor) : null;
   }
