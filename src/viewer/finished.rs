@@ -12,7 +12,7 @@ use crate::edit::add::add;
 use crate::edit::merge::Merged;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
 use crate::engine::Engine;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crate::files::label_table::LabelTable;
 use crate::gpu::Gpu;
 use crate::label::click::Photos;
@@ -247,7 +247,7 @@ impl Session<'_> {
 
     /// Does what a page asks of the object that it points at.
     fn find(&mut self, id: ClientId, find: &Find) -> Result<()> {
-        let none = || Error::usage("object", "start `labelgs view` with --network to find objects");
+        let none = || Error::usage(Setting("network"), "was not given; without one no object can be found");
         let object = self.object.as_mut().ok_or_else(none)?;
         let drawing = &mut self.drawing;
         let pointed = pointed(find, |from, pixels| self.painter.spot(from, pixels, drawing))?;

@@ -48,7 +48,7 @@ impl Object {
         (model, rows): (&Gaussians, &Path),
     ) -> Result<()> {
         if matches!(pointed, Pointed::Click(_, false)) && !self.is_there() {
-            return Err(Error::usage("click", "take away what is too much after a first click on the object"));
+            return Err(Error::usage("place", "click on the object first, then on what does not belong to it"));
         }
         if self.sent.as_deref() != Some(rows) {
             self.finder.set_model(model.clone());
@@ -124,7 +124,7 @@ pub(super) fn pointed(
         Find::Click { from, pixel, on } => Some(Pointed::Click(at(from, &[*pixel])?, *on)),
         Find::Box { from, corners: [x0, y0, x1, y1] } => {
             if x0 >= x1 || y0 >= y1 {
-                return Err(Error::usage("box", "is empty"));
+                return Err(Error::usage("corners", "are those of an empty box"));
             }
             let pixels = match from {
                 Viewpoint::View(_) => vec![[*x0, *y0], [*x1, *y1]],

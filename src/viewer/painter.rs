@@ -169,7 +169,7 @@ impl Painter {
         };
         let points: Vec<_> = pixels.iter().filter_map(point).collect();
         if points.is_empty() {
-            return Err(Error::usage("click", "nothing of the model is here"));
+            return Err(Error::usage("place", "nothing of the model is here"));
         }
         Ok(Spot::Surface(points, full.centre()))
     }

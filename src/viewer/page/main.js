@@ -236,7 +236,7 @@ labels.onFrame = frameLabels;
 const KEYS = [
   ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
   ["Double click", "set the pivot at the depth below"], ["Click", "select the object; Shift adds, Ctrl takes away"],
-  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["O", "find an object: click on it, right click takes away, drag a box; Enter keeps, Esc drops; Alt+drag turns"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
+  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops; Alt+drag turns"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
   ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
   ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M, Delete", "rename, merge, remove"],
   ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S, Ctrl+Z", "export the selection, save the model, undo"], ["C", "copy the camera"], ["K", "pause a training, or go on"],

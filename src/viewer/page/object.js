@@ -94,7 +94,7 @@ export class Finding {
       if (asked.left) parts.push(`about ${duration(asked.left)} for photos that are new to the network`);
     }
     if (parts.length === 0) parts.push("Click on an object, or drag a box around it");
-    else if (has && !asked) parts.push("click adds, right click takes away");
+    else if (has && !asked) parts.push("click: this too · right click: not this");
     $("object-text").textContent = parts.join(" · ");
   }
 }
