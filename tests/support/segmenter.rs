@@ -21,8 +21,15 @@ pub fn paint(scene: &Path) {
 /// Returns the object of which a view shows most, and a pixel in the middle of it.
 pub fn largest_object(scene: &Path, view: &str) -> (u16, [u32; 2]) {
     let mask = read_mask(scene.join(format!("masks/{view}.png"))).expect("ids");
-    let pixels = |id: u16| mask.ids.iter().enumerate().filter(move |(_, found)| **found == id).map(|(at, _)| at);
-    let object = mask.objects().into_iter().max_by_key(|&id| pixels(id).count()).expect("an object");
-    let middle = pixels(object).nth(pixels(object).count() / 2).expect("a pixel") as u32;
-    (object, [middle % mask.width, middle / mask.width])
+    let pixels = |id: u16| mask.ids.iter().filter(|found| **found == id).count();
+    let object = mask.objects().into_iter().max_by_key(|&id| pixels(id)).expect("an object");
+    (object, pixel_of(scene, view, object))
+}
+
+/// Returns a pixel in the middle of an object.
+pub fn pixel_of(scene: &Path, view: &str, object: u16) -> [u32; 2] {
+    let mask = read_mask(scene.join(format!("masks/{view}.png"))).expect("ids");
+    let pixels: Vec<usize> = (0..mask.ids.len()).filter(|&at| mask.ids[at] == object).collect();
+    let middle = pixels[pixels.len() / 2] as u32;
+    [middle % mask.width, middle / mask.width]
 }

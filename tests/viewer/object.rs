@@ -3,17 +3,22 @@
 use super::browser::{SETTLED, WIDE};
 use super::chromium::{Browser, Tab};
 use super::protocol::same_by_commands;
-use super::server::{Page, Place};
+use super::server::{Page, Place, model};
 use crate::support::device;
-use crate::support::segmenter::{largest_object, paint, tiny};
-use labelgs::formats::read_model;
+use crate::support::segmenter::{largest_object, paint, pixel_of, tiny};
+use labelgs::formats::{read_model, write_model};
 use serde_json::{Value, json};
 
 /// The label that an object gets: the first one after those of the model.
 const NEW: u64 = 5;
 
-/// Gives a place a network, and photos that it can read.
+/// Gives a place a network, photos that it can read, and a model whose surfaces are closed.
 fn prepare(place: &Place) {
+    place.succeeds(&["synth", "fine", "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "4000"]);
+    let mut fine = model(&place.path("fine"));
+    fine.scales.fill([-2.8; 3]);
+    fine.opacities.fill(4.0);
+    write_model(place.path("model.ply"), &fine).expect("a model");
     paint(&place.path("scene"));
     tiny::write(&place.path("net"));
 }
@@ -49,7 +54,7 @@ fn an_object_is_found_grows_and_becomes_a_label() {
     assert_eq!(page.pick(&json!({ "view": 0 }), pixel)["label"], NEW, "it is drawn");
 
     // A free camera: the photo that looks most alike is asked. Then what does not belong to it.
-    let (_, other) = largest_object(&place.path("scene"), "001");
+    let other = pixel_of(&place.path("scene"), "001", object);
     let camera = scene["views"][1]["camera"].clone();
     let second =
         point(&mut page, &json!({ "object": "click", "from": { "camera": camera }, "pixel": other, "on": true }), 2);
@@ -102,6 +107,8 @@ fn an_object_is_found_grows_and_becomes_a_label() {
 /// A click, a name and Enter; a box and Escape.
 pub fn a_click_finds_an_object(browser: &mut Browser, place: &Place) {
     prepare(place);
+    // Pages of servers that have ended were refused.
+    browser.complaints.clear();
     let server = place.view(&["--network", "net"]);
     let tab = browser.open(&server.address, WIDE);
     browser.until(&tab, SETTLED);
