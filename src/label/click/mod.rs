@@ -1,6 +1,7 @@
 //! An object from places in photos: what a network sees there, found again in the other views through the model.
 
 mod photos;
+mod question;
 mod shapes;
 
 pub use photos::Photos;
@@ -11,24 +12,19 @@ use crate::gpu::Gpu;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::decide;
 use crate::label::vote::model::vote_engine;
-use crate::render::{Parts, RenderOptions, Rendered, label_map, render};
+use crate::render::{Parts, RenderOptions, Rendered, render};
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use crate::segment::{Place, Prepared, Prompt};
 use glam::{DVec2, DVec3};
 use photos::Masks;
+use question::{Question, Spot};
 use rayon::prelude::*;
-use shapes::{Asked, agreeing, iou, places, prompt_of};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Views that are asked for a first answer, and at most.
-const FIRST_VIEWS: usize = 12;
-const ALL_VIEWS: usize = 24;
 /// Difference of depths, as a share, up to which a view sees the point and not something in front of it.
 const DEPTH_SHARE_MAX: f64 = 0.04;
-/// IoU of a mask with what the model shows of the object above which it counts in the second round.
-const CONFIRMING_IOU_MIN: f64 = 0.6;
 /// Opacity below which a place shows no surface.
 const OPAQUE_MIN: f32 = 0.5;
 /// The object, in masks and labels of this work.
@@ -113,6 +109,24 @@ pub struct Clicking<'a> {
     /// Views whose photos the network has to look at first, and the time and number of those that it has looked at.
     unseen: BTreeSet<usize>,
     looked: (Duration, u32),
+    answers: Vec<(Question, Vec<bool>)>,
+}
+
+/// Adds Gaussians to an object, or takes them away.
+fn joined(object: Option<&[bool]>, rows: &[bool], is_on: bool) -> Vec<bool> {
+    let Some(object) = object else { return rows.to_vec() };
+    object.iter().zip(rows).map(|(&old, &new)| if is_on { old || new } else { old && !new }).collect()
+}
+
+fn nothing(by_box: bool) -> Error {
+    let problem = "the network found nothing there that the model shows; try another view";
+    Error::usage(Setting(if by_box { "box" } else { "click" }), problem)
+}
+
+/// Returns the index of the pixel at a place; places outside count as at the border.
+fn pixel_of([x, y]: Place, view: &View) -> usize {
+    let along = |at: f32, size: u32| (at.max(0.0) as u32).min(size - 1);
+    (along(y, view.camera.height) * view.camera.width + along(x, view.camera.width)) as usize
 }
 
 /// What was worked out of a view.
@@ -128,12 +142,13 @@ impl<'a> Clicking<'a> {
         let engine = vote_engine(gpu, model, &photos.views.iter().collect::<Vec<_>>(), 2)?;
         let known = photos.views.iter().map(|_| Known::default()).collect();
         let (unseen, looked) = (BTreeSet::new(), (Duration::ZERO, 0));
-        Ok(Self { engine, means: model.means.clone(), photos, near, known, unseen, looked })
+        Ok(Self { engine, means: model.means.clone(), photos, near, known, unseen, looked, answers: Vec::new() })
     }
 
     /// Forgets what takes most memory, before another object.
     pub fn forget(&mut self) {
         self.known.iter_mut().for_each(|known| known.prepared = None);
+        self.answers.clear();
     }
 
     /// Returns the view that looks at points most as from `eye` and sees most of them, and where it sees them.
@@ -151,86 +166,48 @@ impl<'a> Clicking<'a> {
         Ok(None)
     }
 
-    /// Returns which Gaussians belong to the object.
+    /// Returns which Gaussians belong to the object: what the box means, or the first click on it, and what other clicks on it add
+    /// or clicks beside it take away, where they are not answered so already. Their order does not matter.
     pub fn object(&mut self, hints: &Hints, observe: Observe) -> Result<Vec<bool>> {
-        let first = hints.first()?;
-        let mut points = Vec::new();
+        hints.first()?;
+        let mut spots = Vec::new();
         for click in &hints.clicks {
-            points.push((self.point(*click)?, click.is_on));
+            spots.push(self.spot(*click)?);
         }
-        let anchors = self.anchors(hints, &points)?;
-        let target = points.iter().find(|(_, is_on)| *is_on).map(|(point, _)| *point).or(anchors.first().copied());
-        let nothing = || {
-            let problem = "the network found nothing there that the model shows; try another view";
-            Error::usage(Setting(if hints.area.is_some() { "box" } else { "click" }), problem)
-        };
-        let mut order = self.by_direction(self.photos.views[first].camera.centre(), target.ok_or_else(nothing)?);
-        order.sort_by_key(|&view| view != first);
-        let mut prompts = Vec::new();
-        for &view in &order {
-            if prompts.len() == FIRST_VIEWS {
-                break;
+        spots.sort_by_key(|spot| !spot.is_on);
+        let area = hints.area.map(|area| Question { spot: None, area: Some(area), others: Vec::new() });
+        let mut object = area.map(|area| self.remembered(area, observe)).transpose()?;
+        for &spot in &spots {
+            if object.as_ref().is_some_and(|object| object[spot.gaussian] == spot.is_on) {
+                continue;
             }
-            prompts.extend(self.prompt(view, hints, (&points, &anchors))?.map(|prompt| (view, prompt)));
-            observe(Progress::Asked { done: 0, all: prompts.len(), left: None })?;
+            let others: Vec<Spot> = spots.iter().filter(|other| other.is_on != spot.is_on).copied().collect();
+            let before = object.as_deref();
+            let found =
+                self.meant(spot, if before.is_some() { &others } else { &[] }, &mut |progress| match progress {
+                    Progress::First(rows) => observe(Progress::First(&joined(before, rows, spot.is_on))),
+                    asked @ Progress::Asked { .. } => observe(asked),
+                })?;
+            object = Some(joined(before, &found, spot.is_on));
         }
-        for view in prompts.iter().map(|(view, _)| *view).chain(order.iter().copied().take(ALL_VIEWS)) {
-            if self.known[view].prepared.is_none() && self.photos.is_new(view)? {
-                self.unseen.insert(view);
-            }
-        }
-        let answers = self.ask_all(&prompts, observe)?;
-        let asked =
-            |((view, _), masks): (&(usize, Prompt), Masks)| Asked::new(*view, masks, self.known[*view].shown.as_ref());
-        let asked: Vec<Asked> = prompts.iter().zip(answers).map(asked).collect();
-        let rows = self.vote(&agreeing(&asked))?;
-        if !rows.contains(&true) {
-            return Err(nothing());
-        }
-        observe(Progress::First(&rows))?;
-        let confirmed = self.confirmed(&order[..order.len().min(ALL_VIEWS)], hints, &points, observe)?;
-        // Where no view confirms, the first answer stands.
-        let found = if confirmed.is_empty() { rows } else { self.vote(&confirmed)? };
-        found.contains(&true).then_some(found).ok_or_else(nothing)
+        object.filter(|object| object.contains(&true)).ok_or_else(|| nothing(hints.area.is_some()))
     }
 
-    /// Asks views for what the model shows now, and returns their masks where they confirm it.
-    fn confirmed(
-        &mut self,
-        views: &[usize],
-        hints: &Hints,
-        points: &[(DVec3, bool)],
-        observe: Observe,
-    ) -> Result<Vec<(usize, LabelMap)>> {
-        let (mut maps, mut prompts) = (Vec::new(), Vec::new());
-        for &view in views {
-            observe(Progress::Asked { done: 0, all: prompts.len(), left: None })?;
-            let map = label_map(&mut self.engine, &self.photos.views[view].camera, self.near)?;
-            let Some(mut prompt) = prompt_of(&map) else { continue };
-            for (point, _) in points.iter().filter(|(_, is_on)| !is_on) {
-                prompt.off.extend(self.place_of(view, *point)?);
+    /// Returns what of the model is at a click.
+    fn spot(&mut self, Click { view, pixel, is_on }: Click) -> Result<Spot> {
+        let place = self.photos.drawn(view, pixel.map(|at| at as f32 + 0.5));
+        let point = self.surface(view, place)?;
+        let shown = self.known[view].shown.as_ref();
+        let top = shown.map(|shown| shown.top_id[pixel_of(place, &self.photos.views[view])]);
+        let gaussian = top.and_then(|top| usize::try_from(top).ok()).filter(|top| *top < self.means.len());
+        match (point, gaussian) {
+            (Some(point), Some(gaussian)) => Ok(Spot { view, point, gaussian, is_on }),
+            _ => {
+                let [x, y] = pixel;
+                let problem = format!("{}:{x},{y} shows nothing of the model", self.photos.name(view));
+                Err(Error::usage(Setting(if is_on { "click" } else { "not" }), problem))
             }
-            prompt.area = self.area(view, hints).or(prompt.area);
-            maps.push(map);
-            prompts.push((view, prompt));
         }
-        let answers = self.ask_all(&prompts, observe)?;
-        let best = |((masks, _), map): (Masks, &LabelMap)| {
-            let found = masks.into_iter().map(|mask| (iou(&mask, map), mask));
-            found.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(iou, _)| *iou >= CONFIRMING_IOU_MIN)
-        };
-        let found = answers.into_iter().zip(&maps).map(best).zip(prompts);
-        Ok(found.filter_map(|(best, (view, _))| Some((view, best?.1))).collect())
-    }
-
-    /// Returns the point of the surface at a click, in the world.
-    fn point(&mut self, click: Click) -> Result<DVec3> {
-        let place = self.photos.drawn(click.view, click.pixel.map(|at| at as f32 + 0.5));
-        self.surface(click.view, place)?.ok_or_else(|| {
-            let [x, y] = click.pixel;
-            let problem = format!("{}:{x},{y} shows nothing of the model", self.photos.name(click.view));
-            Error::usage(Setting("click"), problem)
-        })
     }
 
     /// Returns the point of the surface at a place of a view, if there is one.
@@ -250,7 +227,7 @@ impl<'a> Clicking<'a> {
         }
         let inside =
             place.x >= 0.0 && place.y >= 0.0 && place.x < f64::from(camera.width) && place.y < f64::from(camera.height);
-        let at = (place.y.max(0.0) as u32 * camera.width + place.x.max(0.0) as u32) as usize;
+        let at = pixel_of([place.x as f32, place.y as f32], &self.photos.views[view]);
         let found = self.known[view].shown.as_ref().filter(|_| inside).map(|found| (found.depth[at], found.alpha[at]));
         Ok(found.filter(|(_, alpha)| *alpha >= OPAQUE_MIN).map(|(depth, alpha)| f64::from(depth / alpha)))
     }
@@ -263,50 +240,6 @@ impl<'a> Clicking<'a> {
         let depth = self.depth(view, place)?;
         let is_seen = depth.is_some_and(|depth| (depth - z).abs() <= DEPTH_SHARE_MAX * z);
         Ok(is_seen.then_some([place.x as f32, place.y as f32]))
-    }
-
-    /// Returns the box in the drawn view, if it is there.
-    fn area(&self, view: usize, hints: &Hints) -> Option<[Place; 2]> {
-        let [x0, y0, x1, y1] = hints.area.filter(|area| area.view == view)?.corners.map(|at| at as f32);
-        Some([self.photos.drawn(view, [x0, y0]), self.photos.drawn(view, [x1, y1])])
-    }
-
-    /// Returns points of the surface that the network takes of a box, from its middle outwards; none without a box.
-    fn anchors(&mut self, hints: &Hints, points: &[(DVec3, bool)]) -> Result<Vec<DVec3>> {
-        let Some(Area { view, .. }) = hints.area else { return Ok(Vec::new()) };
-        let Some(prompt) = self.prompt(view, hints, (points, &[]))? else { return Ok(Vec::new()) };
-        let answers = self.ask_all(&[(view, prompt)], &mut |_| Ok(()))?;
-        let best = answers.iter().flat_map(|(masks, qualities)| masks.iter().zip(qualities));
-        let Some((mask, _)) = best.max_by(|a, b| a.1.total_cmp(b.1)) else { return Ok(Vec::new()) };
-        let mut anchors = Vec::new();
-        for place in places(mask) {
-            anchors.extend(self.surface(view, place)?);
-        }
-        Ok(anchors)
-    }
-
-    /// Returns the prompt of a view that has the box or sees a point of the object.
-    fn prompt(
-        &mut self,
-        view: usize,
-        hints: &Hints,
-        (points, anchors): (&[(DVec3, bool)], &[DVec3]),
-    ) -> Result<Option<Prompt>> {
-        let mut prompt = Prompt { area: self.area(view, hints), ..Prompt::default() };
-        for &(point, is_on) in points {
-            let place = self.place_of(view, point)?;
-            if is_on { prompt.on.extend(place) } else { prompt.off.extend(place) }
-        }
-        if prompt.area.is_some() {
-            return Ok(Some(prompt));
-        }
-        for &anchor in anchors {
-            if !prompt.on.is_empty() {
-                break;
-            }
-            prompt.on.extend(self.place_of(view, anchor)?);
-        }
-        Ok((!prompt.on.is_empty()).then_some(prompt))
     }
 
     /// Returns the views by the angle at the point between them and an eye.

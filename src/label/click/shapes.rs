@@ -57,6 +57,13 @@ pub(super) fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
     best.1
 }
 
+/// Returns the masks that have none of these places.
+pub(super) fn without((masks, qualities): Masks, off: &[Place]) -> Masks {
+    let has = |mask: &LabelMap, [x, y]: Place| mask.ids[y as usize * mask.width as usize + x as usize] != 0;
+    let kept = masks.into_iter().zip(qualities).filter(|(mask, _)| !off.iter().any(|place| has(mask, *place)));
+    kept.unzip()
+}
+
 /// Returns the intersection of two masks over their union.
 pub(super) fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
     let count =
