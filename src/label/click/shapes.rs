@@ -9,6 +9,8 @@ use crate::segment::{Place, Prompt};
 
 /// Overlap of the masks of two views above which both show the object.
 const AGREEING_MIN: f64 = 0.5;
+/// Agreement, as a share of the best, from which a smaller mask is preferred: what is missing is easily added by a click.
+const CLOSE_MIN: f64 = 0.9;
 /// Most places of a mask.
 const PLACES_MAX: usize = 64;
 
@@ -34,11 +36,11 @@ impl Asked {
 }
 
 /// Chooses among the masks of the first view, which show a part, the object or more, the one on which the other views agree
-/// most, and returns it with theirs.
+/// most, and returns it with theirs. Of masks on which they agree almost as much, it is the smallest.
 pub(super) fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
     let Some((first, others)) = asked.split_first() else { return Vec::new() };
     let overlaps: Vec<_> = others.iter().map(|other| first.sight.overlaps(&other.sight)).collect();
-    let mut best: (f64, Vec<(usize, LabelMap)>) = (-1.0, Vec::new());
+    let mut levels = Vec::new();
     for (level, mask) in first.masks.iter().enumerate() {
         let (mut found, mut sum) = (vec![(first.view, mask.clone())], 0.0);
         for (other, overlaps) in others.iter().zip(&overlaps) {
@@ -49,12 +51,12 @@ pub(super) fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
                 found.push((other.view, other.masks[usize::from(*theirs)].clone()));
             }
         }
-        let agreement = first.qualities[level] * (1.0 + sum) / (1 + others.len()) as f64;
-        if agreement > best.0 {
-            best = (agreement, found);
-        }
+        levels.push((first.qualities[level] * (1.0 + sum), found));
     }
-    best.1
+    let most = levels.iter().map(|(agreement, _)| *agreement).fold(0.0, f64::max);
+    let close = levels.into_iter().filter(|(agreement, _)| *agreement >= CLOSE_MIN * most);
+    let area = |(_, found): &(f64, Vec<(usize, LabelMap)>)| found[0].1.ids.iter().filter(|id| **id != 0).count();
+    close.min_by_key(area).map(|(_, found)| found).unwrap_or_default()
 }
 
 /// Returns the masks that have none of these places.
