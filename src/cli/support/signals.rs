@@ -31,7 +31,6 @@ pub(crate) fn note_only() {
 }
 
 /// Makes the next signal end the process again, when there is no unsaved work. Fails if one came before.
-#[cfg(feature = "network")]
 pub(crate) fn end_at_once() -> Result<()> {
     AT_ONCE.store(true, Ordering::SeqCst);
     check()

@@ -83,7 +83,7 @@ export class Labels {
     const objects = this.rows.filter((row) => row.id !== 0).length;
     $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? counted(this.all > this.rows.length ? this.all : objects, "object") : `${rows.length} found`;
     const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. A training with masks gives them when growth has ended."
-      : this.rows.length === 0 ? "This model has no labels. Train it with masks, or label it afterwards with labelgs label."
+      : this.rows.length === 0 ? "This model has no labels. Train it with masks, label it with labelgs label, or find objects here with labelgs view --network."
       : rows.length === 0 ? "No label has this name or id." : "";
     $("label-empty").textContent = empty;
     $("label-empty").hidden = !empty;

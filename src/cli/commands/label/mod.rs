@@ -1,6 +1,5 @@
 //! `labelgs label`.
 
-#[cfg(feature = "network")]
 mod click;
 
 use crate::cli::commands::masks::repair::table;
@@ -37,9 +36,7 @@ pub struct LabelArgs {
     pub scene: PathBuf,
     /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
     /// together choose which of the nested masks are objects.
-    #[arg(long, value_name = "DIR")]
-    #[cfg_attr(feature = "network", arg(required_unless_present = "places"))]
-    #[cfg_attr(not(feature = "network"), arg(required = true))]
+    #[arg(long, value_name = "DIR", required_unless_present = "places")]
     pub masks: Option<PathBuf>,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
     /// `masks repair`.
@@ -50,7 +47,6 @@ pub struct LabelArgs {
     pub output: PathBuf,
     #[command(flatten)]
     pub write: WriteArgs,
-    #[cfg(feature = "network")]
     #[command(flatten)]
     pub clicks: click::ClickArgs,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
@@ -74,10 +70,7 @@ pub struct LabelArgs {
 /// Gives the Gaussians of a trained model their labels.
 pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let Some(folder) = &args.masks else {
-        #[cfg(feature = "network")]
         return click::run(args, context);
-        #[cfg(not(feature = "network"))]
-        return Err(Error::usage("--masks", "is missing"));
     };
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let masks = MaskFolders::of(folder)?;

@@ -3,7 +3,6 @@
 pub(crate) mod check;
 pub(crate) mod collect;
 pub(crate) mod import;
-#[cfg(feature = "network")]
 pub(crate) mod make;
 pub(crate) mod repair;
 pub(crate) mod spoil;
@@ -37,7 +36,6 @@ pub enum MasksVerb {
     /// its own.
     ///
     /// Example: labelgs masks make scene --network mobile_sam -o made
-    #[cfg(feature = "network")]
     Make(make::MakeArgs),
     /// Write masks whose ids agree in all views, with the help of a trained model.
     ///
@@ -63,7 +61,6 @@ impl MasksVerb {
         match self {
             Self::Check(args) => check::run(args, context),
             Self::Import(args) => import::run(args, context),
-            #[cfg(feature = "network")]
             Self::Make(args) => make::run(args, context),
             Self::Repair(args) => repair::run(args, context),
             Self::Track(args) => track::run(args, context),

@@ -54,7 +54,6 @@ pub struct RepairArgs {
 
 impl RepairArgs {
     /// Makes the arguments with their defaults, for a model and its scene.
-    #[cfg(feature = "network")]
     pub(in crate::cli) fn new(masks: &Path, of: (&Path, &Path), output: PathBuf, reading: SceneArgs) -> Self {
         let [masks, model, scene] = [masks, of.0, of.1].map(Path::to_owned);
         Self { masks, model, scene, output, per_view: false, min_views: None, make_missing: false, near: None, reading }

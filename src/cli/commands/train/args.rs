@@ -31,7 +31,6 @@ pub struct TrainArgs {
     /// Folder with a segmentation network, as for `masks make`, for a scene without masks: a model is trained in
     /// OUT/plain, masks are made in OUT/masks, all views choose objects among them, and the model is trained on with these, for
     /// a third of the steps. With --resume, a stopped run goes on in the stage where it was.
-    #[cfg(feature = "network")]
     #[arg(long, value_name = "DIR", conflicts_with_all = ["masks", "block", "occluders"])]
     pub network: Option<PathBuf>,
     /// How it trains.

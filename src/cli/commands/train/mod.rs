@@ -1,7 +1,6 @@
 //! `labelgs train`.
 
 pub(crate) mod args;
-#[cfg(feature = "network")]
 mod network;
 
 use crate::Result;
@@ -16,13 +15,10 @@ use crate::words::counted;
 
 /// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
-    #[cfg(feature = "network")]
     let summary = match &args.network {
         Some(folder) => network::run(args, folder, context)?,
         None => once(args, context)?,
     };
-    #[cfg(not(feature = "network"))]
-    let summary = once(args, context)?;
     context.show(&summary.to_json(), &sentence(&summary))
 }
 
