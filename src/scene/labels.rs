@@ -68,6 +68,30 @@ impl LabelMap {
         Self { width, height, ids: rows.flat_map(|row| &row[..width as usize]).copied().collect() }
     }
 
+    /// Returns the city-block distance of each pixel with an id to the next one without, 0 there, px. The border of the picture
+    /// counts as without.
+    pub fn depths(&self, id: u16) -> Vec<u32> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let mut depths: Vec<u32> = self.ids.iter().map(|&other| if other == id { u32::MAX / 2 } else { 0 }).collect();
+        for y in 0..height {
+            for x in 0..width {
+                let up = if y > 0 { depths[(y - 1) * width + x] } else { 0 };
+                let left = if x > 0 { depths[y * width + x - 1] } else { 0 };
+                let at = y * width + x;
+                depths[at] = depths[at].min(up + 1).min(left + 1);
+            }
+        }
+        for y in (0..height).rev() {
+            for x in (0..width).rev() {
+                let down = if y + 1 < height { depths[(y + 1) * width + x] } else { 0 };
+                let right = if x + 1 < width { depths[y * width + x + 1] } else { 0 };
+                let at = y * width + x;
+                depths[at] = depths[at].min(down + 1).min(right + 1);
+            }
+        }
+        depths
+    }
+
     /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
         let (width, height, distance) = (self.width as usize, self.height as usize, distance as usize);

@@ -8,6 +8,7 @@
     reason = "the rules of files and lengths are those of the library"
 )]
 
+mod clicks;
 mod compiler;
 mod device;
 mod kernels;
@@ -69,6 +70,8 @@ enum Command {
     Sort(Common),
     /// Bytes of a step by the order of the Gaussians.
     Order(order::Options),
+    /// Objects from clicks that a rule makes, compared with true masks.
+    Clicks(clicks::Options),
     /// A large model from a trained one, to be timed.
     Split(split::Options),
     /// Predicted against measured memory of training.
@@ -98,6 +101,7 @@ fn run() -> Result<()> {
         Command::Tile(common) => tile::run(&common),
         Command::Sort(common) => sort::run(&common),
         Command::Order(options) => order::run(&options),
+        Command::Clicks(options) => clicks::run(&options),
         Command::Split(options) => split::run(&options),
         Command::Memory(common) => memory::run(&common),
         Command::Large(options) => large::run(&options),

@@ -75,21 +75,16 @@ pub(super) fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
 
 /// Returns the box around the pixels of the object and the one of them that is farthest from their border.
 pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
-    let depths = depths(map);
+    let depths = map.depths(OBJECT);
     let deepest = (0..).zip(&depths).max_by_key(|(at, depth)| (**depth, *at));
     let (at, _) = deepest.filter(|(_, depth)| **depth > 1)?;
-    let inside = (0_usize..).zip(&depths).filter(|(_, depth)| **depth > 0).map(|(at, _)| place(map, at));
-    let mut corners = [[f32::MAX; 2], [0.0_f32; 2]];
-    for [x, y] in inside {
-        corners[0] = [corners[0][0].min(x - 0.5), corners[0][1].min(y - 0.5)];
-        corners[1] = [corners[1][0].max(x + 0.5), corners[1][1].max(y + 0.5)];
-    }
-    Some(Prompt { on: vec![place(map, at)], off: Vec::new(), area: Some(corners) })
+    let [left, top, right, bottom] = map.bounds()?.map(|side| side as f32);
+    Some(Prompt { on: vec![place(map, at)], off: Vec::new(), area: Some([[left, top], [right, bottom]]) })
 }
 
 /// Returns places all over a mask, from the one that is farthest from its border outwards.
 pub(super) fn places(map: &LabelMap) -> Vec<Place> {
-    let depths = depths(map);
+    let depths = map.depths(OBJECT);
     let mut inside: Vec<usize> = (0..depths.len()).filter(|&at| depths[at] > 0).collect();
     inside.sort_by_key(|&at| std::cmp::Reverse(depths[at]));
     inside.iter().step_by(inside.len().div_ceil(PLACES_MAX).max(1)).map(|&at| place(map, at)).collect()
@@ -99,28 +94,4 @@ pub(super) fn places(map: &LabelMap) -> Vec<Place> {
 fn place(map: &LabelMap, at: usize) -> Place {
     let width = map.width as usize;
     [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5]
-}
-
-/// Returns the city-block distance of each pixel of the object to the next one outside, 0 there. The border of the picture counts
-/// as outside.
-fn depths(map: &LabelMap) -> Vec<u32> {
-    let (width, height) = (map.width as usize, map.height as usize);
-    let mut distance: Vec<u32> = map.ids.iter().map(|&id| if id == OBJECT { u32::MAX / 2 } else { 0 }).collect();
-    for y in 0..height {
-        for x in 0..width {
-            let up = if y > 0 { distance[(y - 1) * width + x] } else { 0 };
-            let left = if x > 0 { distance[y * width + x - 1] } else { 0 };
-            let at = y * width + x;
-            distance[at] = distance[at].min(up + 1).min(left + 1);
-        }
-    }
-    for y in (0..height).rev() {
-        for x in (0..width).rev() {
-            let down = if y + 1 < height { distance[(y + 1) * width + x] } else { 0 };
-            let right = if x + 1 < width { distance[y * width + x + 1] } else { 0 };
-            let at = y * width + x;
-            distance[at] = distance[at].min(down + 1).min(right + 1);
-        }
-    }
-    distance
 }
