@@ -82,8 +82,9 @@ pub fn run(options: &Options) -> Result<()> {
             let is_on = truth.mask.at(pixel[0], pixel[1]) == id;
             Ok::<_, Error>((depth, Click { view: photos.index(&truth.view.name)?, pixel, is_on }))
         };
-        let mut next = largest.map(|truth| deepest(truth, &where_differ(&truth.mask, id, None))).transpose()?;
-        while let Some((_, click)) = next.filter(|_| hints.clicks.len() < options.clicks && iou < ENOUGH) {
+        let mut next =
+            Vec::from_iter(largest.map(|truth| deepest(truth, &where_differ(&truth.mask, id, None))).transpose()?);
+        while let Some((_, click)) = next.pop().filter(|_| hints.clicks.len() < options.clicks && iou < ENOUGH) {
             hints.clicks.push(click);
             let (start, mut first) = (Instant::now(), None);
             let found = clicking.object(&hints, &mut |progress| {
@@ -91,15 +92,19 @@ pub fn run(options: &Options) -> Result<()> {
                     first.get_or_insert(start.elapsed());
                 }
                 Ok(())
-            })?;
-            let last = start.elapsed().as_secs_f64();
+            });
+            // Where the model shows nothing, the next best place is clicked.
+            if matches!(found, Err(Error::Usage { .. })) && !next.is_empty() {
+                hints.clicks.pop();
+                continue;
+            }
+            let (found, last) = (found?, start.elapsed().as_secs_f64());
             let maps = maps(&mut shown, &truths, &found)?;
             iou = iou_of(&truths, &maps, id);
-            next = None;
-            for (truth, map) in truths.iter().zip(&maps) {
-                let wrong = deepest(truth, &where_differ(&truth.mask, id, Some(map)))?;
-                next = next.into_iter().chain([wrong]).max_by_key(|(depth, _)| *depth);
-            }
+            let wrong =
+                truths.iter().zip(&maps).map(|(truth, map)| deepest(truth, &where_differ(&truth.mask, id, Some(map))));
+            next = wrong.collect::<Result<_>>()?;
+            next.sort_by_key(|(depth, _)| *depth);
             let [x, y] = click.pixel;
             let typed = format!("--{} {}:{x},{y}", if click.is_on { "click" } else { "not" }, photos.name(click.view));
             let first = first.map_or_else(String::new, |first| format!("{:.1}", first.as_secs_f64()));
