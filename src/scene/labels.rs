@@ -146,3 +146,25 @@ pub fn objects_of(ids: &[u16]) -> Vec<u16> {
         |(at, &word): (u16, &u64)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| at * 64 + bit);
     (0..).zip(&seen).filter(|(_, word)| **word != 0).flat_map(of_word).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::LabelMap;
+
+    /// Distances by the definition: to the nearest pixel that has not the id, the frame around the picture included.
+    #[test]
+    fn depths_are_distances_to_the_next_pixel_without_the_id() {
+        let (width, height) = (9_u32, 7_u32);
+        let ids = (0..width * height).map(|at| if at % 11 == 3 { 2 } else { 5 }).collect();
+        let map = LabelMap { width, height, ids };
+        let is_inside = |x: i64, y: i64| {
+            (0..i64::from(width)).contains(&x) && (0..i64::from(height)).contains(&y) && map.at(x as u32, y as u32) == 5
+        };
+        for (at, depth) in map.depths(5).into_iter().enumerate() {
+            let (x, y) = ((at % width as usize) as i64, (at / width as usize) as i64);
+            let around = (-1..=i64::from(height)).flat_map(|v| (-1..=i64::from(width)).map(move |u| (u, v)));
+            let nearest = around.filter(|&(u, v)| !is_inside(u, v)).map(|(u, v)| (x - u).abs() + (y - v).abs()).min();
+            assert_eq!(Some(i64::from(depth)), nearest, "at {x},{y}");
+        }
+    }
+}
