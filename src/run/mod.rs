@@ -27,7 +27,7 @@ mod steps;
 pub(crate) mod summary;
 
 pub use every::Every;
-pub use models::latest_model;
+pub use models::{latest_model, model_file};
 pub use objects::ObjectSummary;
 pub use observer::{Event, Flow, Live, Observer};
 pub use report::write as write_report;

@@ -43,7 +43,7 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
 
 /// Reads a model, or the latest one in the folder of a run, with the names in the file. Logs the notes of the reader.
 pub(crate) fn open(path: &Path) -> Result<ReadModel> {
-    let path = &file_of(path)?;
+    let path = &model_file(path)?;
     let read = read_model(path)?;
     log_notes(path, &read.notes);
     Ok(read)
@@ -51,7 +51,7 @@ pub(crate) fn open(path: &Path) -> Result<ReadModel> {
 
 /// Opens a model as `open` does, without reading it if it can stay in its file.
 pub fn open_lazily(path: &Path) -> Result<LazyModel> {
-    let path = &file_of(path)?;
+    let path = &model_file(path)?;
     let model = LazyModel::open(path)?;
     if let LazyModel::Whole(read) = &model {
         log_notes(path, &read.notes);
@@ -61,7 +61,7 @@ pub fn open_lazily(path: &Path) -> Result<LazyModel> {
 
 /// Looks at each row of a model that was opened from `path`, and logs the notes of the reader.
 pub fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> Result<()> {
-    log_notes(&file_of(path)?, &model.scan(see)?);
+    log_notes(&model_file(path)?, &model.scan(see)?);
     Ok(())
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn log_notes(path: &Path, notes: &[String]) {
 }
 
 /// Returns the file of a model, or of the latest one in the folder of a run.
-fn file_of(path: &Path) -> Result<PathBuf> {
+pub fn model_file(path: &Path) -> Result<PathBuf> {
     if path.is_dir() { latest_model(path) } else { Ok(path.to_owned()) }
 }
 

@@ -7,7 +7,7 @@ use labelgs::formats::read_model;
 use labelgs::label::click::{Click, Clicking, Hints, Photos, Progress};
 use labelgs::label::vote_engine;
 use labelgs::render::{NEAR, label_map};
-use labelgs::run::latest_model;
+use labelgs::run::model_file;
 use labelgs::scene::{LabelMap, View};
 use labelgs::scenes::{LoadOptions, open};
 use labelgs::segment::Network;
@@ -53,8 +53,7 @@ struct Truth<'a> {
 
 /// Prints a row for each object: its clicks, and after each IoU over all pixels of held-out views, and seconds.
 pub fn run(options: &Options) -> Result<()> {
-    let path = if options.model.is_dir() { latest_model(&options.model)? } else { options.model.clone() };
-    let model = read_model(&path)?.gaussians;
+    let model = read_model(&model_file(&options.model)?)?.gaussians;
     let network = Network::open(&options.network, rayon::current_num_threads())?;
     let load = |max_resolution, photos| LoadOptions { max_resolution, photos, ..LoadOptions::default() };
     let photos = open(&options.scene, &load(Some(network.side()), true))?;

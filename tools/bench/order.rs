@@ -5,7 +5,7 @@ use crate::{device, measure::table};
 use labelgs::formats::read_model;
 use labelgs::pass::KernelShape;
 use labelgs::reference::{loss::Photo, step::Target};
-use labelgs::run::latest_model;
+use labelgs::run::model_file;
 use labelgs::scene::{Camera, Gaussians};
 use labelgs::scenes::{LoadOptions, open};
 use labelgs::scheduler::plan::Buf;
@@ -45,8 +45,8 @@ type Seen = (Vec<usize>, Vec<bool>, Vec<Vec<u32>>);
 
 /// Prints them.
 pub fn run(options: &Options) -> Result<()> {
-    let path = if options.model.is_dir() { latest_model(&options.model)? } else { options.model.clone() };
-    let model = Gaussians { labels: None, label_confidence: None, ..read_model(&path)?.gaussians };
+    let model =
+        Gaussians { labels: None, label_confidence: None, ..read_model(&model_file(&options.model)?)?.gaussians };
     let load = LoadOptions { photos: false, max_resolution: options.max_resolution, ..LoadOptions::default() };
     let views = open(&options.scene, &load)?.train;
     let (gpu, every) = (device::open()?, (views.len() / options.views.max(1)).max(1));

@@ -3,7 +3,7 @@
 
 use glam::{Quat, Vec3};
 use labelgs::formats::{read_model, write_model};
-use labelgs::run::latest_model;
+use labelgs::run::model_file;
 use labelgs::scene::Gaussians;
 use labelgs::verify::selftest::scenes::generator;
 use labelgs::{Error, Result, Setting};
@@ -24,7 +24,7 @@ pub struct Options {
 
 /// Writes it.
 pub fn run(options: &Options) -> Result<()> {
-    let path = if options.model.is_dir() { latest_model(&options.model)? } else { options.model.clone() };
+    let path = model_file(&options.model)?;
     let model = read_model(&path)?.gaussians;
     if model.is_empty() || options.gaussians < model.len() {
         let problem = format!("is {}, and {} has {} to split", options.gaussians, path.display(), model.len());
