@@ -16,6 +16,9 @@ use crate::shaders::structs::StepUniforms;
 /// Default near plane, of 3DGS, world units.
 pub const NEAR: f32 = crate::shaders::constants::NEAR;
 
+/// Alpha below which a pixel shows no surface.
+const SURFACE_ALPHA_MIN: f32 = 0.5;
+
 /// The parts of a render to read back besides colour and alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parts {
@@ -123,8 +126,13 @@ impl Rendered {
     /// [`Parts::depth`].
     pub fn mean_depth(&self) -> Result<Vec<f32>> {
         self.check_part(self.depth.len(), "depth")?;
-        let mean = |(&depth, &alpha): (&f32, &f32)| if alpha >= 0.5 { depth / alpha } else { 0.0 };
-        Ok(self.depth.iter().zip(&self.alpha).map(mean).collect())
+        Ok((0..self.depth.len()).map(|pixel| self.depth_at(pixel).unwrap_or(0.0)).collect())
+    }
+
+    /// Returns the depth of the surface at a pixel of a picture with [`Parts::depth`], world units; `None` where alpha is below one
+    /// half.
+    pub(crate) fn depth_at(&self, pixel: usize) -> Option<f32> {
+        (self.alpha[pixel] >= SURFACE_ALPHA_MIN).then(|| self.depth[pixel] / self.alpha[pixel])
     }
 
     /// Returns the picture below another one of the same width, if there is one.

@@ -22,8 +22,6 @@ const TARGETS: [f64; 2] = [0.04, 0.08];
 
 /// Longest side of a picture in which the surface is looked up, px.
 const SURFACE_PX: u32 = 1024;
-/// Opacity below which a place shows no surface.
-const OPAQUE_MIN: f32 = 0.5;
 
 /// What draws.
 pub(super) trait Source {
@@ -159,13 +157,11 @@ impl Painter {
         let (width, height) = bounded_size(full.size(), Some(SURFACE_PX));
         let small = full.resized(width, height);
         let rendered = source.render(&small, Parts::DEPTH)?;
-        let depths = rendered.mean_depth()?;
         let point = |[x, y]: &[u32; 2]| {
             let along = |at: u32, from: u32, to: u32| (f64::from(at) + 0.5) * f64::from(to) / f64::from(from);
             let place = DVec2::new(along(*x, full.width, width), along(*y, full.height, height));
             let at = (place.y as u32).min(height - 1) * width + (place.x as u32).min(width - 1);
-            let (depth, alpha) = (f64::from(depths[at as usize]), rendered.alpha[at as usize]);
-            (alpha >= OPAQUE_MIN && depth > 0.0).then(|| small.unproject(place, depth))
+            rendered.depth_at(at as usize).map(|depth| small.unproject(place, f64::from(depth)))
         };
         let points: Vec<_> = pixels.iter().filter_map(point).collect();
         if points.is_empty() {

@@ -25,8 +25,6 @@ use std::time::Duration;
 
 /// Difference of depths, as a share, up to which a view sees the point and not something in front of it.
 const DEPTH_SHARE_MAX: f64 = 0.04;
-/// Opacity below which a place shows no surface.
-const OPAQUE_MIN: f32 = 0.5;
 /// The object, in masks and labels of this work.
 const OBJECT: u16 = 1;
 
@@ -167,7 +165,8 @@ impl<'a> Clicking<'a> {
     }
 
     /// Returns which Gaussians belong to the object: what the box means, or the first click on it, and what other clicks on it add
-    /// or clicks beside it take away, where they are not answered so already. Their order does not matter.
+    /// or clicks beside it take away, where they are not answered so already. Clicks on it come first, in whatever order the two
+    /// kinds were made.
     pub fn object(&mut self, hints: &Hints, observe: Observe) -> Result<Vec<bool>> {
         hints.first()?;
         let mut spots = Vec::new();
@@ -228,8 +227,8 @@ impl<'a> Clicking<'a> {
         let inside =
             place.x >= 0.0 && place.y >= 0.0 && place.x < f64::from(camera.width) && place.y < f64::from(camera.height);
         let at = pixel_of([place.x as f32, place.y as f32], &self.photos.views[view]);
-        let found = self.known[view].shown.as_ref().filter(|_| inside).map(|found| (found.depth[at], found.alpha[at]));
-        Ok(found.filter(|(_, alpha)| *alpha >= OPAQUE_MIN).map(|(depth, alpha)| f64::from(depth / alpha)))
+        let shown = self.known[view].shown.as_ref().filter(|_| inside);
+        Ok(shown.and_then(|shown| shown.depth_at(at)).map(f64::from))
     }
 
     /// Returns where a view sees a point, if nothing hides it.
