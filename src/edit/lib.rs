@@ -3,7 +3,7 @@
 //! A [`Catalogue`] resolves ids and names, and [`choose()`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`], [`add()`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
 //! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
-//! moves a model; [`summarise`] lists the labels.
+//! moves a model; [`summarise`] lists the labels. An [`Edit`] is one change of an editor, [`EditsFile`] all of them.
 
 pub mod add;
 pub mod catalogue;
@@ -11,11 +11,13 @@ pub mod change;
 pub mod choose;
 pub mod clean;
 pub mod components;
+pub mod edits;
 pub mod fill;
 pub mod merge;
 pub mod prompt;
 pub mod rename;
 pub mod select;
+pub mod selection;
 pub mod simplify;
 
 pub use add::add;
@@ -23,6 +25,7 @@ pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};
 pub use components::Grouping;
+pub use edits::{Document, Edit, EditsFile, Rows, Sights};
 pub use fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 pub use labelgs_formats::Transform;
 pub use merge::{Merged, merge};
