@@ -1,9 +1,9 @@
 //! The command line as a whole: its commands, each with an example that runs where `scene` and `out` are.
 
 use crate::cli::commands::{
-    ablate, benchmark, blocks, check, clean, convert, devices, eval, extract_remove, frames, kernels, label, list,
-    masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify, split_components,
-    synth, train, transform, view,
+    ablate, benchmark, blocks, check, clean, convert, devices, edit, eval, extract_remove, frames, kernels, label,
+    list, masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify,
+    split_components, synth, train, transform, view,
 };
 use crate::cli::support::{Context, GlobalArgs, settings};
 use crate::{Result, version};
@@ -68,6 +68,10 @@ pub enum Command {
     ///
     /// Example: labelgs report out
     Report(report::ReportArgs),
+    /// Make the changes again that were made in a viewer: the same model and the same bytes.
+    ///
+    /// Example: labelgs edit out --replay out/edits/001.edits.json -o changed.ply
+    Edit(edit::ReplayArgs),
     /// Show a model in a browser: from any side, beside its photos, by label; choose, rename, merge and remove objects.
     ///
     /// Example: labelgs view out --scene scene --masks scene/masks --open
@@ -175,6 +179,7 @@ impl Command {
             Self::List(args) => list::run(args, context),
             Self::Extract(args) => extract_remove::run_extract(args, context),
             Self::Remove(args) => extract_remove::run_remove(args, context),
+            Self::Edit(args) => edit::run(args, context),
             Self::Render(args) => render::run(args, context),
             Self::Report(args) => report::run(args, context),
             Self::View(args) => view::run(args, context),

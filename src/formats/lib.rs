@@ -43,6 +43,11 @@ fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
     FORMATS.into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
 }
 
+/// Returns name and extension of each format that is written.
+pub fn formats() -> Vec<(&'static str, &'static str)> {
+    FORMATS.into_iter().filter(|format| format.write.is_some()).map(|format| (format.name, format.endings[0])).collect()
+}
+
 /// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
 pub fn is_page(path: &Path) -> bool {
     by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)

@@ -5,6 +5,7 @@
 
 pub mod large;
 pub(crate) mod pictures;
+pub(crate) mod portrait;
 
 pub use pictures::{Format, What, write_pictures, write_rgb};
 

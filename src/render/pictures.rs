@@ -144,11 +144,19 @@ pub(crate) fn to_word(value: f32) -> u16 {
     (value.clamp(0.0, 1.0) * 65_535.0).round() as u16
 }
 
+/// Returns the nearest and the farthest depth; infinity and 0 without any.
+pub(crate) fn depth_range(depth: &[f32]) -> [f32; 2] {
+    let there = depth.iter().copied().filter(|z| is_depth(*z));
+    there.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)])
+}
+
+fn is_depth(z: f32) -> bool {
+    z.is_finite() && z > 0.0
+}
+
 /// Converts depth to grey: near is bright, far is dark, holes are black.
 pub(crate) fn depth_preview(depth: &[f32]) -> Vec<u16> {
-    let there = |z: &f32| z.is_finite() && *z > 0.0;
-    let near = depth.iter().copied().filter(there).fold(f32::INFINITY, f32::min);
-    let far = depth.iter().copied().filter(there).fold(0.0, f32::max);
+    let [near, far] = depth_range(depth);
     let grey = |z: f32| if far > near { 1.0 - 0.9 * (z - near) / (far - near) } else { 1.0 };
-    depth.iter().map(|z| if there(z) { to_word(grey(*z)) } else { 0 }).collect()
+    depth.iter().map(|z| if is_depth(*z) { to_word(grey(*z)) } else { 0 }).collect()
 }

@@ -1,44 +1,42 @@
-//! Changes of the labels of a working copy, each with its command. A change is taken back by the others, from the first model on.
+//! Changes of a working copy. The list of them is written after each one, so that none is lost; the model when a page
+//! asks for it, and at the end.
 
 use super::Words;
-use super::message::Edit;
-use crate::edit::add::add;
-use crate::edit::catalogue::Catalogue;
-use crate::edit::change::recolour;
-use crate::edit::merge::{Merged, merge};
-use crate::edit::rename::keep;
-use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
+use crate::edit::{Document, Edit, EditsFile, Sights};
 use crate::error::{Error, Result};
 use crate::files::label_table::LabelTable;
 use crate::files::{read, run_folder};
 use crate::formats::{WriteOptions, export_model};
 use crate::scene::Gaussians;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A model, its names, and the changes so far.
 pub(super) struct Work<'a> {
-    /// The model as it was typed: the input of the first command.
+    /// The model as it was typed: the input of the command.
     typed: &'a Path,
     words: &'a dyn Words,
-    pub(super) model: Gaussians,
-    pub(super) table: Option<LabelTable>,
-    /// Model and names before the first change; none without changes.
-    first: Option<(Gaussians, Option<LabelTable>)>,
+    now: Document,
+    /// Before the first change; none without changes.
+    first: Option<Document>,
     done: Vec<Done>,
+    /// Changes that were taken back, the last one first.
+    undone: Vec<Edit>,
     folder: PathBuf,
-    /// Number of the next file.
-    next: u32,
-    /// Output of the last change that was written.
-    written: Option<PathBuf>,
+    /// The model that the changes make, once there are some, and whether it is written.
+    output: Option<(PathBuf, bool)>,
+    /// Number of changes of the rows.
+    rows_version: u64,
+    /// Why the list of changes is not on the disk, if it is not.
+    problem: Option<Error>,
 }
 
 /// A change.
 struct Done {
     edit: Edit,
-    command: String,
-    output: PathBuf,
+    told: String,
+    /// What it made, if that took long.
+    after: Option<Document>,
 }
 
 impl<'a> Work<'a> {
@@ -50,11 +48,32 @@ impl<'a> Work<'a> {
             Some(run) => run.join("edits"),
             None => typed.with_file_name(format!("{stem}-edits")),
         };
-        // Names of earlier sessions are not used again. An unreadable folder shows when it is written to.
-        let names = if folder.is_dir() { read::folder(&folder).unwrap_or_default() } else { Vec::new() };
-        let last = names.iter().filter_map(|path| path.file_name()?.to_str()?.split('.').next()?.parse::<u32>().ok());
-        let next = last.max().map_or(1, |last| last.saturating_add(1));
-        Self { typed, words, model, table, first: None, done: Vec::new(), folder, next, written: None }
+        let now = Document { model, table };
+        Self {
+            typed,
+            words,
+            now,
+            first: None,
+            done: Vec::new(),
+            undone: Vec::new(),
+            folder,
+            output: None,
+            rows_version: 0,
+            problem: None,
+        }
+    }
+
+    pub(super) fn model(&self) -> &Gaussians {
+        &self.now.model
+    }
+
+    pub(super) fn table(&self) -> Option<&LabelTable> {
+        self.now.table.as_ref()
+    }
+
+    /// The folder of what is written.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Returns true if the model differs from the file.
@@ -62,70 +81,104 @@ impl<'a> Work<'a> {
         !self.done.is_empty()
     }
 
-    /// Returns what tells models of other Gaussians apart: the file of the last change of their number.
-    pub(super) fn rows_of(&self) -> &Path {
-        let removed = self.done.iter().rev().find(|done| matches!(done.edit, Edit::Remove { .. }));
-        removed.map_or(self.typed, |done| &done.output)
+    /// Returns what tells models of other Gaussians apart.
+    pub(super) fn rows_version(&self) -> u64 {
+        self.rows_version
     }
 
-    /// The file that the model as it is now has or would have.
-    fn present(&self) -> &Path {
-        self.done.last().map_or(self.typed, |done| &done.output)
-    }
-
-    /// Changes the model, or writes a part of it. Returns a sentence for the page.
-    pub(super) fn apply(&mut self, edit: &Edit) -> Result<String> {
-        if let Some(problem) = edit.problem() {
-            return Err(Error::usage("edit", problem));
-        }
-        let output = self.folder.join(format!("{:03}.ply", self.next));
-        let command = self.words.edit(edit, self.present(), &output);
-        if !matches!(edit, Edit::Label { .. }) {
-            Catalogue::new(&self.model, self.table.clone()).check("labels", &labels_of(edit))?;
-        }
-        let (model, table) = changed(&self.model, self.table.as_ref(), edit)?;
-        if let Edit::Export { .. } = edit {
-            if model.is_empty() {
-                let problem = format!("have no Gaussian of a confidence of {MIN_LABEL_CONFIDENCE}");
-                return Err(Error::usage("labels", problem));
-            }
-            export_model(&output, &model, table.as_ref(), WriteOptions::default())?;
-            self.next += 1;
-            return Ok(format!("{} Gaussians are in {}. The command was: {command}", model.len(), output.display()));
-        }
-        let before = (std::mem::replace(&mut self.model, model), std::mem::replace(&mut self.table, table));
-        self.first.get_or_insert(before);
-        self.next += 1;
-        self.done.push(Done { edit: edit.clone(), command, output });
-        Ok(String::new())
-    }
-
-    pub(super) fn undo(&mut self) -> Result<()> {
-        let none = || Error::usage("undo", "there is no change to take back");
-        self.done.pop().ok_or_else(none)?;
-        let first = if self.done.is_empty() { self.first.take() } else { self.first.clone() };
-        let (mut model, mut table) = first.ok_or_else(none)?;
-        for done in &self.done {
-            (model, table) = changed(&model, table.as_ref(), &done.edit)?;
-        }
-        (self.model, self.table) = (model, table);
+    /// Changes the model.
+    pub(super) fn apply(&mut self, edit: Edit, sights: &mut Sights) -> Result<()> {
+        self.make(edit, sights)?;
+        self.undone.clear();
+        self.note();
         Ok(())
     }
 
-    /// Writes the model as it is now. Returns a sentence for the page.
-    pub(super) fn write(&mut self) -> Result<String> {
-        if !self.is_changed() {
-            return Err(Error::usage("write", "nothing has changed; the model is in its file"));
+    /// Takes the last change back.
+    pub(super) fn undo(&mut self) -> Result<()> {
+        let none = || Error::usage("undo", "there is no change to take back");
+        let last = self.done.pop().ok_or_else(none)?;
+        let kept = self.done.iter().enumerate().rev().find_map(|(at, done)| Some((at + 1, done.after.clone()?)));
+        let (from, mut now) = match kept {
+            Some((at, after)) => (at, after),
+            None if self.done.is_empty() => (0, self.first.take().ok_or_else(none)?),
+            None => (0, self.first.clone().ok_or_else(none)?),
+        };
+        // What needs pictures was kept.
+        let mut sights = |_: &Gaussians| Err(Error::Bug("a filled model was not kept".to_owned()));
+        for done in &self.done[from..] {
+            now = now.apply(&done.edit, &mut sights)?;
         }
-        let path = self.present().to_owned();
-        export_model(&path, &self.model, self.table.as_ref(), WriteOptions::default())?;
+        self.now = now;
+        self.rows_version += u64::from(last.edit.changes_rows());
+        self.undone.push(last.edit);
+        self.note();
+        Ok(())
+    }
+
+    /// Makes the change again that was taken back last.
+    pub(super) fn redo(&mut self, sights: &mut Sights) -> Result<()> {
+        let none = || Error::usage("redo", "there is no change to make again");
+        let edit = self.undone.last().cloned().ok_or_else(none)?;
+        self.make(edit, sights)?;
+        self.undone.pop();
+        self.note();
+        Ok(())
+    }
+
+    fn make(&mut self, edit: Edit, sights: &mut Sights) -> Result<()> {
+        let after = self.now.apply(&edit, sights)?;
+        let told = self.now.told(&edit);
+        let before = std::mem::replace(&mut self.now, after);
+        self.first.get_or_insert(before);
+        self.rows_version += u64::from(edit.changes_rows());
+        let is_slow = matches!(edit, Edit::Remove { fill: true, .. });
+        self.done.push(Done { edit, told, after: is_slow.then(|| self.now.clone()) });
+        Ok(())
+    }
+
+    /// Writes the list of changes beside the model that they make. A written model is not written again.
+    fn note(&mut self) {
+        let output = match self.output.take() {
+            Some((path, false)) => path,
+            _ => self.folder.join(format!("{:03}.ply", self.next_number())),
+        };
+        self.output = Some((output.clone(), false));
+        self.problem = self.list().write(&list_of(&output)).err();
+    }
+
+    /// Returns once why the list of changes could not be written.
+    pub(super) fn take_problem(&mut self) -> Option<String> {
+        self.problem.take().map(|error| format!("{error}. The changes are in memory only"))
+    }
+
+    fn list(&self) -> EditsFile {
+        let edits = self.done.iter().map(|done| done.edit.clone()).collect();
+        EditsFile::new(&self.first.as_ref().unwrap_or(&self.now).model, edits)
+    }
+
+    /// Returns the number after those of all files in the folder. An unreadable folder shows when it is written to.
+    fn next_number(&self) -> u32 {
+        let names = if self.folder.is_dir() { read::folder(&self.folder).unwrap_or_default() } else { Vec::new() };
+        let numbers =
+            names.iter().filter_map(|path| path.file_name()?.to_str()?.split('.').next()?.parse::<u32>().ok());
+        numbers.max().map_or(1, |last| last.saturating_add(1))
+    }
+
+    /// Writes the model as it is now, and the list of changes, in case it could not be written before. Returns a sentence
+    /// for the page.
+    pub(super) fn write(&mut self) -> Result<String> {
+        let none = || Error::usage("write", "nothing has changed; the model is in its file");
+        let (path, _) = self.output.clone().filter(|_| self.is_changed()).ok_or_else(none)?;
+        export_model(&path, &self.now.model, self.now.table.as_ref(), WriteOptions::default())?;
+        self.list().write(&list_of(&path))?;
         let text = format!("Saved as {}.", path.display());
-        self.written = Some(path);
+        self.output = Some((path, true));
         Ok(text)
     }
 
     fn is_saved(&self) -> bool {
-        self.written.as_deref() == Some(self.present()) || !self.is_changed()
+        !self.is_changed() || self.output.as_ref().is_some_and(|(_, is_written)| *is_written)
     }
 
     /// Writes changes that are in no file yet, and returns their file; `None` without any.
@@ -134,63 +187,36 @@ impl<'a> Work<'a> {
             return Ok(None);
         }
         self.write()?;
-        Ok(self.written.clone())
+        Ok(self.output.as_ref().map(|(path, _)| path.clone()))
     }
 
     pub(super) fn describe(&self) -> Value {
+        let output = self.output.as_ref().filter(|_| self.is_changed()).map(|(path, _)| path.as_path());
         json!({
             "kind": "edits",
-            "commands": self.done.iter().map(|done| &done.command).collect::<Vec<_>>(),
-            "undo": self.is_changed(),
+            "changes": self.done.iter().map(|done| &done.told).collect::<Vec<_>>(),
+            "redo": self.undone.len(),
             "saved": self.is_saved(),
-            "file": self.present().display().to_string(),
+            "file": output.map(|path| path.display().to_string()),
+            "command": output.map(|path| self.words.replay(self.typed, &list_of(path), path)),
         })
     }
 }
 
-fn labels_of(edit: &Edit) -> BTreeSet<u32> {
-    match edit {
-        Edit::Rename { label, .. } => BTreeSet::from([*label]),
-        Edit::Label { .. } => BTreeSet::new(),
-        Edit::Merge { labels } | Edit::Recolour { labels, .. } | Edit::Remove { labels } | Edit::Export { labels } => {
-            labels.iter().copied().collect()
-        }
-    }
-}
-
-/// Returns what an edit makes of a model and its names.
-fn changed(model: &Gaussians, table: Option<&LabelTable>, edit: &Edit) -> Result<(Gaussians, Option<LabelTable>)> {
-    let labels = labels_of(edit);
-    let listed: Vec<u32> = labels.iter().copied().collect();
-    let merged = |name: Option<&str>| {
-        let known = Catalogue::new(model, table.cloned());
-        merge(model, &known, &labels, None, name).map(|Merged { model, table, .. }| (model, table))
-    };
-    match edit {
-        Edit::Rename { name, .. } => merged(Some(name)),
-        Edit::Merge { .. } => merged(None),
-        Edit::Label { rows, name, .. } => {
-            add(model, table.cloned(), rows, name.as_deref()).map(|Merged { model, table, .. }| (model, table))
-        }
-        Edit::Recolour { colour, mix, .. } => Ok((recolour(model, &labels, *colour, *mix), table.cloned())),
-        Edit::Remove { .. } => {
-            Ok((remove(model, &listed)?, table.map(|table| keep(table, |id| !labels.contains(&id)))))
-        }
-        Edit::Export { .. } => {
-            let part = extract(model, &listed, MIN_LABEL_CONFIDENCE)?;
-            Ok((part, table.map(|table| keep(table, |id| labels.contains(&id)))))
-        }
-    }
+/// The list of changes beside a model.
+fn list_of(model: &Path) -> PathBuf {
+    model.with_extension("edits.json")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::Rows;
 
     struct Plain;
     impl Words for Plain {
-        fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String {
-            format!("{edit:?} {} {}", input.display(), output.display())
+        fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
+            format!("{} {} {}", model.display(), edits.display(), output.display())
         }
         fn view(&self, model: &Path) -> String {
             model.display().to_string()
@@ -213,46 +239,63 @@ mod tests {
         }
     }
 
+    fn no_sights(_: &Gaussians) -> Result<Vec<crate::edit::fill::Sight>> {
+        panic!("nothing is filled")
+    }
+
     #[test]
-    fn every_change_can_be_taken_back() {
+    fn every_change_can_be_taken_back_and_made_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("m.ply");
+        let half: Vec<bool> = (0..12).map(|row| row < 6).collect();
         let edits = [
             Edit::Rename { label: 1, name: "cup".into() },
             Edit::Merge { labels: vec![1, 2] },
-            Edit::Recolour { labels: vec![3], colour: [1.0, 0.0, 0.0], mix: 0.7 },
-            Edit::Remove { labels: vec![3, 0] },
+            Edit::Assign { rows: Rows::of(&half), label: None, name: None },
+            Edit::Remove { labels: vec![3, 0], fill: false },
             Edit::Rename { label: 1, name: "set".into() },
         ];
-        let mut work = Work::new(Path::new("a/m.ply"), model(), None, &Plain);
-        let mut states = Vec::new();
+        let mut work = Work::new(&path, model(), None, &Plain);
+        let mut states = vec![work.now.clone()];
         for edit in &edits {
-            states.push((work.model.clone(), work.table.clone(), work.present().to_owned()));
-            work.apply(edit).expect("a change");
+            work.apply(edit.clone(), &mut no_sights).expect("a change");
+            states.push(work.now.clone());
         }
-        assert_eq!(work.present(), Path::new("a/m-edits/005.ply"));
-        while let Some((model, table, path)) = states.pop() {
+        for state in states[..5].iter().rev() {
             work.undo().expect("undo");
-            assert_eq!((&work.model, &work.table, work.present()), (&model, &table, &*path));
+            assert_eq!(&work.now, state);
         }
         assert!(work.undo().is_err() && work.write().is_err() && !work.is_changed());
-        work.apply(&edits[0]).expect("a change");
-        assert_eq!(work.present(), Path::new("a/m-edits/006.ply"), "a name is not used again");
+        for state in &states[1..] {
+            work.redo(&mut no_sights).expect("redo");
+            assert_eq!(&work.now, state);
+        }
+        assert!(work.redo(&mut no_sights).is_err());
+        assert_eq!(work.rows_version(), 3, "one removal, back, and again");
+        work.undo().expect("undo");
+        work.apply(edits[0].clone(), &mut no_sights).expect("a change");
+        assert!(work.redo(&mut no_sights).is_err(), "a new change ends what could be made again");
+
+        // The list is there after each change; the model when it was asked for, and then a new pair begins.
+        let list = folder.path().join("m-edits/001.edits.json");
+        let first = Document { model: model(), table: None };
+        let replayed = EditsFile::read(&list).expect("a list").replay(&list, first, &mut no_sights).expect("a model");
+        assert_eq!(replayed, work.now);
+        assert!(!list.with_file_name("001.ply").exists());
+        work.write().expect("a file");
+        assert!(list.with_file_name("001.ply").exists() && work.save().expect("saved").is_none());
+        work.undo().expect("undo");
+        assert_eq!(work.save().expect("saved"), Some(list.with_file_name("002.ply")));
     }
 
     #[test]
     fn bad_changes_change_nothing() {
         let mut work = Work::new(Path::new("m.ply"), model(), None, &Plain);
-        for edit in [
-            Edit::Rename { label: 9, name: "x".into() },
-            Edit::Rename { label: 1, name: " ".into() },
-            Edit::Rename { label: 1, name: "a\nb".into() },
-            Edit::Merge { labels: vec![1] },
-            Edit::Remove { labels: vec![0, 1, 2, 3] },
-            Edit::Remove { labels: vec![] },
-            Edit::Recolour { labels: vec![1], colour: [f32::NAN, 0.0, 0.0], mix: 1.0 },
-        ] {
-            assert!(work.apply(&edit).is_err(), "{edit:?}");
-            assert_eq!(work.model, model());
-            assert!(!work.is_changed());
+        for edit in
+            [Edit::Rename { label: 9, name: "x".into() }, Edit::Remove { labels: vec![0, 1, 2, 3], fill: false }]
+        {
+            assert!(work.apply(edit.clone(), &mut no_sights).is_err(), "{edit:?}");
+            assert!(work.model() == &model() && !work.is_changed());
         }
     }
 }

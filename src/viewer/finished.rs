@@ -1,23 +1,30 @@
 //! Shows a finished model, and changes its labels.
 
+use super::chosen::Chosen;
+use super::drawing::{Drawing, Shown};
 use super::edits::Work;
+use super::exports::export;
 use super::finder::Finder;
 use super::hub::{ClientId, Hub};
 use super::message::{Find, Message};
 use super::object::{Object, pointed};
 use super::painter::{Painter, Source};
+use super::portraits::Portraits;
 use super::views::{Score, Views, describe_scores};
 use super::{Viewer, Words, rows};
+use crate::edit::Edit;
 use crate::edit::add::add;
-use crate::edit::merge::Merged;
-use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract, remove};
+use crate::edit::fill::Sight;
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
+use crate::eval::removal::sights;
 use crate::files::label_table::LabelTable;
+use crate::formats::{FirstView, formats};
 use crate::gpu::Gpu;
 use crate::label::click::Photos;
-use crate::render::{Parts, RenderOptions, Rendered, render};
-use crate::scene::{Camera, Dataset, Gaussians, Overview};
+use crate::render::RenderOptions;
+use crate::scene::{Camera, Dataset, Gaussians, Overview, View};
+use crate::words::counted;
 use glam::DVec3;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -60,24 +67,28 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
     hub.set_views(Arc::clone(&views));
     let mut scene = scene(&views, frame, &finished.path.display().to_string(), (&name, false));
     scene["finds"] = finished.photos.is_some().into();
+    scene["fills"] = finished.dataset.train.iter().any(|view| view.photo.is_some()).into();
+    scene["formats"] = json!(formats());
     let near = finished.options.near;
     let finder = finished.photos.map(|photos| Finder::new(Arc::clone(&gpu), photos, near, Arc::clone(&viewer.hub)));
-    let drawing = Drawing {
-        engine: Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?,
-        options: finished.options,
-        confidence: finished.model.label_confidence.clone(),
-        is_blank: finished.model.is_empty(),
-    };
+    let frame_up = frame.up;
+    let first_view = views.list.first().map(|first| FirstView { up: frame.up, eye: first.view.camera.centre() });
+    let engine = Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?;
     let mut session = Session {
         hub,
         painter: Painter::new(Arc::clone(&views), is_cpu),
-        drawing,
+        background: finished.options.background,
+        drawing: Drawing::new(engine, finished.options, &finished.model),
+        chosen: Chosen::new(&finished.model),
         work: Work::new(finished.path, finished.model, finished.table, finished.words),
         object: finder.map(Object::new),
         object_label: None,
-        hidden: Vec::new(),
-        solo: Vec::new(),
+        shown: Shown::default(),
+        portraits: Portraits::default(),
         scores: Vec::new(),
+        views: finished.dataset.train.iter().filter(|view| view.photo.is_some()).collect(),
+        up: frame_up,
+        first_view,
     };
     hub.publish("scene", &scene);
     session.publish();
@@ -97,7 +108,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         }
         match hub.next(TURN) {
             Some((id, message)) => session.hear(id, message)?,
-            None => session.score_one()?,
+            None => session.use_pause()?,
         }
     }
 }
@@ -139,64 +150,25 @@ fn frame_of(model: &Gaussians) -> Overview {
     Overview { up: DVec3::NEG_Y, target: model.origin + middle, distance: 1.5 * size }
 }
 
-/// The engine with the drawn part of the model.
-struct Drawing {
-    engine: Engine,
-    options: RenderOptions,
-    confidence: Option<Vec<f32>>,
-    /// Every label is hidden.
-    is_blank: bool,
-}
-
-impl Source for Drawing {
-    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
-        if self.is_blank {
-            return Ok(blank(camera, parts, self.options.background));
-        }
-        self.engine.grow_image(camera.width, camera.height)?;
-        render(&mut self.engine, camera, &RenderOptions { parts, ..self.options })
-    }
-
-    fn confidence(&self) -> Option<&[f32]> {
-        self.confidence.as_deref()
-    }
-
-    fn largest(&mut self) -> Option<(u32, u32)> {
-        None
-    }
-
-    fn step(&self) -> u32 {
-        0
-    }
-}
-
-/// A picture of nothing.
-fn blank(camera: &Camera, parts: Parts, background: [f32; 3]) -> Rendered {
-    let pixels = camera.width as usize * camera.height as usize;
-    let count = |asked: bool| if asked { pixels } else { 0 };
-    Rendered {
-        width: camera.width,
-        height: camera.height,
-        rgb: vec![background; pixels],
-        alpha: vec![0.0; pixels],
-        depth: vec![0.0; count(parts.depth)],
-        top_id: vec![-1; count(parts.main)],
-        top_weight: vec![0.0; count(parts.main)],
-        labels: vec![0; count(parts.labels)],
-    }
-}
-
 struct Session<'a> {
     hub: &'a Hub,
     painter: Painter,
     drawing: Drawing,
     work: Work<'a>,
+    chosen: Chosen,
     object: Option<Object>,
     /// The label with which the object is drawn until it has one.
     object_label: Option<u32>,
-    hidden: Vec<u32>,
-    solo: Vec<u32>,
+    shown: Shown,
+    portraits: Portraits,
     scores: Vec<Score>,
+    /// The training views, for what fills a hole.
+    views: Vec<&'a View>,
+    /// Colour behind the model that it is scored with.
+    background: [f32; 3],
+    /// The way up, of length 1.
+    up: DVec3,
+    first_view: Option<FirstView>,
 }
 
 impl Session<'_> {
@@ -206,17 +178,6 @@ impl Session<'_> {
             Message::Pick { seq, from, pixel } => {
                 return self.painter.pick(self.hub, id, (seq, &from, pixel), &mut self.drawing);
             }
-            Message::Show { hidden, solo } => {
-                (self.hidden, self.solo) = (hidden, solo);
-                self.redraw().map(|()| String::new())
-            }
-            Message::Edit { what } => self.work.apply(&what).and_then(|said| self.changed().map(|()| said)),
-            // The object that is pointed at is the last change.
-            Message::Undo if self.object.as_ref().is_some_and(Object::is_there) => {
-                self.changed().map(|()| String::new())
-            }
-            Message::Undo => self.work.undo().and_then(|()| self.changed()).map(|()| String::new()),
-            Message::Object { what } => self.find(id, &what).map(|()| String::new()),
             Message::News { number, news } => {
                 if self.object.as_mut().is_some_and(|object| object.hear(number, news, self.hub)) {
                     self.redraw()?;
@@ -225,9 +186,8 @@ impl Session<'_> {
                 self.publish_object();
                 return Ok(());
             }
-            Message::Write => self.work.write(),
-            Message::Train { .. } | Message::Share { .. } => Ok("No training runs.".to_owned()),
             Message::Ack { .. } | Message::Alive => return Ok(()),
+            message => self.serve(id, message),
         };
         match said {
             Ok(text) if text.is_empty() => {}
@@ -235,13 +195,70 @@ impl Session<'_> {
             Err(error) if error.is_device_lost() => return Err(error),
             Err(error) => self.hub.reply(id, &json!({ "kind": "problem", "text": error.to_string() })),
         }
+        if let Some(text) = self.work.take_problem() {
+            self.hub.reply(id, &json!({ "kind": "problem", "text": text }));
+        }
         self.publish();
         Ok(())
     }
 
-    /// Draws a model that has changed. An object that is pointed at is one of the model before.
+    /// Does what a page asks. Returns a sentence for it, or none.
+    fn serve(&mut self, id: ClientId, message: Message) -> Result<String> {
+        match message {
+            Message::Show { hidden, solo } => {
+                self.shown = Shown { hidden, solo };
+                self.redraw()?;
+            }
+            Message::Background { colour } if colour.iter().all(|value| (0.0..=1.0).contains(value)) => {
+                self.drawing.options.background = colour;
+            }
+            Message::Choose { what } => {
+                let is_drawn = self.shown.rows(self.work.model());
+                let with = (&self.painter, &mut self.drawing as &mut dyn Source);
+                self.chosen.choose(&what, self.work.model(), &is_drawn, with)?;
+                self.redraw()?;
+            }
+            Message::Edit { what } => self.edit(what)?,
+            // The object that is pointed at is the last change.
+            Message::Undo if self.object.as_ref().is_some_and(Object::is_there) => self.changed()?,
+            Message::Undo => {
+                self.work.undo()?;
+                self.changed()?;
+            }
+            Message::Redo => {
+                let done = self.work.redo(&mut sights_of(&mut self.drawing, &self.views));
+                self.after(done)?;
+            }
+            Message::Object { what } => self.find(id, &what)?,
+            Message::Write => return self.work.write(),
+            Message::Export { what } => {
+                let (path, count) = export(&what, &self.work, &self.chosen, self.first_view)?;
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let file = self.hub.add_file(path.clone());
+                self.hub.reply(id, &json!({ "kind": "exported", "file": file, "name": name }));
+                return Ok(format!("{} in {}.", counted(count, "Gaussian"), path.display()));
+            }
+            _ => return Ok("No training runs.".to_owned()),
+        }
+        Ok(String::new())
+    }
+
+    /// Makes a change; one of rows has those that are chosen.
+    fn edit(&mut self, edit: Edit) -> Result<()> {
+        let edit = edit.with_rows(self.chosen.rows());
+        let done = self.work.apply(edit, &mut sights_of(&mut self.drawing, &self.views));
+        self.after(done)
+    }
+
+    /// Draws the model after a change. One that failed leaves what is chosen, but may have left another model on the device.
+    fn after(&mut self, done: Result<()>) -> Result<()> {
+        if done.is_ok() { self.changed() } else { self.redraw().and(done) }
+    }
+
+    /// Draws a model that has changed. What was pointed at or chosen is of the model before.
     fn changed(&mut self) -> Result<()> {
         self.object.as_mut().map(Object::drop);
+        self.chosen = Chosen::new(self.work.model());
         self.redraw()
     }
 
@@ -252,9 +269,10 @@ impl Session<'_> {
         let drawing = &mut self.drawing;
         let pointed = pointed(find, |from, pixels| self.painter.spot(from, pixels, drawing))?;
         match (find, pointed) {
-            (_, Some(pointed)) => object.point(id, pointed, (&self.work.model, self.work.rows_of())),
+            (_, Some(pointed)) => object.point(id, pointed, (self.work.model(), self.work.rows_version())),
             (Find::Keep { name }, _) => {
-                self.work.apply(&object.edit(name)?)?;
+                let edit = object.edit(name)?;
+                self.work.apply(edit, &mut sights_of(&mut self.drawing, &self.views))?;
                 let label = self.object_label;
                 self.changed()?;
                 self.publish();
@@ -271,62 +289,70 @@ impl Session<'_> {
         }
     }
 
-    fn publish(&self) {
+    fn publish(&mut self) {
         self.publish_object();
-        self.hub.publish("labels", &rows::of_model(&self.work.model, self.work.table.as_ref()));
+        self.hub.publish("labels", &rows::of_model(self.work.model(), self.work.table()));
         self.hub.publish("edits", &self.work.describe());
-        self.hub.publish("shown", &json!({ "kind": "shown", "hidden": self.hidden, "solo": self.solo }));
+        self.hub.publish("chosen", &self.chosen.describe());
+        self.portraits.note(self.work.model());
+        let Shown { hidden, solo } = &self.shown;
+        let background = self.drawing.options.background;
+        self.hub
+            .publish("shown", &json!({ "kind": "shown", "hidden": hidden, "solo": solo, "background": background }));
     }
 
-    /// Puts the visible part of the model on the device: what rendering all but the hidden labels, or only the chosen
-    /// ones, would draw. Labels that are gone do not count.
+    /// Puts the visible part of the model on the device. An object that is pointed at is always visible.
     fn redraw(&mut self) -> Result<()> {
-        let with;
         let rows = self.object.as_ref().and_then(Object::rows);
-        let found = rows.map(|rows| add(&self.work.model, self.work.table.clone(), rows, None)).transpose()?;
+        let table = self.work.table().cloned();
+        let found = rows.map(|rows| add(self.work.model(), table, rows, None)).transpose()?;
         self.object_label = found.as_ref().map(|found| found.into);
-        let model = match found {
-            Some(Merged { model, .. }) => {
-                with = model;
-                &with
-            }
-            None => &self.work.model,
-        };
-        let there: std::collections::BTreeSet<u32> = model.labels.iter().flatten().copied().collect();
-        self.hidden.retain(|label| there.contains(label));
-        self.solo.retain(|label| there.contains(label));
-        let part;
-        let shown = if !self.solo.is_empty() {
-            let solo: Vec<u32> = self.solo.iter().copied().chain(self.object_label).collect();
-            part = extract(model, &solo, MIN_LABEL_CONFIDENCE)?;
-            &part
-        } else if self.hidden.is_empty() {
-            model
-        } else if there.iter().all(|label| self.hidden.contains(label)) {
-            self.drawing.is_blank = true;
-            return Ok(());
-        } else {
-            part = remove(model, &self.hidden)?;
-            &part
-        };
-        self.drawing.is_blank = shown.is_empty();
-        if !shown.is_empty() {
-            self.drawing.engine.upload_model(shown)?;
-            self.drawing.confidence.clone_from(&shown.label_confidence);
-        }
-        Ok(())
+        let model = found.as_ref().map_or(self.work.model(), |found| &found.model);
+        self.shown.retain(model);
+        let is_solo = !self.shown.solo.is_empty();
+        let solo = self.shown.solo.iter().copied().chain(self.object_label.filter(|_| is_solo)).collect();
+        let shown = Shown { solo, hidden: self.shown.hidden.clone() };
+        self.drawing.show(model, &shown.rows(model), self.chosen.mask())
     }
 
-    /// Scores the next view of the whole, unchanged model while nothing else is to do.
+    /// Makes pictures of labels, then scores, while nothing else is to do.
+    fn use_pause(&mut self) -> Result<()> {
+        if !self.hub.is_watched() {
+            return Ok(());
+        }
+        let cameras: Vec<&Camera> = self.painter.views.list.iter().map(|posed| &posed.view.camera).collect();
+        let up = self.up;
+        let from = (&cameras[..], up, self.drawing.options.near);
+        if self.portraits.make_some(&mut self.drawing.engine, self.work.model(), from, self.hub)? {
+            return self.redraw();
+        }
+        self.score_one()
+    }
+
+    /// Scores the next view of the whole, unchanged model.
     fn score_one(&mut self) -> Result<()> {
         let views = Arc::clone(&self.painter.views);
-        let is_whole = self.hidden.is_empty() && self.solo.is_empty() && !self.work.is_changed();
+        let is_plain = self.shown.is_whole()
+            && !self.work.is_changed()
+            && !self.chosen.mask().contains(&true)
+            && self.drawing.options.background == self.background;
         // Views without a photo have no score.
         let next = (self.scores.len()..views.list.len()).find(|&index| views.list[index].view.photo.is_some());
-        let Some(index) = next.filter(|_| is_whole && self.hub.is_watched()) else { return Ok(()) };
+        let Some(index) = next.filter(|_| is_plain) else { return Ok(()) };
         self.scores.resize(index, Score::default());
         self.scores.push(self.painter.score(index, &mut self.drawing)?);
         self.hub.publish("scores", &describe_scores(&self.scores, 0));
         Ok(())
+    }
+}
+
+/// Returns what draws a model from the training views.
+fn sights_of<'a>(drawing: &'a mut Drawing, views: &'a [&View]) -> impl FnMut(&Gaussians) -> Result<Vec<Sight>> + 'a {
+    move |model| {
+        if views.is_empty() {
+            return Err(Error::usage("fill", "needs the training views of a scene; start labelgs view with --scene"));
+        }
+        drawing.engine.upload_model(model)?;
+        sights(&mut drawing.engine, views, drawing.options.near)
     }
 }

@@ -1,7 +1,10 @@
 //! Heads of HTTP requests, read with limits on size and time, and answers.
 
+use crate::error::Error;
+use crate::files::read;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Time for a whole head, however slowly its bytes come.
@@ -104,15 +107,32 @@ fn parse(bytes: &[u8]) -> Result<Option<Head>, NoHead> {
 
 /// Writes an answer and ends the connection.
 pub(super) fn answer(stream: &mut TcpStream, status: &str, kind: &str, more: &str, body: &[u8]) {
-    let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n{more}Cache-Control: no-store\r\n\
+    send_all(stream, &head(status, kind, more, body.len() as u64), body);
+}
+
+/// Sends a file to be kept, under its own name.
+pub(super) fn send(stream: &mut TcpStream, path: &Path) {
+    let opened = read::open(path).and_then(|file| Ok((file.get_ref().length().map_err(Error::read(path))?, file)));
+    let Ok((length, file)) = opened else { return say(stream, "404 Not Found", "The file is not there any more.") };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let coded: String = name.bytes().map(|byte| format!("%{byte:02X}")).collect();
+    let more = format!("Content-Disposition: attachment; filename*=UTF-8''{coded}\r\n");
+    send_all(stream, &head("200 OK", "application/octet-stream", &more, length), file);
+}
+
+fn head(status: &str, kind: &str, more: &str, length: u64) -> String {
+    format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{more}Cache-Control: no-store\r\n\
          Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
          Cross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\n\
-         Connection: close\r\n\r\n",
-        body.len()
-    );
-    // A browser that went away misses nothing.
-    let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(body)).and_then(|()| stream.flush());
+         Connection: close\r\n\r\n"
+    )
+}
+
+/// A browser that went away misses nothing.
+fn send_all(stream: &mut TcpStream, head: &str, mut body: impl Read) {
+    let sent = stream.write_all(head.as_bytes()).and_then(|()| std::io::copy(&mut body, stream));
+    let _ = sent.and_then(|_| stream.flush());
     let _ = stream.shutdown(std::net::Shutdown::Write);
 }
 

@@ -7,6 +7,7 @@ use super::message::{Frame, Look, Message};
 use super::pace::Line;
 use super::views::Views;
 use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -58,6 +59,10 @@ struct State {
     topics: BTreeMap<&'static str, (u64, Arc<str>)>,
     version: u64,
     views: Arc<Views>,
+    /// Files that pages may fetch.
+    files: Vec<PathBuf>,
+    /// Pictures of labels, as PNG.
+    portraits: BTreeMap<u32, Arc<[u8]>>,
     is_closing: bool,
 }
 
@@ -204,6 +209,25 @@ impl Hub {
         Arc::clone(&self.lock().views)
     }
 
+    /// Lets pages fetch a file. Returns its number.
+    pub(super) fn add_file(&self, path: PathBuf) -> usize {
+        let mut state = self.lock();
+        state.files.push(path);
+        state.files.len() - 1
+    }
+
+    pub(super) fn set_portrait(&self, label: u32, png: Vec<u8>) {
+        self.lock().portraits.insert(label, png.into());
+    }
+
+    pub(super) fn portrait(&self, label: u32) -> Option<Arc<[u8]>> {
+        self.lock().portraits.get(&label).cloned()
+    }
+
+    pub(super) fn file(&self, number: usize) -> Option<PathBuf> {
+        self.lock().files.get(number).cloned()
+    }
+
     /// Waits for what a writer of a page sends next.
     pub(super) fn outgoing(&self, id: ClientId) -> Outgoing {
         let mut state = self.lock();
@@ -289,7 +313,7 @@ mod tests {
     use super::*;
 
     fn look(seq: u32) -> Message {
-        Message::Look(Look { seq, from: Viewpoint::View(0), panes: Vec::new(), mark: Vec::new(), moving: true })
+        Message::Look(Look { seq, from: Viewpoint::View(0), size: None, panes: Vec::new(), moving: true })
     }
 
     fn seq(task: Option<(ClientId, Message)>) -> Option<(ClientId, u32)> {

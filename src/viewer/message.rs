@@ -4,9 +4,10 @@
 //! itself, PNG or JPEG.
 
 use super::finder::News;
+use crate::edit::Edit;
+use crate::edit::selection::{Combine, Region, Side};
 use crate::scenes::camera_json::CameraFile;
 use serde::Deserialize;
-use std::sync::Arc;
 
 /// Largest message of a page, bytes.
 pub(super) const BYTES_MAX: usize = 256 << 10;
@@ -14,8 +15,6 @@ pub(super) const BYTES_MAX: usize = 256 << 10;
 pub(super) const RATE_MAX: f64 = 240.0;
 /// Most pixels of a picture.
 pub(super) const PIXELS_MAX: u64 = 8 << 20;
-/// Longest name of a label, bytes.
-const NAME_MAX: usize = 200;
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -54,88 +53,87 @@ pub(super) struct Look {
     /// Number of the request, for the answer.
     pub(super) seq: u32,
     pub(super) from: Viewpoint,
+    /// Columns and rows of the picture, if it is not that of the camera.
+    #[serde(default)]
+    pub(super) size: Option<[u32; 2]>,
     /// One or two pictures.
     pub(super) panes: Vec<Pane>,
-    /// Labels to draw an outline around.
-    #[serde(default)]
-    pub(super) mark: Vec<u32>,
     /// The camera moves: the picture may be smaller than the camera says.
     pub(super) moving: bool,
 }
 
-/// A change of the labels, as a command of the command line would make it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "edit", rename_all = "lowercase", deny_unknown_fields)]
-pub enum Edit {
-    /// Names a label.
-    Rename {
-        /// The label.
-        label: u32,
-        /// Its name.
-        name: String,
+/// How a page chooses Gaussians.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "select", rename_all = "lowercase", deny_unknown_fields)]
+pub(super) enum Choose {
+    /// By what is drawn over a picture.
+    Draw {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// What is drawn, in its pixels.
+        region: Region,
+        /// Also what is hidden.
+        through: bool,
+        how: Combine,
     },
-    /// Makes several labels one, with the smallest id.
-    Merge {
-        /// The labels.
-        labels: Vec<u32>,
+    /// In a ball around what is at a pixel.
+    Ball {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// Column and row.
+        pixel: [u32; 2],
+        /// Radius of the ball in the picture, px.
+        radius: f64,
+        how: Combine,
     },
-    /// Mixes a colour into the Gaussians.
-    Recolour {
-        /// The labels.
-        labels: Vec<u32>,
-        /// r, g, b, 0 to 1.
-        colour: [f32; 3],
-        /// Share of the new colour, 0 to 1.
-        mix: f32,
+    /// What is like the main Gaussian of a pixel, from neighbour to neighbour.
+    Flood {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// Column and row.
+        pixel: [u32; 2],
+        /// Difference of colour between neighbours, 0 to 1.
+        tolerance: f32,
+        how: Combine,
     },
-    /// Removes the Gaussians.
-    Remove {
-        /// The labels.
-        labels: Vec<u32>,
+    /// In front of what is at a pixel, or behind.
+    Depth {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// Column and row.
+        pixel: [u32; 2],
+        side: Side,
+        how: Combine,
     },
-    /// Gives an object that was found a label.
-    #[serde(skip)]
-    Label {
-        /// Which Gaussians it is.
-        rows: Arc<[bool]>,
-        /// Its name, if any.
-        name: Option<String>,
-        /// What was pointed at: flags of `labelgs label`, and what follows them.
-        flags: Vec<(&'static str, String)>,
-    },
-    /// Writes the Gaussians as a model of their own; the shown model stays.
-    Export {
-        /// The labels.
-        labels: Vec<u32>,
-    },
+    /// By label.
+    Labels { labels: Vec<u32>, how: Combine },
+    /// With its neighbours.
+    Grow,
+    /// Without those beside others.
+    Shrink,
+    /// All others.
+    Invert,
+    /// Nothing.
+    Nothing,
+    /// What is chosen cannot be chosen otherwise any more.
+    Lock,
+    /// Nothing is locked.
+    Unlock,
 }
 
-impl Edit {
-    /// Returns what is wrong with the values, if anything.
-    pub(super) fn problem(&self) -> Option<String> {
-        match self {
-            Self::Rename { name, .. } | Self::Label { name: Some(name), .. } => name_problem(name),
-            Self::Recolour { colour, mix, .. }
-                if !colour.iter().chain([mix]).all(|value| (0.0..=1.0).contains(value)) =>
-            {
-                Some("colour and share are from 0 to 1".to_owned())
-            }
-            Self::Merge { labels } if labels.len() < 2 => Some("choose at least two labels to merge".to_owned()),
-            _ => None,
-        }
-    }
-}
-
-fn name_problem(name: &str) -> Option<String> {
-    if name.trim().is_empty() {
-        Some("a name has at least one letter".to_owned())
-    } else if name.len() > NAME_MAX {
-        Some(format!("a name has at most {NAME_MAX} bytes"))
-    } else if name.contains(char::is_control) {
-        Some("a name is one line of text without control characters".to_owned())
-    } else {
-        None
-    }
+/// What is written as a file of its own; the shown model stays.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Export {
+    /// These labels; none: everything.
+    pub(super) labels: Vec<u32>,
+    /// What is chosen, instead of labels.
+    #[serde(default)]
+    pub(super) chosen: bool,
+    /// Name without ending.
+    pub(super) name: String,
+    /// Ending of the format.
+    pub(super) format: String,
 }
 
 /// What a page asks of the object that it points at.
@@ -201,6 +199,11 @@ pub(super) enum Message {
         /// Column and row.
         pixel: [u32; 2],
     },
+    /// Sets the colour behind the model.
+    Background {
+        /// r, g, b, 0 to 1.
+        colour: [f32; 3],
+    },
     /// Which labels are drawn: all but the hidden ones, or only some.
     Show {
         /// Labels that are not drawn.
@@ -208,10 +211,20 @@ pub(super) enum Message {
         /// Labels that are drawn alone; empty: no such choice.
         solo: Vec<u32>,
     },
-    /// Changes labels.
+    /// Changes the model. Rows are those that are chosen.
     Edit {
         /// The change.
         what: Edit,
+    },
+    /// Chooses Gaussians.
+    Choose {
+        /// How.
+        what: Choose,
+    },
+    /// Writes a file for the page to fetch.
+    Export {
+        /// What.
+        what: Export,
     },
     /// Points at an object, or says what becomes of it.
     Object {
@@ -228,6 +241,8 @@ pub(super) enum Message {
     },
     /// Takes back the last change.
     Undo,
+    /// Makes it again.
+    Redo,
     /// Writes the changed model.
     Write,
     /// Asks something of the training.
@@ -251,24 +266,27 @@ pub(super) struct Frame {
     pub(super) step: u32,
     /// Size of the pictures, px.
     pub(super) size: (u32, u32),
-    /// The pixels of `render`, in full size.
+    /// Every pixel of the picture that was asked for, without loss.
     pub(super) exact: bool,
     /// Time of the render and of the compression, microseconds.
     pub(super) micros: u32,
-    /// The last picture is an outline, to be drawn over the others.
-    pub(super) marked: bool,
+    /// Nearest and farthest depth that a picture of depths shows, world units.
+    pub(super) depths: [f32; 2],
+    /// The last picture has the label of each pixel.
+    pub(super) mapped: bool,
     pub(super) pictures: Vec<Vec<u8>>,
 }
 
 impl Frame {
     /// Bytes of the header.
-    pub(super) const HEADER: usize = 28;
+    pub(super) const HEADER: usize = 36;
 
     pub(super) fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(Self::HEADER + self.pictures.iter().map(|p| p.len() + 4).sum::<usize>());
         let count = self.pictures.len() as u32;
-        let flags = count << 2 | u32::from(self.marked) << 1 | u32::from(self.exact);
-        for word in [1, self.seq, self.step, self.size.0, self.size.1, self.micros, flags] {
+        let flags = count << 2 | u32::from(self.mapped) << 1 | u32::from(self.exact);
+        let [near, far] = self.depths.map(f32::to_bits);
+        for word in [1, self.seq, self.step, self.size.0, self.size.1, self.micros, flags, near, far] {
             bytes.extend_from_slice(&word.to_le_bytes());
         }
         for picture in &self.pictures {

@@ -7,7 +7,10 @@
 //! One thread owns the engine. `server` has a thread per connection, `hub` passes requests and frames between them:
 //! the newest camera wins, one frame is in work and one on the wire. `guard` decides who may ask.
 
+mod chosen;
+mod drawing;
 mod edits;
+mod exports;
 mod finder;
 mod finished;
 mod guard;
@@ -19,6 +22,7 @@ mod pace;
 mod page;
 mod painter;
 mod pictures;
+mod portraits;
 mod rows;
 mod server;
 mod socket;
@@ -26,7 +30,6 @@ mod training;
 mod views;
 
 pub use finished::{Finished, show};
-pub use message::Edit;
 pub use training::Watched;
 
 use crate::error::Result;
@@ -69,8 +72,8 @@ pub const TOKEN_MIN: usize = 16;
 
 /// The commands of the program, for the page to show.
 pub trait Words: Sync {
-    /// Returns the command that makes `output` of `input` by an edit.
-    fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String;
+    /// Returns the command that makes `output` of `model` by a list of edits.
+    fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String;
     /// Returns the command that shows a model.
     fn view(&self, model: &Path) -> String;
 }

@@ -2,11 +2,11 @@
 
 use super::finder::{Finder, News, Pointed, Spot};
 use super::hub::{ClientId, Hub};
-use super::message::{Edit, Find, Viewpoint};
+use super::message::{Find, Viewpoint};
+use crate::edit::{Edit, Rows};
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Places in a box, along each side, whose surface is carried to a photo.
@@ -15,8 +15,8 @@ const ACROSS: u32 = 16;
 /// The object, and who looks for it.
 pub(super) struct Object {
     finder: Finder,
-    /// Which Gaussians the finder has ([`Work::rows_of`](super::edits::Work::rows_of)).
-    sent: Option<PathBuf>,
+    /// Which Gaussians the finder has ([`Work::rows_version`](super::edits::Work::rows_version)).
+    sent: Option<u64>,
     found: Option<Found>,
     /// What the finder does: photos that were asked, of how many, and seconds left.
     asked: Option<(usize, usize, Option<f64>)>,
@@ -40,19 +40,19 @@ impl Object {
         self.found.is_some() || self.asked.is_some()
     }
 
-    /// Looks for what a page points at. `model` has the Gaussians that `rows` stands for.
+    /// Looks for what a page points at. `version` stands for the Gaussians of `model`.
     pub(super) fn point(
         &mut self,
         client: ClientId,
         pointed: Pointed,
-        (model, rows): (&Gaussians, &Path),
+        (model, version): (&Gaussians, u64),
     ) -> Result<()> {
         if matches!(pointed, Pointed::Click(_, false)) && !self.is_there() {
             return Err(Error::usage("place", "click on the object first, then on what does not belong to it"));
         }
-        if self.sent.as_deref() != Some(rows) {
+        if self.sent != Some(version) {
             self.finder.set_model(model.clone());
-            self.sent = Some(rows.to_owned());
+            self.sent = Some(version);
         }
         self.finder.point(client, pointed);
         self.asked = Some((0, 0, None));
@@ -96,9 +96,9 @@ impl Object {
     /// Returns the change that makes a label of it.
     pub(super) fn edit(&self, name: &str) -> Result<Edit> {
         let none = || Error::usage("object", "none was found yet");
-        let Found { rows, flags, .. } = self.found.as_ref().ok_or_else(none)?;
+        let rows = Rows::of(self.rows().ok_or_else(none)?);
         let name = Some(name.trim().to_owned()).filter(|name| !name.is_empty());
-        Ok(Edit::Label { rows: Arc::clone(rows), name, flags: flags.clone() })
+        Ok(Edit::Assign { rows, label: None, name })
     }
 
     /// Returns what pages show of it. `label` is the one that it is drawn with.

@@ -8,10 +8,11 @@ use super::pictures::{self, Beside};
 use super::views::{Posed, Score, Views};
 use crate::error::{Error, Result};
 use crate::files::resize::bounded_size;
+use crate::render::pictures::depth_range;
 use crate::render::{Parts, Rendered};
 use crate::scene::{Camera, Pixels, View};
 use crate::scenes::camera_json::camera_of;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use std::time::Instant;
 const TARGETS: [f64; 2] = [0.04, 0.08];
 
 /// Longest side of a picture in which the surface is looked up, px.
-const SURFACE_PX: u32 = 1024;
+pub(super) const SURFACE_PX: u32 = 1024;
 
 /// What draws.
 pub(super) trait Source {
@@ -29,10 +30,26 @@ pub(super) trait Source {
     fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered>;
     /// Confidence by row of the drawn model.
     fn confidence(&self) -> Option<&[f32]>;
+    /// Returns the row of the whole model of a row of the drawn one.
+    fn row(&self, drawn: usize) -> usize {
+        drawn
+    }
     /// Largest picture, px, if there is a limit.
     fn largest(&mut self) -> Option<(u32, u32)>;
     /// Step of the training; 0 for a finished model.
     fn step(&self) -> u32;
+}
+
+/// What is at a pixel.
+pub(super) struct Surface {
+    /// Camera of the full picture.
+    pub(super) camera: Camera,
+    /// In the world.
+    pub(super) place: DVec3,
+    /// Along the axis of the camera, world units.
+    pub(super) depth: f64,
+    /// The main Gaussian.
+    pub(super) row: usize,
 }
 
 /// Draws at a size that keeps up with the hand.
@@ -66,7 +83,14 @@ impl Painter {
         }
         let start = Instant::now();
         let views = Arc::clone(&self.views);
-        let (full, posed) = camera(&views, &look.from)?;
+        let (mut full, posed) = camera(&views, &look.from)?;
+        if let Some([width, height]) = look.size {
+            let pixels = u64::from(width) * u64::from(height);
+            if pixels == 0 || pixels > PIXELS_MAX {
+                return Err(Error::usage("size", format!("{width} x {height} px is none, or more than {PIXELS_MAX}")));
+            }
+            full = full.resized(width, height);
+        }
         let fits = fitting(&full, source.largest());
         let pixels = |size: (u32, u32)| f64::from(size.0) * f64::from(size.1);
         let scale = if look.moving { self.pace.scale(pixels(fits), self.target) } else { 1.0 };
@@ -76,15 +100,16 @@ impl Painter {
         let camera = full.resized(size.0, size.1);
         let is_lossy = look.moving && hub.is_slow(id, pixels(size), self.target);
         let mut parts = pictures::parts(&look.panes);
-        parts.labels |= !look.mark.is_empty();
+        // Clicks on a still picture are answered by the page.
+        parts.labels |= !look.moving;
         let rendered = source.render(&camera, parts)?;
         let compares = look.panes.contains(&Pane::Error);
         let photo = posed.and_then(|posed| posed.photo.as_ref()).filter(|_| compares).map(Pixels::get).transpose()?;
         let beside = Beside { confidence: source.confidence(), photo: photo.as_deref() };
         let encode = |&pane| pictures::encode(pane, &rendered, beside, is_lossy);
         let mut encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
-        if !look.mark.is_empty() {
-            encoded.push(pictures::outline(&rendered, &look.mark)?);
+        if !look.moving {
+            encoded.push(pictures::label_map(&rendered)?);
         }
         let time = start.elapsed();
         self.pace.note(pixels(size), time.as_secs_f64());
@@ -94,7 +119,8 @@ impl Painter {
             size,
             exact: is_full && !is_lossy,
             micros: u32::try_from(time.as_micros()).unwrap_or(u32::MAX),
-            marked: !look.mark.is_empty(),
+            mapped: !look.moving,
+            depths: depth_range(&rendered.depth),
             pictures: encoded,
         })
     }
@@ -123,26 +149,48 @@ impl Painter {
         }
     }
 
-    fn at(&self, from: &Viewpoint, [x, y]: [u32; 2], source: &mut dyn Source) -> Result<serde_json::Value> {
-        let (full, _) = camera(&self.views, from)?;
-        if x >= full.width || y >= full.height {
-            let problem = format!("{x}, {y} is outside of the picture of {} x {} px", full.width, full.height);
-            return Err(Error::usage("pixel", problem));
-        }
-        let (width, height) = fitting(&full, source.largest());
-        let place = |at: u32, of: u32, now: u32| (u64::from(at) * u64::from(now) / u64::from(of)) as usize;
-        let index = place(y, full.height, height) * width as usize + place(x, full.width, width);
-        let rendered = source.render(&full.resized(width, height), Parts::ALL)?;
-        let row = usize::try_from(rendered.top_id[index]).ok();
-        let confidence = row.and_then(|row| source.confidence()?.get(row).copied());
+    fn at(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<serde_json::Value> {
+        let (camera, scale, rendered) = self.seen(from, Parts::ALL, None, source)?;
+        let index = index_of(&camera, scale, pixel)?;
+        let drawn = usize::try_from(rendered.top_id[index]).ok();
+        let confidence = drawn.and_then(|row| source.confidence()?.get(row).copied());
         Ok(json!({
             "label": rendered.labels[index],
-            "gaussian": row,
+            "gaussian": drawn.map(|row| source.row(row)),
             "weight": rendered.top_weight[index],
             "depth": rendered.mean_depth()?[index],
             "opacity": rendered.alpha[index],
             "confidence": confidence,
         }))
+    }
+
+    /// Renders a full picture, smaller if it has to be or is longer than `longest`, px. Returns its camera and its size as
+    /// shares of the full one.
+    pub(super) fn seen(
+        &self,
+        from: &Viewpoint,
+        parts: Parts,
+        longest: Option<u32>,
+        source: &mut dyn Source,
+    ) -> Result<(Camera, [f64; 2], Rendered)> {
+        let (full, _) = camera(&self.views, from)?;
+        let (width, height) = bounded_size(fitting(&full, source.largest()), longest);
+        let scale = [f64::from(width) / f64::from(full.width), f64::from(height) / f64::from(full.height)];
+        let small = full.resized(width, height);
+        let rendered = source.render(&small, parts)?;
+        Ok((small, scale, rendered))
+    }
+
+    /// Returns what is at a pixel of a full picture. Nothing is an error.
+    pub(super) fn surface(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<Surface> {
+        let (small, scale, rendered) = self.seen(from, Parts { depth: true, ..Parts::MAIN }, None, source)?;
+        let index = index_of(&small, scale, pixel)?;
+        let none = || Error::usage("place", "nothing of the model is here");
+        let depth = f64::from(rendered.depth_at(index).ok_or_else(none)?);
+        let row = source.row(usize::try_from(rendered.top_id[index]).map_err(|_| none())?);
+        let place = small.unproject(small.pixel_centre(index), depth);
+        let (full, _) = camera(&self.views, from)?;
+        Ok(Surface { camera: full, place, depth, row })
     }
 
     /// Returns what is at pixels of a full picture: in the photo of a view, or on the surface.
@@ -175,6 +223,17 @@ impl Painter {
         let parts = if posed.view.mask.is_some() { Parts::LABELS } else { Parts::COLOUR };
         Score::new(posed, &source.render(&posed.view.camera, parts)?)
     }
+}
+
+/// Returns the number of a pixel of a full picture in a smaller one.
+fn index_of(small: &Camera, scale: [f64; 2], pixel: [u32; 2]) -> Result<usize> {
+    let along = |axis: usize| ((f64::from(pixel[axis]) + 0.5) * scale[axis]) as u32;
+    let (x, y) = (along(0), along(1));
+    if x >= small.width || y >= small.height {
+        let problem = format!("{}, {} is outside of the picture", pixel[0], pixel[1]);
+        return Err(Error::usage("pixel", problem));
+    }
+    Ok(y as usize * small.width as usize + x as usize)
 }
 
 /// Returns the camera of a full picture, and its view.

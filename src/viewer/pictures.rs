@@ -2,13 +2,12 @@
 
 use super::message::Pane;
 use crate::error::Result;
-use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8, png_rgba8};
+use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8};
 use crate::render::pictures::{depth_preview, to_word};
 use crate::render::{Parts, Rendered};
 use crate::scene::colour::to_byte;
 use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
-use std::collections::BTreeSet;
 
 /// Share of the label's colour in labels over colour.
 const TINT: f32 = 0.55;
@@ -17,8 +16,6 @@ const ERROR_MAX: f32 = 0.25;
 /// Quality of JPEGs, for moving pictures on slow lines.
 const QUALITY: u8 = 70;
 
-/// Colour of outlines.
-const OUTLINE: [u8; 4] = [255, 196, 61, 255];
 /// Colours of no to full confidence.
 const CONFIDENCE: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
 /// Colours of no to much error.
@@ -64,24 +61,10 @@ pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: 
     if is_lossy { jpeg_rgb8(size, &pixels, QUALITY) } else { png_rgb8(size, &pixels) }
 }
 
-/// Returns a picture that is clear except for a line just inside of the contour of some labels.
-pub(super) fn outline(rendered: &Rendered, labels: &[u32]) -> Result<Vec<u8>> {
-    let (width, height) = (rendered.width as usize, rendered.height as usize);
-    let marked: BTreeSet<u32> = labels.iter().copied().collect();
-    let inside: Vec<bool> = rendered.labels.iter().map(|&id| marked.contains(&id)).collect();
-    let thickness = (rendered.width / 500).max(1) as usize;
-    let is_out = |x: usize, y: usize| x >= width || y >= height || !inside[y * width + x];
-    let pixel = |index: usize| {
-        let (x, y) = (index % width, index / width);
-        let around = [(thickness, 0), (0, thickness), (thickness, thickness)];
-        let is_edge = inside[index]
-            && around.iter().any(|&(dx, dy)| {
-                is_out(x + dx, y + dy) || x < dx || y < dy || is_out(x - dx, y - dy) || is_out(x + dy, y + dx)
-            });
-        if is_edge { OUTLINE } else { [0; 4] }
-    };
-    let pixels: Vec<[u8; 4]> = (0..width * height).map(pixel).collect();
-    png_rgba8((rendered.width, rendered.height), &pixels)
+/// Returns the label of each pixel as a PNG: its bytes from the lowest on are red, green and blue.
+pub(super) fn label_map(rendered: &Rendered) -> Result<Vec<u8>> {
+    let pixels: Vec<[u8; 3]> = rendered.labels.iter().map(|id| [0, 8, 16].map(|shift| (id >> shift) as u8)).collect();
+    png_rgb8((rendered.width, rendered.height), &pixels)
 }
 
 fn tinted((colour, &id): (&[f32; 3], &u32)) -> [u8; 3] {

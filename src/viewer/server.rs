@@ -129,10 +129,18 @@ fn open_socket(mut stream: TcpStream, head: &Head, hub: &Arc<Hub>) {
     socket::serve(stream, hub, id);
 }
 
-/// Answers with a file of the page, or a photo by its number. No path of the request reaches the disk.
+/// Answers with a file of the page, or a photo or an exported model by its number. No path of the request reaches the disk.
 fn files(stream: &mut TcpStream, path: &str, hub: &Hub) {
     if let Some((kind, bytes)) = page::file(path) {
         return answer(stream, "200 OK", kind, "", bytes);
+    }
+    let number = path.strip_prefix("/export/").and_then(|number| number.parse().ok());
+    if let Some(file) = number.and_then(|number| hub.file(number)) {
+        return http::send(stream, &file);
+    }
+    let label = path.strip_prefix("/label/").and_then(|label| label.parse().ok());
+    if let Some(png) = label.and_then(|label| hub.portrait(label)) {
+        return answer(stream, "200 OK", "image/png", "", &png);
     }
     let photo = path.strip_prefix("/photo/").map(|number| (number, false));
     let asked = photo.or(path.strip_prefix("/thumb/").map(|number| (number, true)));

@@ -26,6 +26,7 @@ export class Input {
     box.addEventListener("pointerdown", (event) => this.down(event));
     box.addEventListener("pointermove", (event) => this.move(event));
     for (const kind of ["pointerup", "pointercancel"]) box.addEventListener(kind, (event) => this.up(event));
+    box.addEventListener("pointerleave", () => this.actions.hover?.(null));
     box.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     box.addEventListener("contextmenu", (event) => event.preventDefault());
     box.addEventListener("auxclick", (event) => event.preventDefault());
@@ -40,7 +41,9 @@ export class Input {
   }
 
   down(event) {
-    if (event.target.closest?.(".wipe, .veil, form")) return;
+    if (event.target.closest?.(".wipe, .veil, form, .palette, .chip")) return;
+    // The ring around what has the focus is for the keyboard.
+    this.stage.box.classList.add("clicked");
     this.stage.box.focus({ preventScroll: true });
     this.stage.box.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, this.at(event));
@@ -52,7 +55,7 @@ export class Input {
 
   move(event) {
     const last = this.pointers.get(event.pointerId);
-    if (!last) return;
+    if (!last) return this.actions.hover?.(this.at(event));
     const now = this.at(event);
     const [dx, dy] = [now[0] - last[0], now[1] - last[1]];
     this.moved += Math.hypot(dx, dy);
@@ -60,10 +63,10 @@ export class Input {
     this.pointers.set(event.pointerId, now);
     this.stage.box.classList.add("dragging");
     if (this.pointers.size === 2) return this.pinch(event.pointerId, last, now);
-    const isPan = event.buttons & 6 || event.shiftKey;
+    const isPan = event.buttons & 6 || (event.shiftKey && !this.tool);
     if (this.tool && !isPan) {
       this.isBoxed = true;
-      return this.tool.drag(this.start, now);
+      return this.tool.drag(this.start, now, event);
     }
     if (isPan) {
       const ratio = this.rig.size[1] / this.stage.box.clientHeight;
@@ -84,8 +87,8 @@ export class Input {
   }
 
   /** A second finger takes the drag over. */
-  endTool(to = null) {
-    if (this.isBoxed) this.tool?.box(this.start, to);
+  endTool(to = null, event = null) {
+    if (this.isBoxed) this.tool?.box(this.start, to, event);
     this.isBoxed = false;
     return null;
   }
@@ -93,9 +96,9 @@ export class Input {
   up(event) {
     if (!this.pointers.delete(event.pointerId)) return;
     this.stage.box.classList.remove("dragging");
-    if (this.isBoxed) return this.endTool(event.type === "pointercancel" ? null : this.at(event));
+    if (this.isBoxed) return this.endTool(event.type === "pointercancel" ? null : this.at(event), event);
     if (this.tool && event.type !== "pointercancel" && this.moved <= CLICK && event.button !== 1) {
-      return this.tool.click(this.at(event), event.button === 0);
+      return this.tool.click(this.at(event), event.button === 0, event);
     }
     if (event.type === "pointercancel" || this.moved > CLICK || event.button !== 0) return;
     const at = this.at(event);
@@ -118,6 +121,7 @@ export class Input {
   }
 
   key(event) {
+    this.stage.box.classList.remove("clicked");
     const target = event.target;
     const isText = target.matches?.("input:not([type=range]):not([type=color]), textarea, select");
     if (isText || document.querySelector("dialog[open]")) return;

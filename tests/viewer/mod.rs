@@ -1,6 +1,7 @@
 //! The viewer: what the server answers, and the page in a browser.
 
 mod browser; // the page, driven by mouse and keys
+mod choose; // Gaussians chosen by hand, without a browser and in one
 mod chromium; // a browser and its DevTools protocol
 mod events; // random events in the page
 mod object; // an object from clicks, without a browser and in one

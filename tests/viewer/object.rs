@@ -2,7 +2,7 @@
 
 use super::browser::{SETTLED, WIDE};
 use super::chromium::{Browser, Tab};
-use super::protocol::same_by_commands;
+use super::protocol::{has, same_by_command};
 use super::server::{Page, Place};
 use crate::support::device;
 use crate::support::segmenter::{largest_object, paint, pixel_of, tiny};
@@ -78,15 +78,18 @@ fn an_object_is_found_grows_and_becomes_a_label() {
         rows.is_some_and(|rows| rows.iter().any(|row| json!([row["id"], row["name"], row["count"]]) == kept))
     });
     page.send(&json!({ "kind": "write" }));
-    let done = page.until("edits", |edits| edits["saved"] == true && edits["undo"] == true);
-    let command = done["commands"][0].as_str().expect("a command").to_owned();
-    assert!(command.starts_with("labelgs label model.ply --scene scene --network net --click="), "{command}");
+    let done = page.until("edits", |edits| has(edits, 1, true));
+    let command = done["command"].as_str().expect("a command").to_owned();
+    assert_eq!(
+        command,
+        "labelgs edit model.ply --replay model-edits/001.edits.json --scene scene -o model-edits/001.ply"
+    );
     let labels = |name: &str| read_model(place.path(name)).expect("a model").gaussians.labels.expect("labels");
     let (found, truth) = (labels("model-edits/001.ply"), labels("model.ply"));
     let of = |label: u32| found.iter().zip(&truth).filter(|(a, b)| u64::from(**a) == NEW && **b == label).count();
     let (own, others) = (of(u32::from(object)), (1..=3).map(of).sum::<usize>());
     assert!(own > 10 && 10 * own >= 8 * others, "{own} of {others}");
-    same_by_commands(&place, &[&command], "model-edits/001");
+    same_by_command(&place, &command, "model-edits/001");
 
     // It is taken back; a box is dropped; what cannot be done is said.
     page.send(&json!({ "kind": "undo" }));
@@ -119,6 +122,7 @@ pub fn a_click_finds_an_object(browser: &mut Browser, place: &Place) {
     browser.click_on(&tab, "#view-list li:nth-child(1) button");
     browser.until(&tab, "labelgs.rig.view === 0");
     browser.js(&tab, "document.querySelector('#stage').focus()");
+    browser.js(&tab, "document.querySelector('#photo-pixels').click()");
     browser.key(&tab, "KeyO", "o", 0);
     browser.until(&tab, "labelgs.finding.isOn && !document.querySelector('#object').hidden");
     let (_, pixel) = largest_object(&place.path("scene"), "000");
@@ -126,7 +130,7 @@ pub fn a_click_finds_an_object(browser: &mut Browser, place: &Place) {
     browser.click(&tab, at, 0);
     browser.until(&tab, "labelgs.finding.state.count > 10 && !labelgs.finding.state.asked");
     browser.until(&tab, SETTLED);
-    browser.until(&tab, "labelgs.stage.mark.includes(5) && labelgs.stage.outline");
+    browser.until(&tab, "labelgs.stage.mark.includes(5) && labelgs.stage.overlay");
     assert_eq!(browser.js(&tab, "labelgs.rig.view"), 0, "a click does not move the camera");
     browser.js(&tab, "document.querySelector('#object-name').focus()");
     browser.write(&tab, "found");
@@ -139,7 +143,7 @@ pub fn a_click_finds_an_object(browser: &mut Browser, place: &Place) {
     browser.key(&tab, "Escape", "Escape", 0);
     browser.until(&tab, "!labelgs.finding.isThere && document.querySelector('#object-box').hidden");
     browser.js(&tab, "labelgs.edits.undo()");
-    browser.until(&tab, "labelgs.edits.state.commands.length === 0 && !labelgs.labels.row(5)");
+    browser.until(&tab, "labelgs.edits.state.changes.length === 0 && !labelgs.labels.row(5)");
     browser.kill(&tab);
     assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
 }

@@ -280,8 +280,13 @@ fn the_newest_camera_wins_and_one_frame_is_on_the_wire() {
     assert!(seqs.windows(2).all(|pair| pair[0] < pair[1]) && seqs.len() < 20, "{seqs:?}");
 }
 
+/// A list of changes with so many, which is saved or not.
+pub(super) fn has(edits: &Value, count: usize, is_saved: bool) -> bool {
+    edits["changes"].as_array().is_some_and(|all| all.len() == count) && edits["saved"] == is_saved
+}
+
 #[test]
-fn edits_are_the_commands_that_are_shown() {
+fn edits_are_told_saved_and_made_again_by_a_command() {
     if device().is_none() {
         return;
     }
@@ -291,43 +296,54 @@ fn edits_are_the_commands_that_are_shown() {
     let before = page.hear("labels");
     page.hear("edits");
     let edits = [
-        json!({ "edit": "rename", "label": 1, "name": "it's a $(cup)" }),
-        json!({ "edit": "recolour", "labels": [3], "colour": [0.85, 0.1, 0.05], "mix": 0.7 }),
-        json!({ "edit": "merge", "labels": [1, 4] }),
-        json!({ "edit": "remove", "labels": [2] }),
+        (json!({ "edit": "rename", "label": 1, "name": "it's a $(cup)" }), "Renamed cup to it's a $(cup)"),
+        (
+            json!({ "edit": "recolour", "labels": [3], "colour": [0.85, 0.1, 0.05], "mix": 0.7 }),
+            "Recoloured box of tea",
+        ),
+        (json!({ "edit": "merge", "labels": [1, 4] }), "Merged it's a $(cup), label 4"),
+        (
+            json!({ "edit": "remove", "labels": [2], "fill": true }),
+            "Removed <img src=x onerror=window.hacked=1>, filled",
+        ),
     ];
-    for (before, edit) in edits.iter().enumerate() {
+    for (before, (edit, told)) in edits.iter().enumerate() {
         page.edit(edit);
-        page.until("edits", |edits| edits["commands"].as_array().is_some_and(|all| all.len() == before + 1));
+        let edits = page.until("edits", |edits| has(edits, before + 1, false));
+        assert_eq!(edits["changes"][before], *told);
     }
     page.send(&json!({ "kind": "write" }));
     page.hear("said");
-    let done = page.until("edits", |edits| edits["saved"] == true);
-    let commands: Vec<&str> = done["commands"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
-    assert_eq!(commands.len(), 4, "{commands:?}");
-    let saved = place.path(done["file"].as_str().expect("a file"));
-    assert_eq!(saved, place.path("model-edits/004.ply"));
-    same_by_commands(&place, &commands, "model-edits/004");
+    let done = page.until("edits", |edits| has(edits, 4, true));
+    assert_eq!(done["file"], "model-edits/001.ply");
+    same_by_command(&place, done["command"].as_str().expect("a command"), "model-edits/001");
 
-    // An export writes another file, and leaves the model.
-    page.edit(&json!({ "edit": "export", "labels": [3] }));
-    let said = page.hear("said")["text"].as_str().expect("text").to_owned();
-    let command = said.split("The command was: ").nth(1).expect("a command");
-    same_by_commands(&place, &[command], "model-edits/005");
-
-    // Taken back one by one: the model as it was, rows and names.
+    // Taken back one by one: the model as it was, rows and names. Then all are made again.
     for left in (0..4).rev() {
         page.send(&json!({ "kind": "undo" }));
-        page.until("edits", |edits| edits["commands"].as_array().is_some_and(|all| all.len() == left));
+        page.until("edits", |edits| has(edits, left, left == 0));
     }
     assert_eq!(page.until("labels", |labels| labels == &before), before);
-    page.edit(&json!({ "edit": "rename", "label": 1, "name": "cup" }));
-    page.until("edits", |edits| edits["undo"] == true);
+    for there in 1..=4 {
+        page.send(&json!({ "kind": "redo" }));
+        page.until("edits", |edits| has(edits, there, false));
+    }
     page.send(&json!({ "kind": "write" }));
-    page.until("edits", |edits| edits["saved"] == true && edits["undo"] == true);
+    let again = page.until("edits", |edits| has(edits, 4, true));
+    assert_eq!(again["file"], "model-edits/002.ply");
     let read = |name: &str| std::fs::read(place.path(name)).expect("a file");
-    assert_eq!(read("model-edits/006.ply"), read("model.ply"), "undo gives the bytes of the start");
-    assert_eq!(read("model-edits/006.labels.json"), read("model.labels.json"));
+    for ending in ["ply", "labels.json", "edits.json"] {
+        let [first, second] = ["001", "002"].map(|number| read(&format!("model-edits/{number}.{ending}")));
+        assert!(first == second, "{ending}");
+    }
+    (0..4).for_each(|_| page.send(&json!({ "kind": "undo" })));
+    page.until("edits", |edits| has(edits, 0, true));
+    page.edit(&json!({ "edit": "rename", "label": 1, "name": "cup" }));
+    page.until("edits", |edits| has(edits, 1, false));
+    page.send(&json!({ "kind": "write" }));
+    let last = page.until("edits", |edits| has(edits, 1, true))["file"].as_str().expect("a file").to_owned();
+    assert_eq!(read(&last), read("model.ply"), "undo gives the bytes of the start");
+    assert_eq!(read(&last.replace(".ply", ".labels.json")), read("model.labels.json"));
 
     // What cannot be done is said, and changes nothing.
     for (edit, word) in [
@@ -359,7 +375,9 @@ fn an_interrupted_viewer_loses_no_change() {
     let mut page = server.page();
     page.hear("labels");
     page.edit(&json!({ "edit": "rename", "label": 1, "name": "mug" }));
-    page.until("edits", |edits| edits["undo"] == true);
+    page.until("edits", |edits| has(edits, 1, false));
+    // The list of changes is there before it is asked for, in case the program is killed.
+    assert!(place.path("model-edits/001.edits.json").is_file() && !place.path("model-edits/001.ply").exists());
     let (status, said) = server.interrupt();
     assert_eq!(status, Some(130), "{said}");
     let line = said.lines().find(|line| line.contains("unsaved changes are in")).expect("a line");
@@ -377,7 +395,7 @@ fn an_interrupted_viewer_loses_no_change() {
     let mut page = server.page();
     page.hear("labels");
     page.edit(&json!({ "edit": "rename", "label": 1, "name": "mug" }));
-    page.until("edits", |edits| edits["undo"] == true);
+    page.until("edits", |edits| has(edits, 1, false));
     std::fs::rename(place.path("model-edits"), place.path("kept")).expect("moved");
     std::fs::write(place.path("model-edits"), "no folder").expect("written");
     server.signal();
@@ -389,22 +407,20 @@ fn an_interrupted_viewer_loses_no_change() {
     assert!(place.path("model-edits/002.ply").is_file(), "{said}");
 }
 
-/// Takes what the viewer wrote away, runs the commands that it showed, and compares the bytes.
-pub(super) fn same_by_commands(place: &Place, commands: &[&str], stem: &str) {
+/// Takes what the viewer wrote away, runs the command that it showed, and compares the bytes.
+pub(super) fn same_by_command(place: &Place, command: &str, stem: &str) {
     let read = |ending: &str| std::fs::read(place.path(&format!("{stem}.{ending}"))).expect("a file");
     let own = (read("ply"), read("labels.json"));
     let program = std::path::Path::new(env!("CARGO_BIN_EXE_labelgs")).parent().expect("a folder");
     for ending in ["ply", "labels.json"] {
         std::fs::remove_file(place.path(&format!("{stem}.{ending}"))).expect("a file");
     }
-    for command in commands {
-        let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
-        let mut shell = std::process::Command::new("sh");
-        shell.args(["-c", command]).env("PATH", path).env("LABELGS_VALIDATION", "off");
-        let output = shell.current_dir(place.path("")).output().expect("it runs");
-        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-    }
-    assert!(own == (read("ply"), read("labels.json")), "{stem} differs from that of {commands:?}");
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", command]).env("PATH", path).env("LABELGS_VALIDATION", "off");
+    let output = shell.current_dir(place.path("")).output().expect("it runs");
+    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(own == (read("ply"), read("labels.json")), "{stem} differs from that of {command}");
 }
 
 const TRAIN: [&str; 10] = [

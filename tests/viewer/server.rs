@@ -350,6 +350,12 @@ impl Page {
         self.until(kind, |_| true)
     }
 
+    /// The newest message of a kind among those that came until now.
+    pub fn newest(&mut self, kind: &str) -> Option<Value> {
+        let at = self.texts.iter().rposition(|text| text["kind"] == kind)?;
+        Some(self.texts.remove(at))
+    }
+
     /// Forgets what came until now.
     pub fn forget(&mut self) {
         while let Some(message) = self.next(Instant::now() + Duration::from_millis(50)) {
@@ -378,7 +384,7 @@ impl Page {
 fn parse(bytes: &[u8]) -> Frame {
     let word = |at: usize| u32::from_le_bytes(bytes[4 * at..4 * at + 4].try_into().expect("4 bytes"));
     assert_eq!(word(0), 1, "the kind of message");
-    let (mut at, mut pictures) = (28, Vec::new());
+    let (mut at, mut pictures) = (36, Vec::new());
     for _ in 0..word(6) >> 2 {
         let size = u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes")) as usize;
         pictures.push(decode(&bytes[at + 4..at + 4 + size]));

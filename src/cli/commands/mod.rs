@@ -7,6 +7,7 @@ pub(crate) mod check;
 pub(crate) mod clean;
 pub(crate) mod convert;
 pub(crate) mod devices;
+pub(crate) mod edit;
 pub(crate) mod eval;
 pub(crate) mod extract_remove;
 pub(crate) mod frames;

@@ -9,7 +9,7 @@ use crate::cli::support::{
 use crate::render::{Parts, RenderOptions};
 use crate::scene::Dataset;
 use crate::scenes::camera_json::views_of_model;
-use crate::viewer::{Edit, Finished, Token, Viewer, ViewerOptions, Words, show};
+use crate::viewer::{Finished, Token, Viewer, ViewerOptions, Words, show};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -167,25 +167,9 @@ pub(crate) struct Typed {
 }
 
 impl Words for Typed {
-    fn edit(&self, edit: &Edit, input: &Path, output: &Path) -> String {
-        let ids = |labels: &[u32]| labels.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
-        let (verb, flags) = match edit {
-            Edit::Rename { label, name } => ("merge", format!("--labels {label} --name={}", quoted(name))),
-            Edit::Merge { labels } => ("merge", format!("--labels {}", ids(labels))),
-            Edit::Recolour { labels, colour: [r, g, b], mix } => {
-                ("recolour", format!("--labels {} --colour {r},{g},{b} --mix {mix}", ids(labels)))
-            }
-            Edit::Label { name, flags, .. } => {
-                let mut all = format!("--scene {}", self.scene.as_deref().map(path).unwrap_or_default());
-                all += &format!(" --network {}", self.network.as_deref().map(path).unwrap_or_default());
-                flags.iter().for_each(|(flag, at)| all += &format!(" --{flag}={}", quoted(at)));
-                all += &name.as_ref().map_or(String::new(), |name| format!(" --name={}", quoted(name)));
-                ("label", all)
-            }
-            Edit::Remove { labels } => ("remove", format!("--labels {}", ids(labels))),
-            Edit::Export { labels } => ("extract", format!("--labels {}", ids(labels))),
-        };
-        format!("labelgs {verb} {} {flags} -o {}", path(input), path(output))
+    fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
+        let scene = self.scene.as_ref().map_or(String::new(), |scene| format!(" --scene {}", path(scene)));
+        format!("labelgs edit {} --replay {}{scene} -o {}", path(model), path(edits), path(output))
     }
 
     fn view(&self, model: &Path) -> String {

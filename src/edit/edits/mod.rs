@@ -57,6 +57,7 @@ pub enum Edit {
     /// Gives Gaussians a label.
     Assign {
         /// Which Gaussians.
+        #[serde(default)]
         rows: Rows,
         /// The label; 0 takes theirs away, none makes a new one.
         #[serde(default)]
@@ -68,16 +69,19 @@ pub enum Edit {
     /// Removes Gaussians.
     Delete {
         /// Which Gaussians.
+        #[serde(default)]
         rows: Rows,
     },
     /// Removes all other Gaussians.
     Keep {
         /// Which Gaussians stay.
+        #[serde(default)]
         rows: Rows,
     },
     /// Adds copies of Gaussians beside them, with a label of their own.
     Duplicate {
         /// Which Gaussians.
+        #[serde(default)]
         rows: Rows,
         /// From a Gaussian to its copy, world units.
         shift: [f64; 3],
@@ -124,6 +128,17 @@ impl Edit {
             }
             _ => None,
         }
+    }
+
+    /// Returns the same for other Gaussians, if it is about some.
+    pub fn with_rows(mut self, chosen: Rows) -> Self {
+        match &mut self {
+            Self::Assign { rows, .. } | Self::Delete { rows } | Self::Keep { rows } | Self::Duplicate { rows, .. } => {
+                *rows = chosen;
+            }
+            _ => {}
+        }
+        self
     }
 
     /// Returns true if the model has other Gaussians afterwards.

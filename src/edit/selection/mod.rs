@@ -26,15 +26,14 @@ pub enum Combine {
 }
 
 impl Combine {
-    /// Returns what becomes of `before`. Where `is_locked`, it stays as it is.
-    pub fn join(self, before: &[bool], found: &[bool], is_locked: &[bool]) -> Vec<bool> {
-        let join = |before: bool, found: bool| match self {
+    /// Returns what becomes of `before`.
+    pub fn join(self, before: &[bool], found: &[bool]) -> Vec<bool> {
+        let join = |(&before, &found): (&bool, &bool)| match self {
             Self::Replace => found,
             Self::Add => before || found,
             Self::Take => before && !found,
             Self::Within => before && found,
         };
-        let rows = before.iter().zip(found).zip(is_locked);
-        rows.map(|((&before, &found), &locked)| if locked { before } else { join(before, found) }).collect()
+        before.iter().zip(found).map(join).collect()
     }
 }

@@ -50,8 +50,8 @@ impl Nearby {
     }
 
     /// Returns the Gaussians that a flood from `first` reaches: from neighbour to neighbour, while their colours differ by
-    /// at most `tolerance` (0 to 1 in each channel) and flat ones lie alike. Not `is_locked` ones.
-    pub fn flood(&self, model: &Gaussians, first: usize, tolerance: f32, is_locked: &[bool]) -> Vec<bool> {
+    /// at most `tolerance` (0 to 1 in each channel) and flat ones lie alike. Only `is_free` ones.
+    pub fn flood(&self, model: &Gaussians, first: usize, tolerance: f32, is_free: &[bool]) -> Vec<bool> {
         let mut found = vec![false; model.len()];
         let mut open = vec![first];
         found[first] = true;
@@ -59,7 +59,7 @@ impl Nearby {
         while let Some(row) = open.pop() {
             for (next, distance) in self.of(row, NEIGHBOURS) {
                 if !found[next]
-                    && !is_locked[next]
+                    && is_free[next]
                     && distance <= GAP_MAX * (radius(model, row) + radius(model, next))
                     && difference(colour(model, row), colour(model, next)) <= tolerance
                     && difference(start, colour(model, next)) <= FROM_FIRST * tolerance

@@ -1,21 +1,32 @@
 // What can be done to the selection, and the commands that do the same.
 
-import { $, ask, copy, el, number } from "./dom.js";
+import { $, copy, el, toast } from "./dom.js";
 
 export class Edits {
-  constructor(link, labels) {
-    Object.assign(this, { link, labels, state: null, isFixed: false });
+  /** `isChosen` says whether Gaussians are chosen by hand. */
+  constructor(link, labels, isChosen) {
+    Object.assign(this, { link, labels, isChosen, state: null, isFixed: false, fills: false, title: "model" });
     const on = (id, act) => $(id).addEventListener("click", act);
     on("act-rename", () => this.rename());
     on("act-merge", () => this.merge());
+    on("act-split", () => this.split());
     on("act-export", () => this.export());
-    on("act-remove", () => this.remove());
+    on("act-remove", () => this.remove(false));
+    on("act-fill", () => this.remove(true));
     on("act-clear", () => labels.select([]));
     on("act-recolour", () => this.recolour());
     on("edit-undo", () => this.undo());
+    on("edit-redo", () => this.redo());
     on("edit-save", () => this.save());
-    on("edit-copy", () => copy(this.state.commands.join("\n"), "Commands"));
+    on("edit-copy", () => copy(this.state.command, "Command"));
+    $("export").addEventListener("close", () => this.exported($("export").returnValue === "yes"));
+    $("export-what").addEventListener("change", () => this.suggest());
     this.refresh();
+  }
+
+  setScene({ formats, fills, title }) {
+    Object.assign(this, { fills: fills === true, title });
+    $("export-format").replaceChildren(...(formats ?? []).map(([textContent, value]) => el("option", { value, textContent: `${textContent} (${value})` })));
   }
 
   get chosen() { return [...this.labels.selected].sort((a, b) => a - b); }
@@ -32,29 +43,69 @@ export class Edits {
     if (!this.isFixed && this.chosen.filter((id) => id !== 0).length > 1) this.send({ edit: "merge", labels: this.chosen });
   }
 
-  export() {
-    if (!this.isFixed && this.chosen.length > 0) this.send({ edit: "export", labels: this.chosen });
+  split() {
+    if (!this.isFixed && this.chosen.length === 1) this.send({ edit: "split", label: this.chosen[0] });
   }
 
-  async remove() {
-    if (this.isFixed || this.chosen.length === 0) return;
-    const count = this.chosen.reduce((sum, id) => sum + (this.labels.row(id)?.count ?? 0), 0);
-    const what = this.chosen.length === 1 ? this.labels.title(this.chosen[0]) : `${this.chosen.length} labels`;
-    const labels = this.chosen;
-    const said = await ask(`Remove ${what}?`, `${number(count)} Gaussians go. The file on the disk stays as it is, and the change can be taken back.`, "Remove");
-    if (said !== null) this.send({ edit: "remove", labels });
+  /** Asks what is to be written, and under which name. */
+  export() {
+    if (this.isFixed || $("export").open) return;
+    const option = (value, textContent) => el("option", { value, textContent });
+    const { chosen } = this;
+    const what = chosen.length === 1 ? this.labels.title(chosen[0]) : `${chosen.length} labels`;
+    $("export-what").replaceChildren(
+      ...(this.isChosen() ? [option("chosen", "The chosen Gaussians")] : []),
+      ...(chosen.length > 0 ? [option("labels", what)] : []), option("all", "The whole model"),
+    );
+    this.suggest();
+    $("export").returnValue = "no";
+    $("export").showModal();
+    $("export-name").select();
+  }
+
+  /** Proposes a name. */
+  suggest() {
+    const kind = $("export-what").value;
+    const name = kind === "labels" && this.chosen.length === 1 ? this.labels.row(this.chosen[0])?.name ?? `label ${this.chosen[0]}`
+      : kind === "labels" ? "objects" : kind === "chosen" ? "part" : this.title.split("/").pop().replace(/\.[a-z]+$/, "");
+    $("export-name").value = name.replace(/[^\p{L}\p{N} _.-]/gu, "").replace(/^[ .]+/, "").slice(0, 60) || "object";
+  }
+
+  exported(isSaid) {
+    if (!isSaid) return;
+    const kind = $("export-what").value;
+    const what = { labels: kind === "labels" ? this.chosen : [], chosen: kind === "chosen", name: $("export-name").value, format: $("export-format").value };
+    this.link.send({ kind: "export", what });
+  }
+
+  /** Fetches a file that was written. */
+  fetch({ file, name }) {
+    const link = el("a", { href: `/export/${file}`, download: name });
+    document.body.append(link);
+    link.click();
+    link.remove();
+  }
+
+  remove(fill) {
+    if (this.isFixed || this.chosen.length === 0 || (fill && !this.fills)) return;
+    if (fill) toast("Looking at what is around …");
+    this.send({ edit: "remove", labels: this.chosen, fill });
   }
 
   recolour() {
     if (this.isFixed || this.chosen.length === 0) return;
     const value = Number.parseInt($("paint-colour").value.slice(1), 16);
-    // Two digits keep the command readable.
+    // Two digits keep the list of changes readable.
     const colour = [value >> 16, (value >> 8) & 255, value & 255].map((byte) => Math.round(byte / 2.55) / 100);
     this.send({ edit: "recolour", labels: this.chosen, colour, mix: Number($("paint-mix").value) / 100 });
   }
 
   undo() {
-    if (!this.isFixed && this.state?.undo) this.link.send({ kind: "undo" });
+    if (!this.isFixed && this.state?.changes.length > 0) this.link.send({ kind: "undo" });
+  }
+
+  redo() {
+    if (!this.isFixed && this.state?.redo > 0) this.link.send({ kind: "redo" });
   }
 
   save() {
@@ -63,12 +114,12 @@ export class Edits {
 
   setState(state) {
     this.state = state;
-    const { commands } = state;
-    $("edits").hidden = commands.length === 0;
-    $("edit-count").textContent = commands.length;
-    $("edit-list").replaceChildren(...commands.map((command) => el("li", { textContent: command })));
+    const { changes, file } = state;
+    $("edits").hidden = changes.length === 0;
+    $("edit-count").textContent = changes.length;
+    $("edit-list").replaceChildren(...changes.map((change) => el("li", { textContent: change })));
     $("edit-list").scrollTop = 1e6;
-    $("edit-file").textContent = state.saved ? `Saved as ${state.file}` : `Not saved yet; it will be ${state.file}`;
+    $("edit-file").textContent = file === null ? "" : state.saved ? `Saved as ${file}` : `Will be saved as ${file}`;
     this.refresh();
   }
 
@@ -77,10 +128,16 @@ export class Edits {
     const allow = (id, isPossible) => { $(id).disabled = this.isFixed || !isPossible; };
     allow("act-rename", count === 1 && !this.chosen.includes(0));
     allow("act-merge", this.chosen.filter((id) => id !== 0).length > 1);
-    for (const id of ["act-export", "act-remove", "act-recolour"]) allow(id, count > 0);
+    allow("act-split", count === 1 && !this.chosen.includes(0));
+    for (const id of ["act-remove", "act-recolour", "act-alone", "act-choose"]) allow(id, count > 0);
+    allow("act-fill", count > 0);
+    $("act-fill").hidden = !this.fills;
     $("act-frame").disabled = this.labels.box(this.chosen) === null;
     $("recolour").hidden = this.isFixed;
-    allow("edit-undo", this.state?.undo);
+    allow("edit-undo", this.state?.changes.length > 0);
+    allow("edit-redo", this.state?.redo > 0);
     allow("edit-save", this.state && !this.state.saved);
+    allow("act-export", true);
+    for (const id of ["edit-undo", "edit-redo", "edit-save", "act-export"]) $(id).hidden = this.isFixed;
   }
 }

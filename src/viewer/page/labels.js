@@ -8,13 +8,15 @@ const SOLO = ["M8 2.5a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11Z", "M8 6.5a1.5 1.5 0
 
 export class Labels {
   constructor(link, changed) {
-    Object.assign(this, { link, changed, rows: [], all: 0, selected: new Set(), hidden: [], solo: [], isFixed: false });
+    Object.assign(this, { link, changed, rows: [], all: 0, selected: new Set(), hidden: [], solo: [], thumbs: {}, isFixed: false });
     this.anchor = null;
     this.focused = null;
     this.list = $("label-list");
     $("label-search").addEventListener("input", () => this.render());
     $("label-sort").addEventListener("change", () => this.render());
-    $("label-all").addEventListener("click", () => this.showAll());
+    for (const id of ["label-all", "solo-end"]) $(id).addEventListener("click", () => this.showAll());
+    this.list.addEventListener("mouseover", (event) => this.onHover?.(this.idOf(event.target)));
+    this.list.addEventListener("mouseleave", () => this.onHover?.(null));
     this.list.addEventListener("click", (event) => this.clicked(event));
     this.list.addEventListener("dblclick", (event) => {
       const id = this.idOf(event.target);
@@ -37,6 +39,14 @@ export class Labels {
   setShown({ hidden, solo }) {
     this.hidden = hidden;
     this.solo = solo;
+    $("solo-chip").hidden = solo.length === 0;
+    $("solo-text").textContent = solo.length === 1 ? `Only ${this.title(solo[0])}` : `Only ${solo.length} labels`;
+    this.render();
+  }
+
+  /** Takes the versions of the pictures of labels. */
+  setThumbs({ versions }) {
+    this.thumbs = versions;
     this.render();
   }
 
@@ -44,7 +54,7 @@ export class Labels {
 
   title(id) {
     const name = this.row(id)?.name;
-    return id === 0 ? "no label" : name ? `${name} (${id})` : `label ${id}`;
+    return id === 0 ? "background" : name ? `${name} (${id})` : `label ${id}`;
   }
 
   idOf(target) {
@@ -83,7 +93,7 @@ export class Labels {
     const objects = this.rows.filter((row) => row.id !== 0).length;
     $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? counted(this.all > this.rows.length ? this.all : objects, "object") : `${rows.length} found`;
     const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. A training with masks gives them when growth has ended."
-      : this.rows.length === 0 ? "This model has no labels. Train it with masks, label it with labelgs label, or find objects here with labelgs view --network."
+      : this.rows.length === 0 ? "This model has no labels. Train it with masks, label it with labelgs label, or choose its Gaussians here with the tools at the left."
       : rows.length === 0 ? "No label has this name or id." : "";
     $("label-empty").textContent = empty;
     $("label-empty").hidden = !empty;
@@ -97,15 +107,14 @@ export class Labels {
 
   item(row) {
     const isVisible = this.isVisible(row.id);
-    const name = el("span", { className: row.name ? "name" : "name none", textContent: row.name ?? (row.id === 0 ? "no label" : "unnamed") });
+    const name = el("span", { className: row.name ? "name" : "name none", textContent: row.name ?? (row.id === 0 ? "background" : "unnamed") });
     name.title = row.name ?? "";
     const facts = el("span", { className: "facts" }, el("span", { className: "size", textContent: `${number(row.count)} Gaussians` }));
-    if (typeof row.confidence === "number") {
-      const bar = el("span", { className: row.confidence < 0.6 ? "sure low" : "sure", title: `mean confidence ${(100 * row.confidence).toFixed(0)} %` }, el("i"));
-      bar.style.setProperty("--share", row.confidence.toFixed(3));
-      facts.append(bar);
+    if (typeof row.confidence === "number" && row.confidence < 0.6) {
+      facts.append(el("span", { className: "unsure", textContent: `confidence ${(100 * row.confidence).toFixed(0)} %`, title: "Its Gaussians were often of other labels in the masks" }));
     }
-    const swatch = el("span", { className: "swatch" });
+    const version = this.thumbs[row.id];
+    const swatch = el("span", { className: "swatch" }, ...(version === undefined ? [] : [el("img", { src: `/label/${row.id}?v=${version}`, alt: "", width: 34, height: 34, loading: "lazy" })]));
     swatch.style.setProperty("--swatch", `rgb(${row.colour.join(" ")})`);
     const what = this.title(row.id);
     const button = (kind, shape, label, pressed) => el("button", {

@@ -1,7 +1,7 @@
 // The connection to the server: requests, frames, and what happens when it goes away.
 
 /** Bytes of a frame's header. */
-const HEADER = 28;
+const HEADER = 36;
 /** Milliseconds between two signs of life. */
 const ALIVE = 20000;
 
@@ -78,7 +78,7 @@ export class Link {
   async receive(data) {
     const words = new DataView(data);
     const word = (index) => words.getUint32(4 * index, true);
-    const frame = { seq: word(1), step: word(2), width: word(3), height: word(4), ms: word(5) / 1000, exact: (word(6) & 1) === 1, marked: (word(6) & 2) === 2, blobs: [] };
+    const frame = { seq: word(1), step: word(2), width: word(3), height: word(4), ms: word(5) / 1000, exact: (word(6) & 1) === 1, mapped: (word(6) & 2) === 2, depths: [words.getFloat32(28, true), words.getFloat32(32, true)], blobs: [] };
     let at = HEADER;
     for (let index = 0; index < word(6) >> 2; index += 1) {
       const size = words.getUint32(at, true);

@@ -5,7 +5,9 @@ import { $, choose, copy, el, toast } from "./dom.js";
 import { Input } from "./input.js";
 import { Labels } from "./labels.js";
 import { Link } from "./link.js";
+import { Measuring } from "./measure.js";
 import { Finding } from "./object.js";
+import { Selecting } from "./select.js";
 import { PANES, Stage } from "./stage.js";
 import { Rig } from "./camera.js";
 import { Training } from "./training.js";
@@ -23,15 +25,20 @@ const labels = new Labels(link, () => {
   mark();
 });
 const finding = new Finding(link, stage, rig, () => mark());
-const edits = new Edits(link, labels);
+const measuring = new Measuring(stage, rig, (at, then) => pick(at, then));
+const selecting = new Selecting(link, stage, rig, labels, { find: finding, measure: measuring });
+const edits = new Edits(link, labels, () => selecting.state.count > 0);
 const views = new Views(rig, snap);
 const training = new Training(link);
 
 function hear(message) {
   switch (message.kind) {
     case "scene": return begin(message);
-    case "labels": return labels.setRows(message);
-    case "shown": labels.setShown(message); return stage.change();
+    case "labels": labels.setRows(message); return selecting.render();
+    case "shown": return shown(message);
+    case "chosen": return selecting.setState(message);
+    case "thumbs": return labels.setThumbs(message);
+    case "exported": return edits.fetch(message);
     case "object": return finding.setState(message);
     case "kept": return labels.select([message.label]);
     case "edits": edits.setState(message); return stage.change();
@@ -48,15 +55,20 @@ function hear(message) {
   }
 }
 
-/** Draws an outline around the selection and the object that was found. */
+/** Draws a line around the selection and the object that was found. */
 function mark() {
   const found = finding.mark === null ? [] : [finding.mark];
-  const all = [...edits.chosen.filter((id) => id !== 0).slice(0, 4095), ...found];
+  stage.setMark([...edits.chosen.filter((id) => id !== 0), ...found]);
   // The object keeps its label while it grows.
-  const what = `${all.join()} ${found.length > 0 ? JSON.stringify([finding.state.count, finding.state.flags, finding.state.first]) : ""}`;
+  const what = JSON.stringify([finding.mark, finding.state?.count, finding.state?.flags, finding.state?.first]);
   if (what === mark.last) return;
   mark.last = what;
-  stage.mark = all;
+  stage.change();
+}
+
+function shown(message) {
+  labels.setShown(message);
+  $("background").value = `#${message.background.map((value) => Math.round(255 * value).toString(16).padStart(2, "0")).join("")}`;
   stage.change();
 }
 
@@ -71,8 +83,10 @@ function begin(message) {
   stage.isTraining = message.training;
   labels.isFixed = message.training;
   edits.isFixed = message.training;
-  for (const option of $("pane-a").options) if (option.value === "confidence") option.disabled = message.training;
-  finding.setScene(message);
+  for (const option of $("pane-more").options) if (option.value === "confidence") option.disabled = message.training;
+  $("first-hint").hidden = message.training || begin.isKnown === true;
+  edits.setScene(message);
+  selecting.setScene(message);
   rig.reset(message, isSame);
   views.setScene(message.views);
   labels.render();
@@ -119,11 +133,29 @@ function snap(index) {
 }
 
 stage.onFrame = (frame) => {
-  $("state-exact").hidden = !frame.exact;
+  $("state-exact").hidden = !(frame.exact && stage.isExact && rig.view !== null);
+  if (frame.depths[1] > 0) stage.captions();
+  measuring.draw();
   $("state-size").textContent = `${frame.width} × ${frame.height} px`;
   $("state-time").textContent = `${frame.ms.toFixed(0)} ms`;
   if ((rig.view === null) === ($("state-view").textContent.startsWith("view"))) moved(true);
 };
+
+/** Selects the label at a point of the picture, without asking if the picture is known. */
+function select(at, how) {
+  begin.isKnown = true;
+  $("first-hint").hidden = true;
+  const label = stage.labelAt(...at);
+  if (label === null) return pick(at, (found) => labels.picked(found.label, how));
+  $("state-pick").textContent = labels.title(label);
+  return labels.picked(label, how);
+}
+
+function hover(at) {
+  const label = at && !selecting.isOn ? stage.labelAt(...at) : null;
+  stage.setHover(label === 0 ? null : label);
+  if (label !== null) $("state-pick").textContent = labels.title(label);
+}
 
 /** Asks what is at a point of the stage. */
 function pick(at, then) {
@@ -183,6 +215,17 @@ const act = {
   level: () => { rig.level(); toast("Up is now the up of this picture."); },
   copyCamera: () => copy(JSON.stringify(rig.file()), "Camera"),
   help: () => $("help").showModal(),
+  choose: () => {
+    if (edits.chosen.length > 0) selecting.send({ select: "labels", labels: edits.chosen, how: "replace" });
+  },
+  /** Leaves one thing after the other. */
+  escape: () => {
+    if (finding.isThere) finding.drop();
+    else if (selecting.state.count > 0) selecting.clear();
+    else if (selecting.isOn) selecting.take("pointer");
+    else if (labels.selected.size > 0) labels.select([]);
+    else if (labels.solo.length > 0) labels.showAll();
+  },
   holdPhoto: () => {
     if (rig.view === null || !rig.views[rig.view].photo) return;
     stage.isPhotoHeld = true;
@@ -191,14 +234,17 @@ const act = {
   },
 };
 
+const toggle = (tool) => selecting.take(selecting.tool === tool ? "pointer" : tool);
+
 const input = new Input(stage, rig, {
-  click: (at, how) => pick(at, (found) => labels.picked(found.label, how)),
+  click: select,
+  hover,
   pivot: (at) => pick(at, (found) => {
     rig.pivotAt(stage.point(...at), found.depth);
     spot(at);
     moved();
   }),
-  tool: (event) => (finding.isOn && !event.altKey ? finding : null),
+  tool: (event) => (event.altKey || event.button === 1 ? null : selecting.hand),
   released: { Space: () => { stage.isPhotoHeld = false; stage.paint(); stage.captions(); } },
   keys: {
     KeyV: () => fly(!input.isFlight),
@@ -220,31 +266,60 @@ const input = new Input(stage, rig, {
     "Ctrl+Shift+KeyA": () => labels.select([]),
     "Ctrl+KeyI": () => labels.select(labels.rows.filter((row) => row.id !== 0 && !labels.selected.has(row.id)).map((row) => row.id)),
     "Ctrl+KeyZ": () => edits.undo(),
+    "Ctrl+Shift+KeyZ": () => edits.redo(),
+    "Ctrl+KeyY": () => edits.redo(),
+    "Ctrl+Shift+KeyI": () => selecting.send({ select: "invert" }),
     "Ctrl+KeyS": () => edits.save(),
     F2: () => edits.rename(),
-    Delete: () => edits.remove(),
-    KeyO: () => finding.choose(!finding.isOn),
-    Enter: () => finding.keep(),
-    Escape: () => (finding.isThere ? finding.drop() : labels.select([])),
+    Delete: () => (selecting.state.count > 0 ? selecting.edit({ edit: "delete" }) : edits.remove(false)),
+    "Shift+Delete": () => edits.remove(true),
+    KeyO: () => toggle("find"),
+    KeyR: () => toggle("box"),
+    KeyT: () => toggle("lasso"),
+    KeyB: () => toggle("brush"),
+    KeyN: () => toggle("ball"),
+    KeyU: () => toggle("flood"),
+    KeyY: () => toggle("depth"),
+    KeyJ: () => toggle("measure"),
+    KeyG: act.choose,
+    KeyL: () => selecting.send({ select: "lock" }),
+    Equal: () => selecting.send({ select: "grow" }),
+    "Shift+Equal": () => selecting.send({ select: "grow" }),
+    Minus: () => selecting.send({ select: "shrink" }),
+    Enter: () => (finding.isThere ? finding.keep() : selecting.give()),
+    Escape: act.escape,
     KeyK: () => training.ask("pause"),
     "?": act.help,
     ...Object.fromEntries(PANES.map(([pane], index) => [`Digit${index + 1}`, () => setPane(0, pane)])),
   },
 });
 labels.onFrame = frameLabels;
+labels.onHover = (id) => stage.setHover(id === 0 ? null : id);
 
 const KEYS = [
   ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
   ["Double click", "set the pivot at the depth below"], ["Click", "select the object; Shift adds, Ctrl takes away"],
-  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops; Alt+drag turns"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
+  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
+  ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops"],
+  ["R, T, B", "choose Gaussians in a rectangle, in a line, with a brush; Alt+drag turns"], ["N, U, Y", "in a ball, by like colour, in front or behind"],
+  ["G", "choose the Gaussians of the selection"], ["+, -, L", "grow, shrink, lock what is chosen"], ["Enter, Delete", "give them a label, delete them"], ["J", "measure"],
   ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
-  ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M, Delete", "rename, merge, remove"],
-  ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S, Ctrl+Z", "export the selection, save the model, undo"], ["C", "copy the camera"], ["K", "pause a training, or go on"],
+  ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M", "rename, merge"], ["Delete, Shift+Delete", "remove; remove and fill"],
+  ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S", "export, save the model"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "leave one thing after the other"], ["C", "copy the camera"], ["K", "pause a training, or go on"],
 ];
 $("help-keys").append(...KEYS.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
 
-for (const id of ["pane-a", "pane-b"]) $(id).append(...PANES.map(([value, name]) => el("option", { value, textContent: name })));
-$("pane-a").addEventListener("change", (event) => setPane(0, event.target.value));
+/** Pictures with a button of their own. */
+const COMMON = 4;
+const option = ([value, textContent]) => el("option", { value, textContent });
+$("pane-b").append(...PANES.map(option));
+$("pane-more").append(el("option", { value: "", textContent: "More", disabled: true, hidden: true }), ...PANES.slice(COMMON).map(option));
+$("pane-more").addEventListener("change", (event) => setPane(0, event.target.value));
+for (const [index, [value, name]] of PANES.slice(0, COMMON).entries()) {
+  const button = el("button", { type: "button", value, textContent: name, title: `${name} (${index + 1})` });
+  button.addEventListener("click", () => setPane(0, value));
+  $("pane-a").append(button);
+}
 $("pane-b").addEventListener("change", (event) => setPane(1, event.target.value));
 const on = (id, what) => $(id).addEventListener("click", what);
 for (const layout of ["one", "wipe", "pair"]) on(`layout-${layout}`, () => stage.setLayout(layout));
@@ -256,6 +331,13 @@ on("home", act.home);
 on("copy-camera", act.copyCamera);
 on("help-open", act.help);
 on("act-frame", () => frameLabels(edits.chosen));
+on("act-alone", () => labels.alone(edits.chosen));
+on("act-choose", act.choose);
+$("photo-pixels").addEventListener("change", (event) => { stage.isExact = event.target.checked; stage.change(); });
+$("background").addEventListener("change", (event) => {
+  const value = Number.parseInt(event.target.value.slice(1), 16);
+  link.send({ kind: "background", colour: [value >> 16, (value >> 8) & 255, value & 255].map((byte) => byte / 255) });
+});
 
 const tabs = { stage: $("tab-stage"), labels: $("tab-labels"), views: $("tab-views") };
 for (const [tab, button] of Object.entries(tabs)) {
@@ -269,4 +351,4 @@ fly(false);
 stage.captions();
 
 // For whoever drives the page from outside.
-window.labelgs = { rig, stage, link, labels, edits, views, training, input, finding };
+window.labelgs = { rig, stage, link, labels, edits, views, training, input, finding, selecting, measuring };

@@ -1,27 +1,20 @@
 // The tool that finds an object: clicks and a box in the picture, the answers, and what becomes of it.
 
-import { $, choose, counted, duration } from "./dom.js";
+import { $, counted, duration } from "./dom.js";
 
 export class Finding {
   /** `changed` is called when another object is to be marked, or the tool is chosen or left. */
   constructor(link, stage, rig, changed) {
-    Object.assign(this, { link, stage, rig, changed, isPossible: false, isOn: false, state: null });
-    $("object-tool").addEventListener("click", () => this.choose(!this.isOn));
+    Object.assign(this, { link, stage, rig, changed, isOn: false, state: null });
     $("object").addEventListener("submit", (event) => { event.preventDefault(); this.keep(); });
     $("object").addEventListener("keydown", (event) => { if (event.key === "Escape") this.drop(); });
     $("object-drop").addEventListener("click", () => this.drop());
     this.render();
   }
 
-  setScene({ finds }) {
-    this.isPossible = finds === true;
-    this.choose(this.isOn);
-  }
-
   /** Takes the tool, or puts it away. An object in work stays until it is kept or dropped. */
   choose(isOn) {
-    this.isOn = isOn && this.isPossible;
-    this.stage.box.classList.toggle("pointing", this.isOn);
+    this.isOn = isOn;
     this.render();
   }
 
@@ -80,8 +73,6 @@ export class Finding {
   render() {
     const { asked, count, first } = this.state ?? { asked: null, count: null };
     const has = count !== null;
-    $("object-tool").hidden = !this.isPossible;
-    choose({ on: $("object-tool") }, this.isOn ? "on" : "off");
     $("object").hidden = !this.isOn && !this.isThere;
     $("object-progress").hidden = !asked;
     for (const id of ["object-name", "object-keep"]) $(id).hidden = !has;

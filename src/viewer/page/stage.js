@@ -1,6 +1,7 @@
 // The picture: draws frames, and asks for the next one when the camera or a control has changed.
 
 import { $, choose } from "./dom.js";
+import { LabelMap } from "./map.js";
 
 export const PANES = [
   ["colour", "Colour"], ["labels", "Labels"], ["tinted", "Labels over colour"], ["depth", "Depth"],
@@ -28,8 +29,14 @@ export class Stage {
     this.isPhotoHeld = false;
     this.wipeAt = 0.5;
     this.images = [];
+    // Labels with a line around them, the one below the pointer, and where each is in the picture.
     this.mark = [];
-    this.outline = null;
+    this.hovered = null;
+    this.map = null;
+    this.overlay = null;
+    // Points of a line over the picture, px of the canvas.
+    this.line = [];
+    this.isExact = false;
     this.frame = null;
     this.photos = new Map();
     this.isTraining = false;
@@ -143,21 +150,52 @@ export class Stage {
 
   ask(moving) {
     const from = this.rig.view === null ? { camera: this.rig.file() } : { view: this.rig.view };
-    this.asked = this.link.look({ from, panes: this.wanted(), mark: this.mark, moving });
+    const { width, height } = this.area();
+    const size = this.rig.view === null || this.isExact ? null : [width, height].map((side) => Math.max(1, Math.round(side)));
+    this.asked = this.link.look({ from, size, panes: this.wanted(), moving });
   }
 
   /** Draws a frame that came. */
   async show(frame) {
     const decode = (blob) => createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
     const images = await Promise.all(frame.blobs.map(decode));
-    [...this.images, this.outline].forEach((image) => image?.close());
-    this.outline = frame.marked ? images.pop() : null;
+    this.images.forEach((image) => image.close());
+    const labels = frame.mapped ? images.pop() : null;
+    this.map = labels && new LabelMap(labels);
+    labels?.close();
     this.images = images;
+    this.lay();
     this.frame = frame;
     this.drawn = performance.now();
     if (frame.seq === this.asked) this.asked = null;
     this.paint();
     this.onFrame(frame);
+  }
+
+  /** Lays a line around some labels. */
+  setMark(labels) {
+    this.mark = labels;
+    this.lay();
+    this.paint();
+  }
+
+  /** Shows which label is below the pointer. */
+  setHover(label) {
+    if (label === this.hovered) return;
+    this.hovered = label;
+    this.lay();
+    this.paint();
+  }
+
+  lay() { this.overlay = this.map?.drawn(this.mark, this.hovered) ?? null; }
+
+  /** The label at a point of the stage; null outside of a picture or before the present one is there. */
+  labelAt(x, y) {
+    if (!this.map || !this.isStill || this.isDirty || this.asked !== null) return null;
+    const [column, row] = this.place(x, y);
+    const { W, H } = this.rig.file();
+    const isInside = column >= 0 && row >= 0 && column < W && row < H;
+    return isInside ? this.map.at(column / W, row / H) : null;
   }
 
   lost(seq) {
@@ -196,35 +234,83 @@ export class Stage {
     } else if (this.isPair && second) {
       put(second, this.area(1));
     }
-    if (this.outline && !isPhoto) {
-      put(this.outline, this.area(0));
-      if (this.isPair) put(this.outline, this.area(1));
+    if (this.overlay && !isPhoto) {
+      put(this.overlay, this.area(0));
+      if (this.isPair) put(this.overlay, this.area(1));
+    }
+    this.paintLine();
+  }
+
+  paintLine() {
+    const { context, line } = this;
+    if (line.length === 0) return;
+    for (const [width, style] of [[4, "#000a"], [2, "#fff"]]) {
+      Object.assign(context, { lineWidth: width, strokeStyle: style });
+      context.beginPath();
+      line.forEach(([x, y], index) => (index === 0 ? context.moveTo(x, y) : context.lineTo(x, y)));
+      line.forEach(([x, y]) => { context.moveTo(x + 5, y); context.arc(x, y, 5, 0, 7); });
+      context.stroke();
     }
   }
 
   captions() {
     const [first, second] = this.panes.map((pane) => NAMES[pane]);
     const isTwo = (this.layout !== "one" && this.photo === "off") || this.photo === "wipe";
+    const shown = this.photo === "error" ? "error" : this.panes[0];
     $("tag-b").hidden = !isTwo;
     $("tag-b").textContent = this.photo === "wipe" ? "Photo" : second;
     $("tag-a").textContent = this.photo === "switch" || this.isPhotoHeld ? "Photo" : this.photo === "error" ? NAMES.error : isTwo ? first : "";
     choose({ one: $("layout-one"), wipe: $("layout-wipe"), pair: $("layout-pair") }, this.layout);
     choose({ off: $("photo-off"), wipe: $("photo-wipe"), switch: $("photo-switch"), error: $("photo-error") }, this.photo);
-    $("pane-a").value = this.panes[0];
+    choose(Object.fromEntries([...$("pane-a").children].map((button) => [button.value, button])), shown);
+    $("pane-more").value = [...$("pane-more").options].some(({ value }) => value === shown) ? shown : "";
     $("pane-b").value = this.panes[1];
     $("pane-b").closest("label").hidden = this.layout === "one";
+    this.legend(shown);
   }
 
-  /** The pixel of the full picture under a point of the stage, CSS px; outside the nearest one if `isNear`, else null. */
-  pixel(x, y, isNear = false) {
+  /** What the colours of a picture mean. */
+  legend(pane) {
+    const { depths } = this.frame ?? { depths: [0, 0] };
+    const scales = {
+      depth: [depths[0].toPrecision(3), `${depths[1].toPrecision(3)} away`], opacity: ["clear", "opaque"],
+      confidence: ["unsure of its label", "sure"], error: ["like the photo", "a quarter off"],
+    };
+    const scale = pane === "depth" && !(depths[1] > 0) ? undefined : scales[pane];
+    $("legend").hidden = !scale;
+    $("legend-bar").className = pane;
+    [$("legend-low").textContent, $("legend-high").textContent] = scale ?? ["", ""];
+  }
+
+  /** The place in the full picture under a point of the stage, CSS px. */
+  place(x, y) {
     const ratio = this.canvas.width / this.box.clientWidth;
     const at = [x * ratio, y * ratio];
-    const column = this.isPair && at[0] >= this.canvas.width / 2 ? 1 : 0;
-    const area = this.area(column);
-    const camera = this.rig.file();
-    const pixel = [(at[0] - area.x) / area.width * camera.W, (at[1] - area.y) / area.height * camera.H];
-    if (isNear) return pixel.map((at, axis) => Math.floor(Math.max(0, Math.min(at, (axis === 0 ? camera.W : camera.H) - 1))));
-    const isInside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < camera.W && pixel[1] < camera.H;
+    const area = this.area(this.isPair && at[0] >= this.canvas.width / 2 ? 1 : 0);
+    const { W, H } = this.rig.file();
+    return [(at[0] - area.x) / area.width * W, (at[1] - area.y) / area.height * H];
+  }
+
+  /** Pixels of the full picture in a CSS px of the stage. */
+  scale() {
+    return this.rig.file().W * this.canvas.width / (this.area().width * this.box.clientWidth);
+  }
+
+  /** Where a point of the world is on the canvas, px; null behind the camera. */
+  seen(point) {
+    const { w2c, fx, fy, cx, cy, W, H } = this.rig.file();
+    const [x, y, z] = w2c.slice(0, 3).map((row) => row[0] * point[0] + row[1] * point[1] + row[2] * point[2] + row[3]);
+    if (z <= 0) return null;
+    const area = this.area();
+    return [area.x + (fx * x / z + cx) / W * area.width, area.y + (fy * y / z + cy) / H * area.height];
+  }
+
+  /** The pixel of the full picture under a point of the stage; outside the nearest one if `isNear`, else null. */
+  pixel(x, y, isNear = false) {
+    const pixel = this.place(x, y);
+    const { W, H } = this.rig.file();
+    if (isNear) return pixel.map((at, axis) => Math.floor(Math.max(0, Math.min(at, (axis === 0 ? W : H) - 1))));
+    const isInside = pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] < W && pixel[1] < H;
     return isInside ? pixel.map(Math.floor) : null;
   }
 

@@ -1,0 +1,60 @@
+//! `labelgs edit`.
+
+use crate::Result;
+use crate::cli::support::parsers::near;
+use crate::cli::support::{Context, EditArgs, Edited, SceneArgs, near_plane, open_gpu, open_scene};
+use crate::edit::fill::Sight;
+use crate::edit::{Document, EditsFile};
+use crate::engine::Engine;
+use crate::error::{Error, Setting};
+use crate::eval::removal::sights;
+use crate::scene::{Gaussians, View};
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// `labelgs edit`.
+#[derive(Args, Clone, Debug)]
+pub struct ReplayArgs {
+    #[command(flatten)]
+    pub edit: EditArgs,
+    /// The changes: edits.json as a viewer has written it for this model.
+    #[arg(long, value_name = "EDITS.json")]
+    pub replay: PathBuf,
+    /// Scene of the model, for changes that fill holes.
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Near plane, world units. Default: the value of the model's run, else 0.2.
+    #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
+    pub near: Option<f32>,
+    #[command(flatten)]
+    pub reading: SceneArgs,
+}
+
+/// Makes the changes of a list and writes the model.
+pub(crate) fn run(args: &ReplayArgs, context: &Context) -> Result<()> {
+    let (model, known) = args.edit.open()?;
+    let of = model.len();
+    let list = EditsFile::read(&args.replay)?;
+    let mut draw = |model: &Gaussians| sights_of(args, model, context);
+    let first = Document { model, table: known.table };
+    let Document { model, table } = list.replay(&args.replay, first, &mut draw)?;
+    let labels = model.labels.iter().flatten().copied().collect();
+    let added = (model.len() as u64).saturating_sub(of as u64);
+    let edited = Edited { added, ..Edited::new(&model, table, of, labels) };
+    args.edit.finish(context, &edited, json!({ "edits": list.edits.len() }))
+}
+
+/// Draws a model from the training views of the scene.
+fn sights_of(args: &ReplayArgs, model: &Gaussians, context: &Context) -> Result<Vec<Sight>> {
+    let none = || Error::usage(Setting("scene"), "is missing: the list has a removal that is filled");
+    let scene: &Path = args.scene.as_deref().ok_or_else(none)?;
+    let dataset = open_scene(scene, &args.reading.of_run(&args.edit.model)?, None, [0.0; 3], false)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.is_empty() {
+        return Err(Error::data(scene, "", "has no training view to fill from"));
+    }
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
+    sights(&mut engine, &views, near_plane(&args.edit.model, args.near)?)
+}

@@ -1,0 +1,107 @@
+//! The Gaussians that pages have chosen by hand. They stay here; a page knows how many there are.
+
+use super::message::Choose;
+use super::painter::{Painter, SURFACE_PX, Source};
+use crate::edit::Rows;
+use crate::edit::selection::{Combine, Nearby, Region, beyond, in_region, in_sphere};
+use crate::error::{Error, Result};
+use crate::render::Parts;
+use crate::scene::Gaussians;
+use serde_json::{Value, json};
+
+/// What is chosen, and what cannot be.
+#[derive(Default)]
+pub(super) struct Chosen {
+    rows: Vec<bool>,
+    locked: Vec<bool>,
+    /// The places of the model's Gaussians, once they were asked for.
+    nearby: Option<Nearby>,
+}
+
+impl Chosen {
+    pub(super) fn new(model: &Gaussians) -> Self {
+        let none = vec![false; model.len()];
+        Self { rows: none.clone(), locked: none, nearby: None }
+    }
+
+    /// Returns for each row whether it is chosen.
+    pub(super) fn mask(&self) -> &[bool] {
+        &self.rows
+    }
+
+    pub(super) fn rows(&self) -> Rows {
+        Rows::of(&self.rows)
+    }
+
+    /// Chooses as a page asks, among what is drawn and not locked.
+    pub(super) fn choose(
+        &mut self,
+        what: &Choose,
+        model: &Gaussians,
+        is_drawn: &[bool],
+        (painter, source): (&Painter, &mut dyn Source),
+    ) -> Result<()> {
+        let is_free: Vec<bool> = is_drawn.iter().zip(&self.locked).map(|(&drawn, &locked)| drawn && !locked).collect();
+        let (found, how) = match what {
+            Choose::Draw { from, region, through, how } => {
+                let (camera, scale, rendered) = painter.seen(from, Parts::DEPTH, Some(SURFACE_PX), source)?;
+                let points = region.points.iter().map(|[x, y]| [x * scale[0], y * scale[1]]).collect();
+                let region = Region { points, radius: region.radius * scale[0], shape: region.shape };
+                let depth = if *through { None } else { Some(rendered.mean_depth()?) };
+                (in_region(model, &camera, &region, depth.as_deref()), *how)
+            }
+            Choose::Ball { from, pixel, radius, how } => {
+                let spot = painter.surface(from, *pixel, source)?;
+                let size = radius * spot.depth / spot.camera.fx;
+                (in_sphere(model, spot.place, size), *how)
+            }
+            Choose::Depth { from, pixel, side, how } => {
+                let spot = painter.surface(from, *pixel, source)?;
+                (beyond(model, &spot.camera, spot.depth, *side), *how)
+            }
+            Choose::Flood { from, pixel, tolerance, how } => {
+                let first = painter.surface(from, *pixel, source)?.row;
+                let none = || Error::usage("place", "what is here is locked; unlock it first");
+                let first = Some(first).filter(|&row| is_free[row]).ok_or_else(none)?;
+                (self.nearby(model)?.flood(model, first, *tolerance, &is_free), *how)
+            }
+            Choose::Labels { labels, how } => {
+                ((0..model.len()).map(|row| labels.contains(&model.label(row))).collect(), *how)
+            }
+            Choose::Grow => {
+                let before = self.rows.clone();
+                (self.nearby(model)?.grown(&before), Combine::Add)
+            }
+            Choose::Shrink => {
+                let before = self.rows.clone();
+                (self.nearby(model)?.shrunk(&before), Combine::Within)
+            }
+            Choose::Invert => (self.rows.iter().map(|&is_in| !is_in).collect(), Combine::Replace),
+            Choose::Nothing => (vec![false; model.len()], Combine::Replace),
+            Choose::Lock => {
+                self.locked.iter_mut().zip(&self.rows).for_each(|(locked, &is_in)| *locked |= is_in);
+                (vec![false; model.len()], Combine::Replace)
+            }
+            Choose::Unlock => {
+                self.locked.fill(false);
+                return Ok(());
+            }
+        };
+        let found: Vec<bool> = found.into_iter().zip(is_free).map(|(is_in, is_free)| is_in && is_free).collect();
+        self.rows = how.join(&self.rows, &found);
+        Ok(())
+    }
+
+    fn nearby(&mut self, model: &Gaussians) -> Result<&Nearby> {
+        let nearby = match self.nearby.take() {
+            Some(nearby) => nearby,
+            None => Nearby::new(model)?,
+        };
+        Ok(self.nearby.insert(nearby))
+    }
+
+    pub(super) fn describe(&self) -> Value {
+        let count = |rows: &[bool]| rows.iter().filter(|is_in| **is_in).count();
+        json!({ "kind": "chosen", "count": count(&self.rows), "locked": count(&self.locked) })
+    }
+}
