@@ -54,7 +54,7 @@ fn free_path(work: &Work, name: &str, ending: &str) -> Result<PathBuf> {
         return Err(Error::usage("name", problem));
     }
     if !formats().iter().any(|(_, known)| *known == ending) {
-        return Err(Error::usage("format", format!("{ending} is no extension of a format that is written")));
+        return Err(Error::usage("file", format!("{ending} is no extension of a format that is written")));
     }
     let mut taken = BTreeSet::new();
     loop {

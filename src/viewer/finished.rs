@@ -350,7 +350,7 @@ impl Session<'_> {
 fn sights_of<'a>(drawing: &'a mut Drawing, views: &'a [&View]) -> impl FnMut(&Gaussians) -> Result<Vec<Sight>> + 'a {
     move |model| {
         if views.is_empty() {
-            return Err(Error::usage("fill", "needs the training views of a scene; start labelgs view with --scene"));
+            return Err(Error::usage("hole", "is filled by the training views of a scene; open the model with its scene"));
         }
         drawing.engine.upload_model(model)?;
         sights(&mut drawing.engine, views, drawing.options.near)

@@ -40,7 +40,7 @@ impl Document {
         let labels: BTreeSet<u32> = edit.labels().iter().copied().collect();
         let rows = edit.rows().map(|rows| rows.mask(self.model.len())).transpose()?;
         match &rows {
-            Some(rows) if !rows.contains(&true) => return Err(Error::usage("rows", "no Gaussian is chosen")),
+            Some(rows) if !rows.contains(&true) => return Err(Error::usage("choice", "no Gaussian is chosen")),
             Some(_) => {}
             None => self.catalogue().check("labels", &labels)?,
         }

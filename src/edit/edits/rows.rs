@@ -51,7 +51,7 @@ impl Rows {
     pub fn mask(&self, count: usize) -> Result<Vec<bool>> {
         let end: u64 = self.0.iter().map(|&length| u64::from(length)).sum();
         if end > count as u64 {
-            return Err(Error::usage("rows", format!("go to row {end}; the model has {count}")));
+            return Err(Error::usage("choice", format!("goes to row {end}; the model has {count}")));
         }
         let mut rows = Vec::with_capacity(count);
         for (index, &length) in self.0.iter().enumerate() {

@@ -128,6 +128,8 @@ function moved(isMotion = true) {
 
 function snap(index) {
   rig.snap(index);
+  // Where panels are sheets, the picture is what was asked for.
+  if (document.body.dataset.tab === "views") $("tab-stage").click();
   if (stage.photo !== "off") stage.setPhoto(stage.photo);
   moved(false);
 }
@@ -218,6 +220,8 @@ const act = {
   choose: () => {
     if (edits.chosen.length > 0) selecting.send({ select: "labels", labels: edits.chosen, how: "replace" });
   },
+  /** Selects what is in the middle of the picture. */
+  middle: () => select([stage.box.clientWidth / 2, stage.box.clientHeight / 2], {}),
   /** Leaves one thing after the other. */
   escape: () => {
     if (finding.isThere) finding.drop();
@@ -282,6 +286,7 @@ const input = new Input(stage, rig, {
     KeyY: () => toggle("depth"),
     KeyJ: () => toggle("measure"),
     KeyG: act.choose,
+    Period: act.middle,
     KeyL: () => selecting.send({ select: "lock" }),
     Equal: () => selecting.send({ select: "grow" }),
     "Shift+Equal": () => selecting.send({ select: "grow" }),
@@ -298,7 +303,7 @@ labels.onHover = (id) => stage.setHover(id === 0 ? null : id);
 
 const KEYS = [
   ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
-  ["Double click", "set the pivot at the depth below"], ["Click", "select the object; Shift adds, Ctrl takes away"],
+  ["Double click", "set the pivot at the depth below"], ["Click, .", "select the object, or that in the middle; Shift adds, Ctrl takes away"],
   ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
   ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops"],
   ["R, T, B", "choose Gaussians in a rectangle, in a line, with a brush; Alt+drag turns"], ["N, U, Y", "in a ball, by like colour, in front or behind"],
