@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// A model, its names, and the changes so far.
 pub(super) struct Work<'a> {
     /// The model as it was typed: the input of the command.
-    typed: &'a Path,
+    typed: PathBuf,
     words: &'a dyn Words,
     now: Document,
     /// Before the first change; none without changes.
@@ -41,7 +41,7 @@ struct Done {
 
 impl<'a> Work<'a> {
     /// Starts with a model. Files go to the folder `edits` of its run, or to one beside it.
-    pub(super) fn new(typed: &'a Path, model: Gaussians, table: Option<LabelTable>, words: &'a dyn Words) -> Self {
+    pub(super) fn new(typed: &Path, model: Gaussians, table: Option<LabelTable>, words: &'a dyn Words) -> Self {
         let stem = typed.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = match run_folder::of_model(typed) {
             Some(_) if typed.is_dir() => typed.join("edits"),
@@ -50,7 +50,7 @@ impl<'a> Work<'a> {
         };
         let now = Document { model, table };
         Self {
-            typed,
+            typed: typed.to_owned(),
             words,
             now,
             first: None,
@@ -61,6 +61,11 @@ impl<'a> Work<'a> {
             rows_version: 0,
             problem: None,
         }
+    }
+
+    /// Starts again with another model.
+    pub(super) fn reopened(&self, typed: &Path, model: Gaussians, table: Option<LabelTable>) -> Self {
+        Self { rows_version: self.rows_version + 1, ..Self::new(typed, model, table, self.words) }
     }
 
     pub(super) fn model(&self) -> &Gaussians {
@@ -198,7 +203,7 @@ impl<'a> Work<'a> {
             "redo": self.undone.len(),
             "saved": self.is_saved(),
             "file": output.map(|path| path.display().to_string()),
-            "command": output.map(|path| self.words.replay(self.typed, &list_of(path), path)),
+            "command": output.map(|path| self.words.replay(&self.typed, &list_of(path), path)),
         })
     }
 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::formats::{FirstView, WriteOptions, export_model, formats};
 use crate::words::unique;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Longest name of a file without its ending, bytes.
 const NAME_MAX: usize = 100;
@@ -40,13 +40,13 @@ pub(super) fn export(
     }
     let there: BTreeSet<u32> = (0..part.len()).map(|row| part.label(row)).collect();
     let table = work.table().map(|table| keep(table, |id| there.contains(&id)));
-    let path = free_path(work, &export.name, &export.format)?;
+    let path = free_path(work.folder(), &export.name, &export.format)?;
     export_model(&path, &part, table.as_ref(), WriteOptions { first_view, ..WriteOptions::default() })?;
     Ok((path, part.len()))
 }
 
 /// Returns where a file of a name and ending goes: nothing is written over.
-fn free_path(work: &Work, name: &str, ending: &str) -> Result<PathBuf> {
+pub(super) fn free_path(folder: &Path, name: &str, ending: &str) -> Result<PathBuf> {
     let is_plain = |letter: char| letter.is_alphanumeric() || " -_.".contains(letter);
     let name = name.trim();
     if name.is_empty() || name.starts_with('.') || name.len() > NAME_MAX || !name.chars().all(is_plain) {
@@ -59,7 +59,7 @@ fn free_path(work: &Work, name: &str, ending: &str) -> Result<PathBuf> {
     let mut taken = BTreeSet::new();
     loop {
         let next = unique(name.to_owned(), " ", &mut taken);
-        let path = work.folder().join(format!("{next}{ending}"));
+        let path = folder.join(format!("{next}{ending}"));
         if !path.exists() {
             return Ok(path);
         }

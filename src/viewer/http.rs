@@ -1,7 +1,7 @@
 //! Heads of HTTP requests, read with limits on size and time, and answers.
 
 use crate::error::Error;
-use crate::files::read;
+use crate::files::{atomic, read};
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
@@ -11,6 +11,10 @@ use std::time::{Duration, Instant};
 pub(super) const HEAD_TIME: Duration = Duration::from_secs(5);
 /// Time for the other side to take an answer.
 pub(super) const WRITE_TIME: Duration = Duration::from_secs(10);
+/// Longest time between bytes of a body.
+const BODY_TIME: Duration = Duration::from_secs(30);
+/// Largest body, bytes.
+const BODY_BYTES_MAX: u64 = 16 << 30;
 /// Largest head, bytes.
 const HEAD_BYTES: usize = 16 << 10;
 const HEADERS: usize = 64;
@@ -26,6 +30,8 @@ pub(super) struct Head {
     pub(super) path: String,
     pub(super) query: String,
     headers: Vec<(String, String)>,
+    /// What came of the body already.
+    pub(super) body: Vec<u8>,
 }
 
 impl Head {
@@ -54,7 +60,7 @@ pub(super) enum NoHead {
     Status(&'static str),
 }
 
-/// Reads a head. Bytes after it are refused: a browser waits for an answer first.
+/// Reads a head. Only a POST has bytes after it.
 pub(super) fn read_head(stream: &mut TcpStream) -> Result<Head, NoHead> {
     let end = Instant::now() + HEAD_TIME;
     let mut bytes = Vec::new();
@@ -88,11 +94,11 @@ fn parse(bytes: &[u8]) -> Result<Option<Head>, NoHead> {
     const BAD: NoHead = NoHead::Status("400 Bad Request");
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut request = httparse::Request::new(&mut headers);
-    match request.parse(bytes) {
+    let length = match request.parse(bytes) {
         Ok(httparse::Status::Partial) => return Ok(None),
-        Ok(httparse::Status::Complete(length)) if length == bytes.len() => {}
+        Ok(httparse::Status::Complete(length)) if length == bytes.len() || request.method == Some("POST") => length,
         Ok(httparse::Status::Complete(_)) | Err(_) => return Err(BAD),
-    }
+    };
     let target = request.path.ok_or(BAD)?;
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
     let text = |value: &[u8]| String::from_utf8(value.to_vec()).map_err(|_| BAD);
@@ -102,6 +108,7 @@ fn parse(bytes: &[u8]) -> Result<Option<Head>, NoHead> {
         path: path.to_owned(),
         query: query.to_owned(),
         headers: headers.collect::<Result<_, _>>()?,
+        body: bytes[length..].to_vec(),
     }))
 }
 
@@ -118,6 +125,20 @@ pub(super) fn send(stream: &mut TcpStream, path: &Path) {
     let coded: String = name.bytes().map(|byte| format!("%{byte:02X}")).collect();
     let more = format!("Content-Disposition: attachment; filename*=UTF-8''{coded}\r\n");
     send_all(stream, &head("200 OK", "application/octet-stream", &more, length), file);
+}
+
+/// Writes the body of a request to a file, with every byte or not at all.
+pub(super) fn receive(stream: &mut TcpStream, head: &Head, path: &Path) -> crate::Result<()> {
+    let length = head.header("Content-Length").and_then(|length| length.parse::<u64>().ok());
+    let none = || Error::usage("file", format!("has no length, or more than {BODY_BYTES_MAX} bytes"));
+    let length = length.filter(|length| *length <= BODY_BYTES_MAX).ok_or_else(none)?;
+    let waits = stream.set_read_timeout(Some(BODY_TIME));
+    atomic::write(path, |out| {
+        waits?;
+        let mut body = head.body.chain(&mut *stream).take(length);
+        let copied = io::copy(&mut body, out)?;
+        if copied == length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
+    })
 }
 
 fn head(status: &str, kind: &str, more: &str, length: u64) -> String {

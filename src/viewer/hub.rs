@@ -61,6 +61,8 @@ struct State {
     views: Arc<Views>,
     /// Files that pages may fetch.
     files: Vec<PathBuf>,
+    /// Where models go that pages send; none in a training.
+    folder: Option<PathBuf>,
     /// Pictures of labels, as PNG.
     portraits: BTreeMap<u32, Arc<[u8]>>,
     is_closing: bool,
@@ -214,6 +216,14 @@ impl Hub {
         let mut state = self.lock();
         state.files.push(path);
         state.files.len() - 1
+    }
+
+    pub(super) fn set_folder(&self, folder: PathBuf) {
+        self.lock().folder = Some(folder);
+    }
+
+    pub(super) fn folder(&self) -> Option<PathBuf> {
+        self.lock().folder.clone()
     }
 
     pub(super) fn set_portrait(&self, label: u32, png: Vec<u8>) {

@@ -8,6 +8,7 @@ use crate::edit::Edit;
 use crate::edit::selection::{Combine, Region, Side};
 use crate::scenes::camera_json::CameraFile;
 use serde::Deserialize;
+use std::path::PathBuf;
 
 /// Largest message of a page, bytes.
 pub(super) const BYTES_MAX: usize = 256 << 10;
@@ -238,6 +239,12 @@ pub(super) enum Message {
         number: u64,
         /// What.
         news: News,
+    },
+    /// Opens another model, which a page has sent.
+    #[serde(skip)]
+    Open {
+        /// Its file.
+        path: PathBuf,
     },
     /// Takes back the last change.
     Undo,

@@ -25,6 +25,7 @@ mod pictures;
 mod portraits;
 mod rows;
 mod server;
+mod session;
 mod socket;
 mod training;
 mod views;

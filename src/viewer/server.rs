@@ -1,8 +1,10 @@
 //! The server: a thread per connection, fixed paths, and one WebSocket per page.
 
+use super::exports::free_path;
 use super::guard::Guard;
 use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
 use super::hub::Hub;
+use super::message::Message;
 use super::{Token, page, socket};
 use crate::error::{Error, Result, Setting};
 use std::io::{ErrorKind, Write};
@@ -95,7 +97,8 @@ fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
     if !Guard::is_same_origin(head.header("Origin"), host, is_socket) {
         return say(&mut stream, "403 Forbidden", "Another page may not ask this server.");
     }
-    if head.method != "GET" {
+    let is_upload = head.method == "POST" && head.path == "/open";
+    if head.method != "GET" && !is_upload {
         return say(&mut stream, "405 Method Not Allowed", "Only GET is answered.");
     }
     if head.path == "/" && head.value("token").is_some() {
@@ -103,6 +106,9 @@ fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
     }
     if !guard.knows_cookie(head.header("Cookie")) {
         return say(&mut stream, "401 Unauthorized", "Open the address with the token that labelgs printed last.");
+    }
+    if is_upload {
+        return open_model(&mut stream, &head, hub);
     }
     if is_socket { open_socket(stream, &head, hub) } else { files(&mut stream, &head.path, hub) }
 }
@@ -127,6 +133,23 @@ fn open_socket(mut stream: TcpStream, head: &Head, hub: &Arc<Hub>) {
         return hub.leave(id);
     }
     socket::serve(stream, hub, id);
+}
+
+/// Takes a model that was dropped on the page, and lets the engine's thread open it.
+fn open_model(stream: &mut TcpStream, head: &Head, hub: &Hub) {
+    let (name, ending) = head.value("name").and_then(|name| name.rsplit_once('.')).unwrap_or_default();
+    let Some(folder) = hub.folder() else {
+        return say(stream, "409 Conflict", "A training has its own model.");
+    };
+    let received = free_path(&folder, name, &format!(".{}", ending.to_lowercase()))
+        .and_then(|path| http::receive(stream, head, &path).map(|()| path));
+    match received {
+        Ok(path) => {
+            hub.note(Message::Open { path });
+            say(stream, "200 OK", "It is opened.");
+        }
+        Err(error) => say(stream, "400 Bad Request", &error.to_string()),
+    }
 }
 
 /// Answers with a file of the page, or a photo or an exported model by its number. No path of the request reaches the disk.

@@ -173,6 +173,55 @@ fn exports_have_names_and_can_be_fetched() {
     assert!(page.hear("problem")["text"].to_string().contains("no Gaussian is chosen"));
 }
 
+/// A model that is dropped on the page takes the place of the one before, whose changes are saved.
+#[test]
+fn a_dropped_model_is_opened() {
+    if device().is_none() {
+        return;
+    }
+    let place = Place::new();
+    place.succeeds(&["extract", "model.ply", "--labels", "3", "-o", "tea.spz"]);
+    let bytes = std::fs::read(place.path("tea.spz")).expect("a file");
+    let server = place.view(&[]);
+    let cookie = server.cookie();
+    let mut page = server.page();
+    page.hear("labels");
+    page.edit(&json!({ "edit": "rename", "label": 1, "name": "mug" }));
+    page.until("edits", |edits| has(edits, 1, false));
+    let post = |name: &str, length: usize, origin: &str, cookie: &str, body: &[u8]| {
+        let head = format!(
+            "POST /open?name={name} HTTP/1.1\r\nHost: {}\r\nOrigin: {origin}\r\nCookie: {cookie}\r\nContent-Length: {length}\r\n\r\n",
+            server.host()
+        );
+        server.raw(&[head.as_bytes(), body].concat())
+    };
+    let own = format!("http://{}", server.host());
+    let length = bytes.len();
+    for (answer, status) in [
+        (post("tea.spz", length, &own, "labelgs=0", &bytes), "401"),
+        (post("tea.spz", length, "http://evil.test", &cookie, &bytes), "403"),
+        (post("../tea.spz", length, &own, &cookie, &bytes), "400"),
+        (post("tea.exe", length, &own, &cookie, &bytes), "400"),
+        (post("tea.spz", usize::MAX, &own, &cookie, &bytes), "400"),
+        (post("tea.spz", length, &own, &cookie, &bytes), "200"),
+    ] {
+        assert_eq!(answer.split(' ').nth(1), Some(status), "{answer}");
+    }
+    let scene = page.until("scene", |scene| {
+        scene["title"].as_str().is_some_and(|title| title.ends_with("model-edits/opened/tea.spz"))
+    });
+    assert_eq!(scene["views"].as_array().map(Vec::len), Some(6), "the views stay");
+    page.until("labels", |labels| {
+        labels["rows"].as_array().is_some_and(|rows| rows.len() == 1 && rows[0]["name"] == "box of tea")
+    });
+    assert!(std::fs::read_to_string(place.path("model-edits/001.labels.json")).expect("saved").contains("mug"));
+    // What is no model is told, and the shown one stays.
+    assert!(post("bad.ply", 4, &own, &cookie, b"none").starts_with("HTTP/1.1 200"));
+    assert!(page.until("problem", |_| true)["text"].to_string().contains("bad.ply"));
+    page.edit(&json!({ "edit": "rename", "label": 3, "name": "tin" }));
+    page.until("edits", |edits| has(edits, 1, false));
+}
+
 /// The tools by their keys and the mouse.
 pub fn tools_choose_gaussians(browser: &mut Browser, tab: &Tab, place: &Place) {
     browser.click_on(tab, "#view-list li:nth-child(1) button");

@@ -301,6 +301,20 @@ const input = new Input(stage, rig, {
 labels.onFrame = frameLabels;
 labels.onHover = (id) => stage.setHover(id === 0 ? null : id);
 
+/** Sends a model that is dropped on the page to the server, which opens it. */
+async function open(file) {
+  const name = file.name.replace(/[^A-Za-z0-9_.-]/g, "_").replace(/^[.]+/, "");
+  toast(`Opening ${file.name} …`);
+  const answer = await fetch(`/open?name=${name}`, { method: "POST", body: file });
+  if (!answer.ok) toast((await answer.text()).trim(), true);
+}
+document.addEventListener("dragover", (event) => event.preventDefault());
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  const [file] = event.dataTransfer.files;
+  if (file && !scene?.training) open(file).catch(() => toast("The file could not be sent.", true));
+});
+
 const KEYS = [
   ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
   ["Double click", "set the pivot at the depth below"], ["Click, .", "select the object, or that in the middle; Shift adds, Ctrl takes away"],
