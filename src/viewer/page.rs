@@ -14,6 +14,7 @@ const FILES: &[(&str, &str, &[u8])] = &[
     ("/input.js", SCRIPT, web::INPUT.as_bytes()),
     ("/map.js", SCRIPT, include_bytes!("page/map.js")),
     ("/measure.js", SCRIPT, include_bytes!("page/measure.js")),
+    ("/path.js", SCRIPT, include_bytes!("page/path.js")),
     ("/select.js", SCRIPT, include_bytes!("page/select.js")),
     ("/stage.js", SCRIPT, include_bytes!("page/stage.js")),
     ("/labels.js", SCRIPT, include_bytes!("page/labels.js")),

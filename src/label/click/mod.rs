@@ -17,7 +17,7 @@ use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use crate::segment::{Place, Prepared, Prompt};
 use glam::{DVec2, DVec3};
 use photos::Masks;
-use question::{Question, Spot};
+use question::{Question, Spot, Target};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -174,7 +174,7 @@ impl<'a> Clicking<'a> {
             spots.push(self.spot(*click)?);
         }
         spots.sort_by_key(|spot| !spot.is_on);
-        let area = hints.area.map(|area| Question { spot: None, area: Some(area), others: Vec::new() });
+        let area = hints.area.map(|area| Question { target: Target::Box(area), others: Vec::new() });
         let mut object = area.map(|area| self.remembered(area, observe)).transpose()?;
         for &spot in &spots {
             if object.as_ref().is_some_and(|object| object[spot.gaussian] == spot.is_on) {

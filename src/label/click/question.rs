@@ -27,25 +27,49 @@ pub(super) struct Spot {
     pub(super) is_on: bool,
 }
 
+/// Where an object is pointed at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Target {
+    Click(Spot),
+    Box(Area),
+}
+
 /// One click or box, and spots that are on something else.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Question {
-    pub(super) spot: Option<Spot>,
-    pub(super) area: Option<Area>,
+    pub(super) target: Target,
     pub(super) others: Vec<Spot>,
 }
 
 impl Question {
     /// Returns the view that is asked first.
     fn first(&self) -> usize {
-        self.area.map(|area| area.view).or(self.spot.map(|spot| spot.view)).unwrap_or_default()
+        match self.target {
+            Target::Click(spot) => spot.view,
+            Target::Box(area) => area.view,
+        }
+    }
+
+    /// Returns the point of a click.
+    fn point(&self) -> Option<DVec3> {
+        match self.target {
+            Target::Click(spot) => Some(spot.point),
+            Target::Box(_) => None,
+        }
+    }
+
+    fn area(&self) -> Option<Area> {
+        match self.target {
+            Target::Click(_) => None,
+            Target::Box(area) => Some(area),
+        }
     }
 }
 
 impl Clicking<'_> {
     /// Returns what a click means. If that has Gaussians at `others`, it is asked again so that it has not.
     pub(super) fn meant(&mut self, spot: Spot, others: &[Spot], observe: Observe) -> Result<Vec<bool>> {
-        let question = Question { spot: Some(spot), area: None, others: Vec::new() };
+        let question = Question { target: Target::Click(spot), others: Vec::new() };
         let found = self.remembered(question.clone(), observe)?;
         let wrong: Vec<Spot> = others.iter().filter(|other| found[other.gaussian]).copied().collect();
         if wrong.is_empty() { Ok(found) } else { self.remembered(Question { others: wrong, ..question }, observe) }
@@ -64,8 +88,8 @@ impl Clicking<'_> {
     /// Asks for what lies at one click or in a box.
     fn answer(&mut self, question: &Question, observe: Observe) -> Result<Vec<bool>> {
         let anchors = self.anchors(question)?;
-        let Some(target) = question.spot.map(|spot| spot.point).or(anchors.first().copied()) else {
-            return Err(nothing(question.area.is_some()));
+        let Some(target) = question.point().or(anchors.first().copied()) else {
+            return Err(nothing(question.area().is_some()));
         };
         let first = question.first();
         let mut order = self.by_direction(self.photos.views[first].camera.centre(), target);
@@ -88,7 +112,7 @@ impl Clicking<'_> {
         let asked: Vec<Asked> = answers.into_iter().map(asked).collect();
         let rows = self.vote(&agreeing(&asked))?;
         if !rows.contains(&true) {
-            return Err(nothing(question.area.is_some()));
+            return Err(nothing(question.area().is_some()));
         }
         observe(Progress::First(&rows))?;
         let confirmed = self.confirmed(&order[..order.len().min(ALL_VIEWS)], question, observe)?;
@@ -151,13 +175,13 @@ impl Clicking<'_> {
 
     /// Returns the box in the drawn view, if it is there.
     fn area(&self, view: usize, question: &Question) -> Option<[Place; 2]> {
-        let [x0, y0, x1, y1] = question.area.filter(|area| area.view == view)?.corners.map(|at| at as f32);
+        let [x0, y0, x1, y1] = question.area().filter(|area| area.view == view)?.corners.map(|at| at as f32);
         Some([self.photos.drawn(view, [x0, y0]), self.photos.drawn(view, [x1, y1])])
     }
 
     /// Returns points of the surface that the network takes of a box, from its middle outwards; none without a box.
     fn anchors(&mut self, question: &Question) -> Result<Vec<DVec3>> {
-        let Some(Area { view, .. }) = question.area else { return Ok(Vec::new()) };
+        let Some(Area { view, .. }) = question.area() else { return Ok(Vec::new()) };
         let Some(prompt) = self.prompt(view, question, &[])? else { return Ok(Vec::new()) };
         let answers = self.ask_without(vec![(view, prompt)], &question.others, &mut |_| Ok(()))?;
         let best = answers.iter().flat_map(|(_, (masks, qualities))| masks.iter().zip(qualities));
@@ -175,7 +199,7 @@ impl Clicking<'_> {
         if prompt.area.is_some() {
             return Ok(Some(prompt));
         }
-        for point in question.spot.map(|spot| spot.point).iter().chain(anchors) {
+        for point in question.point().iter().chain(anchors) {
             if !prompt.on.is_empty() {
                 break;
             }

@@ -6,6 +6,7 @@ import { Input } from "./input.js";
 import { Labels } from "./labels.js";
 import { Link } from "./link.js";
 import { Measuring } from "./measure.js";
+import { CameraPath } from "./path.js";
 import { Finding } from "./object.js";
 import { Selecting } from "./select.js";
 import { PANES, Stage } from "./stage.js";
@@ -29,6 +30,7 @@ const measuring = new Measuring(stage, rig, (at, then) => pick(at, then));
 const selecting = new Selecting(link, stage, rig, labels, { find: finding, measure: measuring });
 const edits = new Edits(link, labels, () => selecting.state.count > 0);
 const views = new Views(rig, snap);
+const path = new CameraPath(rig, () => moved());
 const training = new Training(link);
 
 function hear(message) {
@@ -86,6 +88,7 @@ function begin(message) {
   for (const option of $("pane-more").options) if (option.value === "confidence") option.disabled = message.training;
   $("first-hint").hidden = message.training || begin.isKnown === true;
   edits.setScene(message);
+  path.title = message.title;
   selecting.setScene(message);
   rig.reset(message, isSame);
   views.setScene(message.views);
@@ -370,4 +373,4 @@ fly(false);
 stage.captions();
 
 // For whoever drives the page from outside.
-window.labelgs = { rig, stage, link, labels, edits, views, training, input, finding, selecting, measuring };
+window.labelgs = { rig, stage, link, labels, edits, views, training, input, finding, selecting, measuring, path };
