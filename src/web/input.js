@@ -62,6 +62,7 @@ export class Input {
     if (this.moved <= CLICK) return;
     this.pointers.set(event.pointerId, now);
     this.stage.box.classList.add("dragging");
+    this.actions.moved?.();
     if (this.pointers.size === 2) return this.pinch(event.pointerId, last, now);
     const isPan = event.buttons & 6 || (event.shiftKey && !this.tool);
     if (this.tool && !isPan) {

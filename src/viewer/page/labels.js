@@ -99,6 +99,12 @@ export class Labels {
     $("label-empty").hidden = !empty;
     this.list.hidden = Boolean(empty);
     $("label-all").disabled = this.isFixed || (this.hidden.length === 0 && this.solo.length === 0);
+    this.mark();
+  }
+
+  /** Marks the rows of the selection. */
+  mark() {
+    for (const item of this.list.children) item.setAttribute("aria-selected", String(this.selected.has(Number(item.dataset.id))));
     $("selection").hidden = this.selected.size === 0;
     $("selection-count").textContent = this.selected.size === 1 ? this.title([...this.selected][0]) : `${this.selected.size} labels`;
   }
@@ -160,7 +166,7 @@ export class Labels {
 
   select(ids) {
     this.selected = new Set(ids);
-    this.render();
+    this.mark();
     this.changed();
   }
 

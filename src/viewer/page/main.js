@@ -122,6 +122,12 @@ function over(message) {
   veil(head, scores ? `Test views: ${scores}. ` : "", "See the model with", el("code", { textContent: message.command }));
 }
 
+/** The hint for newcomers goes with the first click or motion. */
+function known() {
+  begin.isKnown = true;
+  $("first-hint").hidden = true;
+}
+
 function moved(isMotion = true) {
   stage.change(isMotion);
   views.mark();
@@ -148,8 +154,7 @@ stage.onFrame = (frame) => {
 
 /** Selects the label at a point of the picture, without asking if the picture is known. */
 function select(at, how) {
-  begin.isKnown = true;
-  $("first-hint").hidden = true;
+  known();
   const label = stage.labelAt(...at);
   if (label === null) return pick(at, (found) => labels.picked(found.label, how));
   $("state-pick").textContent = labels.title(label);
@@ -251,6 +256,7 @@ const input = new Input(stage, rig, {
     spot(at);
     moved();
   }),
+  moved: known,
   tool: (event) => (event.altKey || event.button === 1 ? null : selecting.hand),
   released: { Space: () => { stage.isPhotoHeld = false; stage.paint(); stage.captions(); } },
   keys: {
