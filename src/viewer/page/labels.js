@@ -104,7 +104,12 @@ export class Labels {
 
   /** Marks the rows of the selection. */
   mark() {
-    for (const item of this.list.children) item.setAttribute("aria-selected", String(this.selected.has(Number(item.dataset.id))));
+    const hasFocused = Boolean(this.item_(this.focused ?? undefined));
+    for (const item of this.list.children) {
+      const id = Number(item.dataset.id);
+      item.setAttribute("aria-selected", String(this.selected.has(id)));
+      if (hasFocused) item.tabIndex = id === this.focused ? 0 : -1;
+    }
     $("selection").hidden = this.selected.size === 0;
     $("selection-count").textContent = this.selected.size === 1 ? this.title([...this.selected][0]) : `${this.selected.size} labels`;
   }
@@ -126,7 +131,7 @@ export class Labels {
     const button = (kind, shape, label, pressed) => el("button", {
       type: "button", className: kind, tabIndex: -1, disabled: this.isFixed, title: label, "aria-label": `${label}: ${what}`, "aria-pressed": String(pressed),
     }, icon(...shape));
-    const item = el("li", { className: isVisible ? "label" : "label off", tabIndex: -1, "aria-selected": String(this.selected.has(row.id)), role: "option" },
+    const item = el("li", { className: isVisible ? "label" : "label off", tabIndex: -1, role: "option" },
       swatch, name, el("span", { className: "id", textContent: row.id === 0 ? "" : row.id }),
       button("eye", isVisible ? EYE : SHUT, isVisible ? "Hide" : "Show", false),
       button("solo", SOLO, "Show alone", this.solo.includes(row.id)), facts);
