@@ -37,6 +37,10 @@ export class Labels {
   }
 
   setShown({ hidden, solo }) {
+    const isOther = hidden.join() !== this.hidden.join() || solo.join() !== this.solo.join();
+    if (isOther && !this.hasAsked && this.hasShown) toast("Another page has changed which labels are shown.");
+    this.hasAsked = false;
+    this.hasShown = true;
     this.hidden = hidden;
     this.solo = solo;
     $("solo-chip").hidden = solo.length === 0;
@@ -234,6 +238,7 @@ export class Labels {
 
   send(hidden, solo) {
     if (this.isFixed) return toast("Labels are hidden in a finished model only: a training draws all of them.", true);
+    this.hasAsked = true;
     this.link.send({ kind: "show", hidden, solo });
   }
 
