@@ -2,6 +2,7 @@
 //!
 //! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `FORMATS`.
 
+mod archive;
 mod format;
 mod glb;
 mod html;

@@ -1,6 +1,7 @@
 //! Moves, turns and scales a model. Colours that depend on the direction are turned along.
 
-use glam::{DQuat, DVec3};
+use super::turn::Signs;
+use glam::{DMat3, DMat4, DQuat, DVec3};
 use labelgs_scene::harmonics::{COEFFICIENTS, basis};
 use labelgs_scene::origin::far_origin;
 use labelgs_scene::{Error, Gaussians, Result, Setting};
@@ -15,6 +16,8 @@ const NODES: [(f64, f64); 4] = [
     (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
+/// Largest relative difference between the scales of the axes, and cosine between axes, of a turn with one scale.
+const OFF_MAX: f64 = 1e-4;
 /// Directions around the axis: exact up to degree 7.
 const AROUND: u32 = 8;
 
@@ -42,6 +45,30 @@ impl Transform {
         let up = up
             .ok_or_else(|| Error::usage(Setting("up"), "is no direction; expected one with a length, such as 0,0,1"))?;
         Ok(DQuat::from_rotation_arc(up, DVec3::NEG_Y))
+    }
+
+    /// The change of place in our axes of a matrix in those of a file, which are a half turn away; `None` for one that is
+    /// more than a turn, one scale and a move.
+    pub(super) fn of_matrix(matrix: DMat4, axes_of_file: Signs) -> Option<Self> {
+        let linear = DMat3::from_mat4(matrix);
+        let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
+        let scale = linear.determinant().cbrt();
+        let is_even = axes.iter().all(|axis| (axis.length() / scale - 1.0).abs() < OFF_MAX);
+        let is_square =
+            [(0, 1), (0, 2), (1, 2)].iter().all(|&(a, b)| axes[a].dot(axes[b]).abs() < OFF_MAX * scale * scale);
+        let place = matrix.w_axis.truncate();
+        if !(scale > 0.0 && scale.is_finite() && place.is_finite() && is_even && is_square) {
+            return None;
+        }
+        if matrix == DMat4::IDENTITY {
+            return Some(Self::default());
+        }
+        let DQuat { x, y, z, w } =
+            DQuat::from_mat3(&DMat3::from_cols(axes[0] / scale, axes[1] / scale, axes[2] / scale));
+        let sign = axes_of_file.0.map(f64::from);
+        let turn = DQuat::from_xyzw(sign[1] * sign[2] * x, sign[0] * sign[2] * y, sign[0] * sign[1] * z, w).normalize();
+        let moved = DVec3::from_array(sign) * place;
+        Some(Self { origin: turn.inverse() * -moved / scale, turn, scale })
     }
 
     /// Returns the transformed model.

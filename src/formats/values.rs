@@ -1,11 +1,34 @@
 //! Values after activation, as other formats store them, before activation.
 
+use super::format::Export;
+
+/// Opacities at which the logit is still finite in 32 bits.
+const OPACITY_MIN: f32 = 1e-7;
+const OPACITY_MAX: f32 = 1.0 - 1e-7;
 /// A size of 0, which some formats allow, as one that has a logarithm.
 const SCALE_MIN: f32 = 1e-12;
 
 /// The opacity of a logit.
 pub(super) fn sigmoid(logit: f32) -> f32 {
     1.0 / (1.0 + (-logit).exp())
+}
+
+/// The logit of an opacity, kept from 0 and 1, where it is not finite in 32 bits.
+pub(super) fn logit(opacity: f32) -> f32 {
+    let inside = opacity.clamp(OPACITY_MIN, OPACITY_MAX);
+    (inside / (1.0 - inside)).ln()
+}
+
+/// What a format loses that holds opacities as floats and has no mark for antialiased models, a line each.
+pub(super) fn losses(export: &Export) -> Vec<String> {
+    let saturated = export.rows.iter().filter(|&&row| !(sigmoid(export.model.opacities[row]) < 1.0)).count();
+    let saturated =
+        (saturated > 0).then(|| format!("{saturated} opacities are 1 in 32 bits and come back as 0.9999999"));
+    let bold = export.model.antialiased.then(|| {
+        "the format has no mark for antialiased models; only labelgs draws its fine parts right, others too bold"
+            .to_owned()
+    });
+    saturated.into_iter().chain(bold).collect()
 }
 
 /// The logit of an opacity in steps of 1/255; 0 and 255, which have none, count as a quarter of a step from the end.

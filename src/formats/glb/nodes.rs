@@ -2,11 +2,8 @@
 
 use super::{AXES, SPLATS};
 use crate::transform::Transform;
-use glam::{DMat3, DMat4, DQuat, DVec3};
+use glam::{DMat4, DQuat, DVec3};
 use serde_json::Value;
-
-/// Largest relative difference between the scales of the axes, and cosine between axes, of a turn with one scale.
-const OFF_MAX: f64 = 1e-4;
 
 /// A primitive with Gaussians at its place.
 pub(super) struct Placed<'a> {
@@ -45,7 +42,7 @@ pub(super) fn placed(root: &Value) -> Result<Vec<Placed<'_>>, usize> {
         open.extend(list(&node["children"]).into_iter().rev().map(|child| (child, matrix)));
         let Some(mesh) = node["mesh"].as_u64().map(|mesh| &root["meshes"][mesh as usize]) else { continue };
         for primitive in splats(mesh) {
-            let place = transform_of(matrix).ok_or(at)?;
+            let place = Transform::of_matrix(matrix, AXES).ok_or(at)?;
             found.push(Placed { primitive: &mesh["primitives"][primitive], place });
         }
     }
@@ -72,26 +69,4 @@ fn matrix_of(node: &Value) -> DMat4 {
         turn.normalize(),
         triple("translation", DVec3::ZERO),
     )
-}
-
-/// The change of place in our axes; `None` for one that is more than a turn, one scale and a move.
-fn transform_of(matrix: DMat4) -> Option<Transform> {
-    let linear = DMat3::from_mat4(matrix);
-    let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
-    let scale = linear.determinant().cbrt();
-    let is_even = axes.iter().all(|axis| (axis.length() / scale - 1.0).abs() < OFF_MAX);
-    let is_square = [(0, 1), (0, 2), (1, 2)].iter().all(|&(a, b)| axes[a].dot(axes[b]).abs() < OFF_MAX * scale * scale);
-    let place = matrix.w_axis.truncate();
-    if !(scale > 0.0 && scale.is_finite() && place.is_finite() && is_even && is_square) {
-        return None;
-    }
-    if matrix == DMat4::IDENTITY {
-        return Some(Transform::default());
-    }
-    let DQuat { x, y, z, w } = DQuat::from_mat3(&DMat3::from_cols(axes[0] / scale, axes[1] / scale, axes[2] / scale));
-    // Signs of a half turn about z, as in AXES.
-    let sign = AXES.0.map(f64::from);
-    let turn = DQuat::from_xyzw(sign[1] * sign[2] * x, sign[0] * sign[2] * y, sign[0] * sign[1] * z, w).normalize();
-    let moved = DVec3::from_array(sign) * place;
-    Some(Transform { origin: turn.inverse() * -moved / scale, turn, scale })
 }

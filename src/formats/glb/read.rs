@@ -6,21 +6,17 @@ use super::{
     file, harmonic, harmonics,
 };
 use crate::format::ReadModel;
-use crate::ply::fitting;
+use crate::ply::joined;
 use crate::rows::{Row, Rows};
 use crate::transform::Transform;
-use crate::values::log_scale;
+use crate::values::{log_scale, logit};
 use labelgs_files::label_table::{LabelEntry, LabelTable};
 use labelgs_files::read as bytes_of;
+use labelgs_scene::MODEL_LABEL_MAX;
 use labelgs_scene::{Error, Result};
-use labelgs_scene::{Gaussians, MODEL_LABEL_MAX};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-
-/// Opacities at which the logit is still finite in 32 bits.
-const OPACITY_MIN: f32 = 1e-7;
-const OPACITY_MAX: f32 = 1.0 - 1e-7;
 
 struct Glb<'a> {
     path: &'a Path,
@@ -92,25 +88,6 @@ fn unread(splats: &Value) -> Vec<String> {
     notes
 }
 
-/// Makes one model of all parts.
-fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
-    if parts.len() == 1 {
-        return Ok(parts.remove(0));
-    }
-    let mut all = Gaussians {
-        sh_degree: parts.iter().map(|part| part.sh_degree).max().unwrap_or_default(),
-        origin: parts.first().map(|part| part.origin).unwrap_or_default(),
-        antialiased: parts.iter().any(|part| part.antialiased),
-        labels: parts.iter().any(|part| part.labels.is_some()).then(Vec::new),
-        label_confidence: parts.iter().any(|part| part.label_confidence.is_some()).then(Vec::new),
-        ..Gaussians::default()
-    };
-    for part in parts {
-        all.append(fitting(part, &all)?);
-    }
-    Ok(all)
-}
-
 impl Glb<'_> {
     /// What changes the picture of the whole file and is not read.
     fn unread(&self) -> Vec<String> {
@@ -166,12 +143,11 @@ impl Glb<'_> {
             AXES.rest(&mut triples);
             let [x, y, z, w] = quats.row(index);
             let [opacity] = opacities.row(index);
-            let inside = opacity.clamp(OPACITY_MIN, OPACITY_MAX);
             rows.push(&Row {
                 position: AXES.position(means.row(index)).map(f64::from),
                 quat: AXES.quat([w, x, y, z]).map(f64::from),
                 scale: scales.row(index).map(log_scale),
-                opacity: (inside / (1.0 - inside)).ln(),
+                opacity: logit(opacity),
                 sh0: sh0.row(index),
                 rest: &triples,
                 label: labels.as_ref().map(|found| found.0[index]),

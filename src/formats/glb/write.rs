@@ -5,7 +5,7 @@ use super::{
     harmonic, harmonics,
 };
 use crate::format::{Export, ModelWriter};
-use crate::values::{sigmoid, unit};
+use crate::values::{losses as losses_of_values, sigmoid, unit};
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::harmonics::value_of;
 use labelgs_scene::{Error, Result, UNLABELLED};
@@ -22,14 +22,7 @@ fn losses(export: &Export) -> Result<Vec<String>> {
             format!("a GLB holds up to {} bytes, and at least a Gaussian; this model takes {bytes}", file::BYTES_MAX);
         return Err(Error::usage("GLB", format!("{problem}; leave out some Gaussians or write another format")));
     }
-    let saturated = export.rows.iter().filter(|&&row| !(sigmoid(export.model.opacities[row]) < 1.0)).count();
-    let saturated =
-        (saturated > 0).then(|| format!("{saturated} opacities are 1 in 32 bits and come back as 0.9999999"));
-    let bold = export.model.antialiased.then(|| {
-        "the format has no mark for antialiased models; only labelgs draws its fine parts right, others too bold"
-            .to_owned()
-    });
-    Ok(saturated.into_iter().chain(bold).collect())
+    Ok(losses_of_values(export))
 }
 
 /// Numbers and the accessors on them.

@@ -50,7 +50,7 @@ fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Expo
 }
 
 /// Returns a part with the columns and the origin of `like`.
-pub fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
+fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     if part.antialiased != like.antialiased {
         let problem = "is on for some of the models and off for others; train all alike, the coarse one too";
         return Err(Error::usage(Setting("antialias"), problem));
@@ -66,4 +66,23 @@ pub fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     part.label_confidence =
         like.label_confidence.as_ref().map(|_| part.label_confidence.take().unwrap_or_else(|| vec![0.0; count]));
     Ok(part)
+}
+
+/// Makes one model of all parts.
+pub fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
+    if parts.len() == 1 {
+        return Ok(parts.remove(0));
+    }
+    let mut all = Gaussians {
+        sh_degree: parts.iter().map(|part| part.sh_degree).max().unwrap_or_default(),
+        origin: parts.first().map(|part| part.origin).unwrap_or_default(),
+        antialiased: parts.iter().any(|part| part.antialiased),
+        labels: parts.iter().any(|part| part.labels.is_some()).then(Vec::new),
+        label_confidence: parts.iter().any(|part| part.label_confidence.is_some()).then(Vec::new),
+        ..Gaussians::default()
+    };
+    for part in parts {
+        all.append(fitting(part, &all)?);
+    }
+    Ok(all)
 }

@@ -8,7 +8,7 @@ mod packed;
 mod stored;
 mod write;
 
-pub(super) use joined::fitting;
+pub(super) use joined::joined;
 pub use joined::write_joined;
 
 use super::format::{ModelFormat, ReadModel};

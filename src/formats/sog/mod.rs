@@ -1,9 +1,9 @@
 //! SOG version 2, the compressed format of PlayCanvas: `meta.json` and lossless WebP pictures in an archive. A Gaussian is
 //! a pixel, the same in each picture. Labels are one more picture, which `extras` of `meta.json` names.
 
-mod archive;
 mod cluster;
 mod meta;
+mod pictures;
 mod read;
 mod write;
 

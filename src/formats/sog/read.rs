@@ -1,8 +1,9 @@
 //! Reads SOG.
 
-use super::archive::{Archive, Picture};
 use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
+use super::pictures::{Picture, picture};
 use super::{CODEBOOK, PALETTE_ROW, ROTATION};
+use crate::archive::Archive;
 use crate::format::ReadModel;
 use crate::rows::{Row, Rows};
 use crate::values::{logit_of_byte, with_largest};
@@ -27,7 +28,7 @@ struct Pictures {
 /// Reads a SOG of version 2.
 pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let bytes = file::bytes(path)?;
-    let mut archive = Archive::open(path, &bytes)?;
+    let mut archive = Archive::open(path, &bytes, "SOG")?;
     let text = archive.file(FILE)?;
     let meta: Meta = serde_json::from_slice(&text)
         .map_err(|error| Error::data(path, FILE, format!("{error}; expected that of a SOG; export the file again")))?;
@@ -82,7 +83,7 @@ fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archiv
         if !(1..=3).contains(&own.bands) {
             return Err(bad(path, FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
         }
-        let (entries, palette) = (archive.picture(&own.files[1])?, archive.picture(&own.files[0])?);
+        let (entries, palette) = (picture(archive, &own.files[1])?, picture(archive, &own.files[0])?);
         if palette.width != PALETTE_ROW * coefficients(own.bands) {
             let problem = format!("is {} wide, expected {PALETTE_ROW} entries a row", palette.width);
             return Err(bad(path, &own.files[0], problem));
@@ -90,12 +91,12 @@ fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archiv
         rest = Some((entries, palette));
     }
     let all = Pictures {
-        low: archive.picture(&meta.means.files[0])?,
-        high: archive.picture(&meta.means.files[1])?,
-        quats: archive.picture(&meta.quats.files[0])?,
-        scales: archive.picture(&meta.scales.files[0])?,
-        sh0: archive.picture(&meta.sh0.files[0])?,
-        labels: own.map(|own| archive.picture(&own.file)).transpose()?,
+        low: picture(archive, &meta.means.files[0])?,
+        high: picture(archive, &meta.means.files[1])?,
+        quats: picture(archive, &meta.quats.files[0])?,
+        scales: picture(archive, &meta.scales.files[0])?,
+        sh0: picture(archive, &meta.sh0.files[0])?,
+        labels: own.map(|own| picture(archive, &own.file)).transpose()?,
         rest,
     };
     let needed = [&all.low, &all.high, &all.quats, &all.scales, &all.sh0].into_iter().chain(&all.labels);

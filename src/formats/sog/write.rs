@@ -3,7 +3,8 @@
 use super::meta::{
     ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION,
 };
-use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, archive, cluster};
+use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, cluster, pictures};
+use crate::archive;
 use crate::format::{Export, ModelWriter};
 use crate::values::{byte, opacity_byte, place_of_largest, unit};
 use labelgs_scene::harmonics::coefficients;
@@ -72,7 +73,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let height = rows.len().div_ceil(width).next_multiple_of(4);
     let mut files = Vec::new();
     let mut add = |name: &str, texels: &[[u8; 4]], width: usize, height: usize| -> io::Result<String> {
-        files.push((name.to_owned(), archive::encode(texels, width, height)?));
+        files.push((name.to_owned(), pictures::encode(texels, width, height)?));
         Ok(name.to_owned())
     };
     let (mins, maxs) = bounds(export, logarithm);
@@ -115,7 +116,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let (version, count) = (VERSION, rows.len());
     let meta = Meta { version, asset, count, model, antialias: false, means, scales, quats, sh0, rest, extras };
     files.push((FILE.into(), serde_json::to_vec(&meta)?));
-    out.write_all(&archive::pack(files)?)
+    out.write_all(&archive::pack(files, 1)?)
 }
 
 /// A rotation: the three smaller components, and which one is the largest.
