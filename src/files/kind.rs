@@ -29,7 +29,7 @@ const OTHER: &str = "name another file";
 type Magic = (usize, &'static [u8], &'static str, &'static str);
 
 /// The first that fits counts.
-const MAGIC: [Magic; 57] = [
+const MAGIC: [Magic; 59] = [
     (0, b"version https://git-lfs.github.com/", "a Git LFS pointer", "run git lfs pull where it was cloned"),
     (0, b"/annex/objects/", "a git-annex pointer", "run git annex get on it"),
     (0, b"bplist00", "a placeholder or list of macOS", "download the file itself"),
@@ -91,6 +91,8 @@ const MAGIC: [Magic; 57] = [
     (0, b"ply\r", "a PLY", "name it *.ply"),
     (0, b"NGSP", "an SPZ", "name it *.spz"),
     (0, b"glTF", "a GLB", "name it *.glb"),
+    (0, b"#usda ", "a USD layer of text", "name it *.usda"),
+    (0, b"PXR-USDC", "a binary USD layer", "save it as text first, as with usdcat IN -o OUT.usda"),
     (0, b"\x80\x02", "a pickle of Python", OTHER),
 ];
 
@@ -155,7 +157,7 @@ mod tests {
         let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 9\n";
         let mut tar = vec![b'a'; 512];
         tar[257..262].copy_from_slice(b"ustar");
-        let cases: [(&[u8], &str); 32] = [
+        let cases: [(&[u8], &str); 34] = [
             (b"", "an empty file"),
             (&[0; 64], "a file of zeros"),
             (pointer, "a Git LFS pointer"),
@@ -186,6 +188,8 @@ mod tests {
             (b"\0\x05\x16\x07\0\x02\0\0Mac OS X", "a side file of macOS (AppleDouble)"),
             (b"ply\r\nformat ascii 1.0\r\n", "a PLY"),
             (b"glTF\x02\0\0\0", "a GLB"),
+            (b"#usda 1.0\n(\n", "a USD layer of text"),
+            (b"PXR-USDC\0\x08\0\0", "a binary USD layer"),
             (b"1 2 3 some text", "unknown"),
             (b"plywood", "unknown"),
         ];

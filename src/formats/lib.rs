@@ -17,6 +17,7 @@ mod splat;
 mod spz;
 mod transform;
 mod turn;
+mod usd;
 pub mod values;
 
 use labelgs_files::label_table::LabelTable;
@@ -35,8 +36,8 @@ pub use format::{Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptio
 pub use format::{ModelFormat, ModelWriter};
 
 /// All formats. The first one also serves pipes and devices, such as `/dev/stdout`.
-const FORMATS: [&ModelFormat; 6] =
-    [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT];
+const FORMATS: [&ModelFormat; 8] =
+    [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT, &usd::TEXT, &usd::PACKAGE];
 
 /// Returns the format for the extension of a path, ignoring case.
 fn by_ending(path: &Path) -> Option<&'static ModelFormat> {

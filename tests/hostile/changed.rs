@@ -159,7 +159,7 @@ fn changed_plys_are_read_or_refused() {
 
 #[test]
 fn changed_models_are_read_or_refused() {
-    run_all(&["spz_", "glb", "sog", "splat"]);
+    run_all(&["spz_", "glb", "sog", "splat", "usd_"]);
 }
 
 #[test]

@@ -25,6 +25,7 @@ spz = dict(position=1.01 / 8192, rotation=0.0022, scale=1.01 / 32, opacity=1.5 /
 BOUNDS = {"same": {key: 1e-5 for key in spz}, "spz": spz, "sog": dict(position=2e-3, rotation=0.012, scale=None, opacity=1.5 / 255, colour=None, harmonics=None),
           "packed": dict(position=None, rotation=0.0022, scale=None, opacity=1.01 / 255, colour=None, harmonics=1.01 / 64),
           "glb": dict(position=0, rotation=1e-6, scale=1e-5, opacity=1e-6, colour=0, harmonics=0)}
+BOUNDS["usd"] = BOUNDS["glb"]
 bounds, worst, bad = BOUNDS[name.replace(",", " ").split()[0]], {}, []
 if len(a) != len(b): bad.append(f"{len(a)} and {len(b)} Gaussians")
 for one in a:

@@ -224,6 +224,16 @@ pub fn spz_framed() -> Vec<Vec<u8>> {
     vec![exported("a.spz", 1, options), golden("splat-transform-v4.spz")]
 }
 
+/// USD with labels and names, and one of another program: every kind of value, groups and places.
+pub fn usd_text() -> Vec<Vec<u8>> {
+    vec![exported("a.usda", 1, WriteOptions::default()), golden("foreign.usda")]
+}
+
+/// A package of USD.
+pub fn usd_package() -> Vec<Vec<u8>> {
+    vec![exported("a.usdz", 0, WriteOptions::default())]
+}
+
 /// SOG with labels and names.
 pub fn sog() -> Vec<Vec<u8>> {
     vec![exported("a.sog", 1, WriteOptions::default())]

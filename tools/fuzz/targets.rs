@@ -47,7 +47,7 @@ const PLAIN: Target = Target {
 const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
 
 /// All readers.
-pub const TARGETS: [Target; 43] = [
+pub const TARGETS: [Target; 45] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
@@ -142,6 +142,8 @@ pub const TARGETS: [Target; 43] = [
     Target { name: "spz_framed", file: "model.spz", read: model, seeds: seeds::spz_framed, ..PIXELS },
     Target { name: "glb", file: "model.glb", read: model, seeds: seeds::glb, ..PLAIN },
     Target { name: "splat", file: "model.splat", read: model, seeds: || vec![seeds::golden("source.splat")], ..PLAIN },
+    Target { name: "usd_text", file: "model.usda", read: model, seeds: seeds::usd_text, ..PLAIN },
+    Target { name: "usd_package", file: "model.usdz", read: model, seeds: seeds::usd_package, ..PLAIN },
     Target { name: "sog", file: "model.sog", read: model, seeds: seeds::sog, ..PIXELS },
     Target {
         name: "sog_meta",

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// `labelgs convert`.
 #[derive(Args, Clone, Debug)]
 pub struct ConvertArgs {
-    /// The model: a file that ends in .ply, .spz, .glb, .sog, .splat or .html, or the folder of a `labelgs train` run.
+    /// The model: a file that ends in .ply, .spz, .glb, .sog, .usda, .usdz, .splat or .html, or the folder of a `labelgs train`
+    /// run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.

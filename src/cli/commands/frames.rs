@@ -28,7 +28,7 @@ pub enum Order {
 /// `labelgs frames`.
 #[derive(Args, Clone, Debug)]
 pub struct FramesArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the photos.

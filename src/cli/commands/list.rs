@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// `labelgs list`.
 #[derive(Args, Clone, Debug)]
 pub struct ListArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     #[command(flatten)]

@@ -24,7 +24,7 @@ use std::path::PathBuf;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["scene", "camera"])))]
 pub struct RenderArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene whose cameras to use.

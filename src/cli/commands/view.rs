@@ -23,7 +23,7 @@ const TOKEN: &str = "LABELGS_VIEW_TOKEN";
 /// `labelgs view`.
 #[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene whose views to list and whose photos to compare with.

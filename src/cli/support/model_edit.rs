@@ -43,7 +43,7 @@ impl TableArg {
 /// Arguments of every edit of labels.
 #[derive(Args, Clone, Debug)]
 pub struct EditArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.

@@ -21,11 +21,14 @@ fn an_unknown_extension_is_refused() {
     let scene = Scene::new();
     write_model(scene.at("a.PLY"), &balls()).expect("written");
     let bytes = std::fs::read(scene.at("a.PLY")).expect("bytes");
-    for name in ["a.obj", "a.ply.bak", "a.usdz", "a.gltf", "a.ksplat", "a"] {
+    for name in ["a.obj", "a.ply.bak", "a.usdc", "a.gltf", "a.ksplat", "a"] {
         let error = write_model(scene.at(name), &balls()).expect_err("no format");
         assert!(matches!(error, labelgs_scene::Error::Usage { .. }), "{error}");
         let error = error.to_string();
-        assert!(error.contains(".ply, .spz, .glb, .sog, .html") && !scene.path().join(name).exists(), "{error}");
+        assert!(
+            error.contains(".ply, .spz, .glb, .sog, .html, .usda, .usd, .usdz") && !scene.path().join(name).exists(),
+            "{error}"
+        );
         let read = read_model(scene.write(name, &bytes));
         if name == "a" {
             assert_eq!(read.expect("read by its content").gaussians, balls());
@@ -34,7 +37,7 @@ fn an_unknown_extension_is_refused() {
             assert!(refused.contains("is no extension of a model") && refused.contains(".ply"), "{refused}");
         }
     }
-    for format in ["spz", "glb", "sog"] {
+    for format in ["spz", "glb", "sog", "usda"] {
         write_model(scene.at(&format!("b.{format}")), &balls()).expect("written");
         std::fs::rename(scene.at(&format!("b.{format}")), scene.at("b")).expect("renamed");
         assert_eq!(read_model(scene.at("b")).expect("read by its content").gaussians.len(), balls().len());

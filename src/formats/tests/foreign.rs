@@ -193,9 +193,9 @@ fn a_file_that_is_no_model_is_named() {
         (b"", "an empty file", "again"),
     ];
     for (bytes, what, cure) in cases {
-        for ending in ["ply", "spz", "glb", "sog", "splat", "html"] {
+        for ending in ["ply", "spz", "glb", "sog", "splat", "html", "usda", "usdz"] {
             // These are what they should be, as far as the first bytes tell.
-            if matches!((what, ending), ("a zip archive", "sog") | ("a web page", "html")) {
+            if matches!((what, ending), ("a zip archive", "sog" | "usdz") | ("a web page", "html")) {
                 continue;
             }
             let refused = refusal(read_model(scene.write(&format!("a.{ending}"), bytes)));

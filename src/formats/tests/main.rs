@@ -14,3 +14,4 @@ mod foreign; // files of other programs
 mod models;
 mod ply; // the columns of a PLY, whole and damaged
 mod round_trips; // what a format may change, and how bad files are refused
+mod usd; // prims of other programs, and damaged layers

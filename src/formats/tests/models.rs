@@ -31,7 +31,7 @@ pub const SPZ: Bounds = Bounds {
     confidence: 1.01 / 510.0,
 };
 
-/// Floats throughout. Rotations lose their length; sizes and opacities go through an exponential and back, each rounded
+/// Floats throughout, as in USD too. Rotations lose their length; sizes and opacities go through an exponential and back, each rounded
 /// to 24 bits.
 pub const GLB: Bounds = Bounds {
     position: 0.0,
@@ -92,9 +92,17 @@ pub fn v4() -> WriteOptions {
 }
 
 /// Every format that is written: file, choices, bounds.
-pub fn written() -> [(&'static str, WriteOptions, Bounds); 5] {
+pub fn written() -> [(&'static str, WriteOptions, Bounds); 7] {
     let usual = WriteOptions::default();
-    [("a.spz", usual, SPZ), ("b.spz", v4(), SPZ), ("a.glb", usual, GLB), ("a.sog", usual, SOG), ("a.html", usual, SPZ)]
+    [
+        ("a.spz", usual, SPZ),
+        ("b.spz", v4(), SPZ),
+        ("a.glb", usual, GLB),
+        ("a.sog", usual, SOG),
+        ("a.html", usual, SPZ),
+        ("a.usda", usual, GLB),
+        ("a.usdz", usual, GLB),
+    ]
 }
 
 /// Long and thin Gaussians in a ball, in every direction, whose colour depends on the direction.

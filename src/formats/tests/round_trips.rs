@@ -275,7 +275,7 @@ fn formats_that_are_only_read_say_so() {
     let error = write_model(scene.at("a.splat"), &model(1, 0, false)).expect_err("read only").to_string();
     assert!(
         error.contains(".splat files are only read; models are written as")
-            && error.contains(".ply, .spz, .glb, .sog, .html"),
+            && error.contains(".ply, .spz, .glb, .sog, .html, .usda, .usd, .usdz"),
         "{error}"
     );
 }

@@ -26,7 +26,7 @@ use table::table;
 /// `labelgs benchmark`.
 #[derive(Args, Clone, Debug)]
 pub struct BenchmarkArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene of the benchmark.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// `labelgs eval`.
 #[derive(Args, Clone, Debug)]
 pub struct EvalArgs {
-    /// The model: a PLY, SPZ, GLB, SOG or .splat, or the folder of a `labelgs train` run.
+    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the photos to compare with.

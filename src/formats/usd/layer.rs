@@ -1,0 +1,253 @@
+//! The prims with Gaussians in a layer of text, and what is around them.
+
+use super::text::{Scanner, Span};
+use super::{
+    CONFIDENCE, DEGREE, HARMONICS, MAGIC, OPACITIES, ORIENTATIONS, OWN, POSITIONS, SCALES, SEMANTICS, SPLATS, place,
+};
+use glam::DMat4;
+use labelgs_scene::Result;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::FRAC_PI_2;
+
+/// Most prims around a prim.
+const DEPTH_MAX: usize = 256;
+/// Words before the type of an attribute.
+const MODIFIERS: [&str; 8] = ["custom", "uniform", "varying", "config", "prepend", "append", "delete", "add"];
+/// Keys of metadata by which a prim or a layer gets more from elsewhere.
+const ARCS: [&str; 6] = ["references", "payload", "inherits", "specializes", "subLayers", "variantSets"];
+
+/// A prim with Gaussians.
+#[derive(Debug)]
+pub(super) struct Part<'a> {
+    /// Where it begins.
+    pub(super) at: usize,
+    pub(super) attributes: BTreeMap<&'a str, Span>,
+    /// Our own dictionary, if it has one.
+    pub(super) own: BTreeMap<&'a str, Span>,
+    /// Its name for people.
+    pub(super) title: Option<Span>,
+    /// What it shows, or what a prim around it shows.
+    pub(super) semantic: Option<Span>,
+    /// From its own axes to those of a stage with y up.
+    pub(super) matrix: DMat4,
+    /// True if the prims around it do not move it.
+    is_free: bool,
+}
+
+/// All of a layer that is read.
+#[derive(Debug, Default)]
+pub(super) struct Layer<'a> {
+    pub(super) parts: Vec<Part<'a>>,
+    pub(super) notes: BTreeSet<String>,
+}
+
+/// A prim that is not closed yet.
+#[derive(Default)]
+struct Frame<'a> {
+    at: usize,
+    name: &'a str,
+    /// True for one that is drawn if it has Gaussians.
+    is_defined: bool,
+    /// False if it and all in it is switched off.
+    is_active: bool,
+    kind: &'a str,
+    attributes: BTreeMap<&'a str, Span>,
+    own: BTreeMap<&'a str, Span>,
+    title: Option<Span>,
+    parts: Vec<Part<'a>>,
+}
+
+/// Reads a layer.
+pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
+    if !scanner.starts(MAGIC) {
+        return Err(scanner.bad(0, format!("does not start with `{MAGIC}`; this is no USD layer of text")));
+    }
+    scanner.skip(MAGIC.len());
+    let mut layer = Layer::default();
+    let mut is_z_up = false;
+    for (key, value) in metadata(scanner)? {
+        is_z_up |= key == "upAxis" && scanner.part(value).contains('Z');
+        layer.note_arc(key);
+    }
+    let root = if is_z_up { DMat4::from_rotation_x(-FRAC_PI_2) } else { DMat4::IDENTITY };
+    let mut stack: Vec<Frame> = Vec::new();
+    while let Some(byte) = scanner.peek() {
+        if byte == b'}' {
+            let Some(frame) = stack.pop() else {
+                return Err(scanner.bad(scanner.at(), "`}` closes nothing; correct it"));
+            };
+            scanner.skip(1);
+            let parts = layer.close(scanner, frame)?;
+            match stack.last_mut() {
+                Some(around) => around.parts.extend(parts),
+                None => layer.parts.extend(parts),
+            }
+            continue;
+        }
+        layer.statement(scanner, &mut stack)?;
+    }
+    if let Some(frame) = stack.last() {
+        let problem = format!("the prim \"{}\" has no end; the file was cut short", frame.name);
+        return Err(scanner.bad(frame.at, problem));
+    }
+    for part in &mut layer.parts {
+        part.matrix = root * part.matrix;
+    }
+    Ok(layer)
+}
+
+impl<'a> Layer<'a> {
+    fn note_arc(&mut self, key: &str) {
+        if ARCS.contains(&key) {
+            self.notes.insert(format!("its {key} were left out; flatten it first, as with usdcat --flatten"));
+        }
+    }
+
+    /// Reads an attribute, or a prim up to its attributes.
+    fn statement(&mut self, scanner: &mut Scanner<'a>, stack: &mut Vec<Frame<'a>>) -> Result<()> {
+        let at = scanner.at();
+        match scanner.name("a prim or an attribute")? {
+            word @ ("def" | "over" | "class") => {
+                if stack.len() >= DEPTH_MAX {
+                    return Err(scanner.bad(at, format!("is a prim in more than {DEPTH_MAX} others; export it flat")));
+                }
+                stack.push(self.open(scanner, at, word)?);
+            }
+            "variantSet" => {
+                scanner.string()?;
+                scanner.need(b'=', "a set of variants")?;
+                scanner.value()?;
+                self.note_arc("variantSets");
+            }
+            "reorder" => {
+                scanner.name("what is ordered")?;
+                scanner.need(b'=', "what is ordered")?;
+                scanner.value()?;
+            }
+            word => {
+                let found = attribute(scanner, word)?;
+                if let (Some((name, value)), Some(frame)) = (found, stack.last_mut()) {
+                    frame.attributes.insert(name, value);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads a prim up to its attributes.
+    fn open(&mut self, scanner: &mut Scanner<'a>, at: usize, word: &str) -> Result<Frame<'a>> {
+        let kind = scanner.word();
+        let name = scanner.string()?;
+        let mut frame = Frame { at, name, is_defined: word == "def", is_active: true, kind, ..Frame::default() };
+        for (key, value) in metadata(scanner)? {
+            match key {
+                "active" => frame.is_active = is_true(scanner.part(value)),
+                "displayName" => frame.title = Some(value),
+                "customData" => {
+                    if let Some(&(_, own)) = dictionary(scanner, value)?.iter().rfind(|(key, _)| *key == OWN) {
+                        frame.own = dictionary(scanner, own)?.into_iter().collect();
+                    }
+                }
+                _ => self.note_arc(key),
+            }
+        }
+        scanner.need(b'{', "a prim")?;
+        Ok(frame)
+    }
+
+    /// Returns the prims with Gaussians that a closed one is or has.
+    fn close(&mut self, scanner: &Scanner<'a>, frame: Frame<'a>) -> Result<Vec<Part<'a>>> {
+        let Frame { at, is_defined, is_active, kind, attributes, own, title, mut parts, .. } = frame;
+        // Classes and what is only changed are drawn elsewhere.
+        if !is_defined || !is_active {
+            if !parts.is_empty() || kind == SPLATS {
+                self.notes.insert("its prims that are switched off or not defined here were left out".into());
+            }
+            return Ok(Vec::new());
+        }
+        let semantic = attributes.iter().find(|(name, _)| name.starts_with(SEMANTICS)).map(|(_, &value)| value);
+        let (matrix, is_free) = if parts.is_empty() && kind != SPLATS {
+            (DMat4::IDENTITY, false)
+        } else {
+            place::local(scanner, at, &attributes)?
+        };
+        for part in &mut parts {
+            part.semantic = part.semantic.or(semantic);
+            if !part.is_free {
+                (part.matrix, part.is_free) = (matrix * part.matrix, is_free);
+            }
+        }
+        if kind == SPLATS {
+            parts.push(Part { at, attributes, own, title, semantic, matrix, is_free });
+        }
+        Ok(parts)
+    }
+}
+
+/// True for `true` and 1.
+pub(super) fn is_true(text: &str) -> bool {
+    matches!(text, "true" | "1")
+}
+
+/// Reads the attribute that begins with `word`. Returns it if it may be needed and has a value.
+fn attribute<'a>(scanner: &mut Scanner<'a>, word: &'a str) -> Result<Option<(&'a str, Span)>> {
+    let mut kind = word;
+    while MODIFIERS.contains(&kind) {
+        kind = scanner.name("the type of an attribute")?;
+    }
+    if scanner.take(b'[') {
+        scanner.need(b']', "the type of an attribute")?;
+    }
+    let name = scanner.name("the name of an attribute")?;
+    let value = if scanner.take(b'=') { Some(scanner.value()?) } else { None };
+    metadata(scanner)?;
+    let numbers = [POSITIONS, ORIENTATIONS, SCALES, OPACITIES, HARMONICS];
+    let is_needed = numbers.contains(&name.strip_suffix('h').unwrap_or(name))
+        || numbers.contains(&name)
+        || [DEGREE, CONFIDENCE].contains(&name)
+        || name.starts_with(SEMANTICS)
+        || name.starts_with(place::OPERATION);
+    // A value of `None` is none.
+    let value = value.filter(|&value| is_needed && scanner.part(value) != "None");
+    Ok(value.map(|value| (name, value)))
+}
+
+/// Reads the keys and values in round brackets, if there are any.
+fn metadata<'a>(scanner: &mut Scanner<'a>) -> Result<Vec<(&'a str, Span)>> {
+    let mut all = Vec::new();
+    if !scanner.take(b'(') {
+        return Ok(all);
+    }
+    while !scanner.take(b')') {
+        // A string alone is a comment.
+        if matches!(scanner.peek(), Some(b'"' | b'\'')) {
+            scanner.string()?;
+            continue;
+        }
+        let mut key = scanner.name("a key or `)`")?;
+        while MODIFIERS.contains(&key) || key == "reorder" {
+            key = scanner.name("a key")?;
+        }
+        scanner.need(b'=', key)?;
+        all.push((key, scanner.value()?));
+    }
+    Ok(all)
+}
+
+/// The keys and values of a dictionary.
+fn dictionary<'a>(scanner: &Scanner<'a>, value: Span) -> Result<Vec<(&'a str, Span)>> {
+    let (mut inside, mut all) = (scanner.within(value), Vec::new());
+    inside.need(b'{', "a dictionary's name")?;
+    while !inside.take(b'}') {
+        inside.name("a type or `}`")?;
+        if inside.take(b'[') {
+            inside.need(b']', "a type")?;
+        }
+        let is_quoted = matches!(inside.peek(), Some(b'"' | b'\''));
+        let key = if is_quoted { inside.string()? } else { inside.name("a key")? };
+        inside.need(b'=', key)?;
+        all.push((key, inside.value()?));
+        inside.take(b',');
+    }
+    Ok(all)
+}

@@ -1,0 +1,216 @@
+//! Reads USD.
+
+use super::layer::{self, Part, is_true};
+use super::text::{Scanner, Span};
+use super::{
+    AXES, CONFIDENCE, DEGREE, HARMONICS, OPACITIES, ORIENTATIONS, OWN_ANTIALIASED, OWN_DEGREE, OWN_LABEL, POSITIONS,
+    SCALES, SPLATS,
+};
+use crate::archive::Archive;
+use crate::format::ReadModel;
+use crate::ply::joined;
+use crate::rows::{Row, Rows};
+use crate::transform::Transform;
+use crate::values::{log_scale, logit};
+use glam::{DMat4, DVec3};
+use labelgs_files::kind::name_of_content;
+use labelgs_files::label_table::{LabelEntry, LabelTable, unique_name};
+use labelgs_files::read as file;
+use labelgs_scene::harmonics::coefficients;
+use labelgs_scene::{Error, MODEL_LABEL_MAX, Result, UNLABELLED};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Degree of a prim with harmonics that does not name it.
+const USUAL_DEGREE: u32 = 3;
+/// Degrees of harmonics of ours.
+const DEGREE_MAX: u32 = 3;
+
+/// Reads a layer of text.
+pub(super) fn read(path: &Path) -> Result<ReadModel> {
+    model(path, None, &file::text(path)?)
+}
+
+/// Reads the first layer of a package.
+pub(super) fn read_package(path: &Path) -> Result<ReadModel> {
+    let bytes = file::bytes(path)?;
+    let mut archive = Archive::open(path, &bytes, "USDZ")?;
+    let is_layer = |name: &&str| [".usda", ".usd", ".usdc"].iter().any(|ending| name.to_lowercase().ends_with(ending));
+    let Some(name) = archive.names().find(is_layer).map(str::to_owned) else {
+        return Err(Error::data(path, "archive", "has no layer (.usda, .usd, .usdc); this is no USDZ file"));
+    };
+    let mut layer = archive.file(&name)?;
+    file::without_mark(path, &mut layer)?;
+    let known = name_of_content(&layer).filter(|content| !super::TEXT.contents.contains(&content.what));
+    if let Some(content) = known {
+        return Err(Error::data(path, &name, content.told("a layer of text")));
+    }
+    let text = String::from_utf8(layer)
+        .map_err(|_| Error::data(path, &name, "is not UTF-8 text; save it as text first, as with usdcat"))?;
+    model(path, Some(&name), &text)
+}
+
+/// Reads the Gaussians in a layer.
+fn model(path: &Path, entry: Option<&str>, text: &str) -> Result<ReadModel> {
+    let mut scanner = Scanner::new(path, entry, text);
+    let layer = layer::read(&mut scanner)?;
+    let reader = Reader { path, scanner };
+    if layer.parts.is_empty() {
+        let notes: String = layer.notes.iter().map(|note| format!("; {note}")).collect();
+        return Err(Error::data(path, entry.unwrap_or_default(), format!("no prim is a {SPLATS}{notes}")));
+    }
+    let labels = reader.labels(&layer.parts)?;
+    let (mut read, mut parts) = (ReadModel::default(), Vec::new());
+    let mut names: BTreeMap<u32, String> = BTreeMap::new();
+    for (part, label) in layer.parts.iter().zip(labels) {
+        let found = reader.gaussians(part, label)?;
+        parts.push(found.gaussians);
+        read.dropped += found.dropped;
+        read.notes.extend(found.notes);
+        let title = if part.own.contains_key(OWN_LABEL) { part.title } else { part.semantic };
+        let title = title.and_then(|title| reader.scanner.first_string(title)).filter(|title| !title.is_empty());
+        if let (Some(label), Some(title)) = (label.filter(|&label| label != UNLABELLED), title) {
+            names.entry(label).or_insert(title);
+        }
+    }
+    read.notes.extend(layer.notes);
+    read.notes.dedup();
+    let mut taken = BTreeSet::new();
+    let entry =
+        |(id, name): (u32, String)| LabelEntry { name: Some(unique_name(name, &mut taken)), ..LabelEntry::new(id) };
+    read.names = (!names.is_empty()).then(|| LabelTable::new(names.into_iter().map(entry).collect()));
+    // One mark is for all.
+    let antialiased = parts.iter().any(|part| part.antialiased);
+    parts.iter_mut().for_each(|part| part.antialiased = antialiased);
+    read.gaussians = joined(parts)?;
+    Ok(read)
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    scanner: Scanner<'a>,
+}
+
+impl Reader<'_> {
+    /// Returns the label of each prim: the one that labelgs wrote, or the next free one for each thing that prims of other
+    /// programs show.
+    fn labels(&self, parts: &[Part]) -> Result<Vec<Option<u32>>> {
+        let own = |part: &Part| -> Result<Option<u32>> {
+            let Some(&value) = part.own.get(OWN_LABEL) else { return Ok(None) };
+            let label = self.scanner.part(value).parse().ok().filter(|&label| label <= MODEL_LABEL_MAX);
+            label.map(Some).ok_or_else(|| {
+                let problem = format!("the label is no whole number from 0 to {MODEL_LABEL_MAX}; correct it");
+                self.scanner.bad(value.start, problem)
+            })
+        };
+        let mut labels = parts.iter().map(own).collect::<Result<Vec<_>>>()?;
+        let known: BTreeSet<u32> = labels.iter().flatten().copied().collect();
+        let mut free = (1..=MODEL_LABEL_MAX).filter(|label| !known.contains(label));
+        let mut shown: BTreeMap<String, Option<u32>> = BTreeMap::new();
+        for (label, part) in labels.iter_mut().zip(parts).filter(|(label, _)| label.is_none()) {
+            let what = part.semantic.and_then(|value| self.scanner.first_string(value));
+            *label = what.and_then(|what| *shown.entry(what).or_insert_with(|| free.next()));
+        }
+        Ok(labels)
+    }
+
+    /// Returns the numbers of an attribute, cut to `count` values of a width; `None` if the prim does not have it.
+    fn column(&self, part: &Part, name: &str, width: usize, count: usize) -> Result<Option<Vec<f32>>> {
+        let Some(value) = attribute(part, name) else { return Ok(None) };
+        let mut numbers: Vec<f32> = self.scanner.numbers(value)?;
+        let wanted = width.saturating_mul(count);
+        if numbers.len() < wanted {
+            let problem = format!("{name} has {} numbers, and {count} positions need {wanted}", numbers.len());
+            return Err(self.scanner.bad(value.start, format!("{problem}; export the file again")));
+        }
+        numbers.truncate(wanted);
+        Ok(Some(numbers))
+    }
+
+    /// Returns the degree of the harmonics in a prim.
+    fn degree(&self, part: &Part) -> Result<u32> {
+        if attribute(part, HARMONICS).is_none() {
+            return Ok(0);
+        }
+        let Some(&value) = part.attributes.get(DEGREE) else { return Ok(USUAL_DEGREE) };
+        let degree = self.scanner.part(value).parse().ok().filter(|degree| (0..=DEGREE_MAX).contains(degree));
+        degree.ok_or_else(|| {
+            let problem =
+                format!("has harmonics of the degree {}; 0 to {DEGREE_MAX} are read", self.scanner.part(value));
+            self.scanner.bad(value.start, format!("{problem}, so leave out the others"))
+        })
+    }
+
+    /// Returns the Gaussians of a prim at its place, with its label.
+    fn gaussians(&self, part: &Part, label: Option<u32>) -> Result<ReadModel> {
+        let Some(positions) = attribute(part, POSITIONS) else {
+            let problem = format!("this {SPLATS} has no {POSITIONS}, or ones that change with time; export it still");
+            return Err(self.scanner.bad(part.at, problem));
+        };
+        let means: Vec<f32> = self.scanner.numbers(positions)?;
+        let (means, others) = means.as_chunks::<3>();
+        if !others.is_empty() {
+            return Err(self
+                .scanner
+                .bad(positions.start, format!("{POSITIONS} are no triples; export the file again")));
+        }
+        let count = means.len();
+        let stored = self.degree(part)?;
+        let of_all = 1 + coefficients(stored);
+        let quats = self.column(part, ORIENTATIONS, 4, count)?;
+        let scales = self.column(part, SCALES, 3, count)?;
+        let opacities = self.column(part, OPACITIES, 1, count)?;
+        let harmonics = self.column(part, HARMONICS, 3 * of_all, count)?;
+        let shares = self.column(part, CONFIDENCE, 1, count)?.filter(|_| label.is_some());
+        if let Some(share) = shares.iter().flatten().find(|share| !(0.0..=1.0).contains(*share)) {
+            return Err(self.scanner.bad(part.at, format!("{CONFIDENCE} {share} is not from 0 to 1; correct it")));
+        }
+        // Zeros that the writer added.
+        let own = part.own.get(OWN_DEGREE).and_then(|&degree| self.scanner.part(degree).parse().ok());
+        let degree = own.filter(|&own: &u32| own < stored).unwrap_or(stored);
+        let mut rows = Rows::new(degree, label.is_some(), shares.is_some());
+        for (index, &mean) in means.iter().enumerate() {
+            let triples = harmonics.as_ref().map_or(&[][..], |all| all.as_chunks::<3>().0);
+            let triples = triples.get(index * of_all..(index + 1) * of_all).unwrap_or_default();
+            let mut rest: Vec<[f32; 3]> = triples.iter().skip(1).take(coefficients(degree)).copied().collect();
+            AXES.rest(&mut rest);
+            let quat = quats.as_ref().map_or([1.0, 0.0, 0.0, 0.0], |all| [0, 1, 2, 3].map(|at| all[4 * index + at]));
+            rows.push(&Row {
+                position: AXES.position(mean).map(f64::from),
+                quat: AXES.quat(quat).map(f64::from),
+                scale: scales.as_ref().map_or([0.0; 3], |all| [0, 1, 2].map(|axis| log_scale(all[3 * index + axis]))),
+                opacity: logit(opacities.as_ref().map_or(1.0, |all| all[index])),
+                // Without a colour it is grey.
+                sh0: triples.first().copied().unwrap_or_default(),
+                rest: &rest,
+                label,
+                confidence: shares.as_ref().map(|all| all[index]),
+            });
+        }
+        self.placed(part, rows)
+    }
+
+    /// Returns rows at the place of their prim.
+    fn placed(&self, part: &Part, rows: Rows) -> Result<ReadModel> {
+        let moved = part.matrix.w_axis.truncate();
+        let is_only_moved = part.matrix == DMat4::from_translation(moved) && moved.as_vec3().is_finite();
+        let origin = if is_only_moved { DVec3::from_array(AXES.0.map(f64::from)) * moved } else { DVec3::ZERO };
+        let mut read = rows.finish(self.path, Some(origin))?;
+        if !is_only_moved {
+            let place = Transform::of_matrix(part.matrix, AXES).ok_or_else(|| {
+                let problem = "is mirrored, sheared or scaled by another factor along each axis, which is not read; apply its \
+                               transform in the program that wrote the file, and export it again";
+                self.scanner.bad(part.at, problem)
+            })?;
+            read.gaussians = place.apply(&read.gaussians)?;
+        }
+        read.gaussians.antialiased =
+            part.own.get(OWN_ANTIALIASED).is_some_and(|&mark| is_true(self.scanner.part(mark)));
+        Ok(read)
+    }
+}
+
+/// An attribute of 32-bit floats, or the one of 16-bit floats in its place.
+fn attribute(part: &Part, name: &str) -> Option<Span> {
+    part.attributes.get(name).or_else(|| part.attributes.get(format!("{name}h").as_str())).copied()
+}
