@@ -26,6 +26,7 @@ use labelgs_scene::stage::Stage;
 use labelgs_scene::{Error, Gaussians, Result};
 use std::path::Path;
 
+pub use glb::{Mesh, write_meshes};
 pub use lazy::{LazyModel, ModelRef};
 pub use ply::StoredModel;
 pub use ply::write_joined;

@@ -4,6 +4,7 @@
 //! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
 
 pub mod large;
+pub mod mesh;
 pub(crate) mod pictures;
 pub(crate) mod portrait;
 

@@ -40,6 +40,11 @@ impl Object {
         to.length_squared() - along * along <= bound * bound && along > -bound
     }
 
+    /// Returns the distance of a place in the world to the surface, negative inside.
+    pub fn distance_to(&self, place: DVec3) -> f64 {
+        self.shape.distance_to(self.to_own(place, DVec3::ZERO).0)
+    }
+
     /// Returns the distance at which a ray hits the object alone.
     pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         if !self.may_meet(origin, direction) {

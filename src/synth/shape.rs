@@ -44,6 +44,30 @@ impl Shape {
         }
     }
 
+    /// Returns the distance of a place to the surface, negative inside. That to an ellipsoid is right to first order near it;
+    /// inside of a fence or bin it is that to the nearest part.
+    pub fn distance_to(&self, place: DVec3) -> f64 {
+        let nearest = |parts: &[Part]| {
+            let all = parts.iter().map(|(shape, at)| shape.distance_to(place - at));
+            all.fold(f64::INFINITY, f64::min)
+        };
+        match *self {
+            Self::Ball(radii) => {
+                let (length, slope) = ((place / radii).length(), (place / (radii * radii)).length());
+                if slope > 0.0 { length * (length - 1.0) / slope } else { -radii.min_element() }
+            }
+            Self::Block(half) => outside_block(place, half),
+            Self::RoundBlock(half, radius) => outside_block(place, half) - radius,
+            Self::Cylinder(radius, half) => {
+                let (across, along) = (place.truncate().length() - radius, place.z.abs() - half);
+                across.max(0.0).hypot(along.max(0.0)) + across.max(along).min(0.0)
+            }
+            Self::Ring(ring, tube) => outside_ring(place, ring, tube),
+            Self::Fence(bars, pitch, half, radius) => nearest(&fence_parts(bars, pitch, half, radius)),
+            Self::Bin(half, wall) => nearest(&bin_parts(half, wall)),
+        }
+    }
+
     /// Returns the first entry of the ray from `origin` (outside the shape) along the unit vector `direction`.
     pub fn enter(&self, origin: DVec3, direction: DVec3) -> Option<Entry> {
         let (near, far) = sphere_span(origin, direction, self.bound() * 1.0001)?;
@@ -55,15 +79,10 @@ impl Shape {
             Self::Block(half) => enter_block(origin, direction, half),
             Self::Cylinder(radius, half) => enter_cylinder(origin, direction, radius, half),
             Self::RoundBlock(half, radius) => {
-                let distance_to = |p: DVec3| {
-                    let q = p.abs() - half;
-                    q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - radius
-                };
-                march(distance_to, origin, direction, near.max(0.0), far)
+                march(|place| outside_block(place, half) - radius, origin, direction, near.max(0.0), far)
             }
             Self::Ring(ring, tube) => {
-                let distance_to = |p: DVec3| (p.truncate().length() - ring).hypot(p.z) - tube;
-                march(distance_to, origin, direction, near.max(0.0), far)
+                march(|place| outside_ring(place, ring, tube), origin, direction, near.max(0.0), far)
             }
             Self::Fence(bars, pitch, half, radius) => {
                 enter_parts(&fence_parts(bars, pitch, half, radius), origin, direction)
@@ -71,6 +90,17 @@ impl Shape {
             Self::Bin(half, wall) => enter_parts(&bin_parts(half, wall), origin, direction),
         }
     }
+}
+
+/// The distance of a place to a box of these half sizes.
+fn outside_block(place: DVec3, half: DVec3) -> f64 {
+    let over = place.abs() - half;
+    over.max(DVec3::ZERO).length() + over.max_element().min(0.0)
+}
+
+/// The distance of a place to a torus.
+fn outside_ring(place: DVec3, ring: f64, tube: f64) -> f64 {
+    (place.truncate().length() - ring).hypot(place.z) - tube
 }
 
 /// A simple shape and its centre in the frame of the whole.

@@ -16,6 +16,7 @@ mod large;
 mod limits;
 mod measure;
 mod memory;
+mod meshes;
 mod order;
 mod pace;
 #[allow(dead_code, reason = "what the build does with shaders; benchmarks generate nothing")]
@@ -72,6 +73,8 @@ enum Command {
     Order(order::Options),
     /// Objects from clicks that a rule makes, compared with true masks.
     Clicks(clicks::Options),
+    /// Meshes of the objects of a trained model, against the true surfaces.
+    Meshes(meshes::Options),
     /// A large model from a trained one, to be timed.
     Split(split::Options),
     /// Predicted against measured memory of training.
@@ -102,6 +105,7 @@ fn run() -> Result<()> {
         Command::Sort(common) => sort::run(&common),
         Command::Order(options) => order::run(&options),
         Command::Clicks(options) => clicks::run(&options),
+        Command::Meshes(options) => meshes::run(&options),
         Command::Split(options) => split::run(&options),
         Command::Memory(common) => memory::run(&common),
         Command::Large(options) => large::run(&options),

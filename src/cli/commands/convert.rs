@@ -1,14 +1,18 @@
 //! `labelgs convert`.
 
-use crate::Result;
-use crate::cli::support::parsers::model_file;
-use crate::cli::support::{Context, EditArgs, Edited, TableArg, WriteArgs};
+use crate::cli::support::model_edit::require_labels;
+use crate::cli::support::parsers::{Picks, model_file, picks};
+use crate::cli::support::{Context, EditArgs, Edited, TableArg, WriteArgs, open_gpu};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
-use crate::formats::export_model;
+use crate::formats::{Mesh, export_model, write_meshes};
+use crate::render::mesh::{CELLS, CELLS_MAX, CELLS_MIN, object_mesh};
 use crate::scene::{Gaussians, UNLABELLED};
+use crate::scenes::camera_json::views_of_model;
 use crate::words::counted;
+use crate::{Error, Result};
 use clap::Args;
+use glam::DVec3;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +30,20 @@ pub struct ConvertArgs {
     /// labels. Gaussians without a label go to OUT_000_none.spz.
     #[arg(long, help_heading = "Output")]
     pub per_object: bool,
+    /// Write closed meshes with colours of their corners instead, a node of a GLB for each label: surfaces for programs
+    /// that draw or collide triangles. What the cameras of the run never saw of an object is closed; objects of a model
+    /// without a run are seen from all sides.
+    #[arg(long, help_heading = "Output", conflicts_with = "per_object")]
+    pub mesh: bool,
+    /// With --mesh, only these labels, such as 1,4-6,cup.
+    #[arg(long, value_name = "LABELS", value_parser = picks, help_heading = "Output", requires = "mesh")]
+    pub labels: Option<Picks>,
+    /// With --mesh, cells of the grid along the longest side of an object.
+    #[arg(
+        long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(i64::from(CELLS_MIN)..=i64::from(CELLS_MAX)),
+        default_value_t = CELLS, help_heading = "Output", requires = "mesh"
+    )]
+    pub mesh_cells: u32,
     #[command(flatten)]
     pub write: WriteArgs,
     #[command(flatten)]
@@ -35,10 +53,16 @@ pub struct ConvertArgs {
 /// Writes a model in another format.
 pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
     let ConvertArgs { model, output, write, table, .. } = args.clone();
+    if args.mesh && output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("glb")) {
+        return Err(Error::usage("--mesh", format!("{} is no .glb; meshes are written as GLB only", output.display())));
+    }
     let edit = EditArgs { model, output, write, table };
     let (model, known) = edit.open()?;
     if args.per_object {
         return per_object(&edit, &model, &known, context);
+    }
+    if args.mesh {
+        return meshes(args, &edit, (&model, &known), context);
     }
     let labels = known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect();
     edit.finish(context, &Edited::new(&model, known.table, model.len(), labels), json!({}))
@@ -58,6 +82,37 @@ fn per_object(edit: &EditArgs, model: &Gaussians, known: &Catalogue, context: &C
         text += &format!("{path}: {count} of {}\n", counted(model.len(), "Gaussian"));
     }
     context.show(&json!({ "schema_version": 1, "of": model.len(), "files": files }), &text)
+}
+
+/// Writes the surfaces of some labels.
+fn meshes(
+    args: &ConvertArgs,
+    edit: &EditArgs,
+    (model, known): (&Gaussians, &Catalogue),
+    context: &Context,
+) -> Result<()> {
+    require_labels(&edit.model, model.labels.is_some())?;
+    let labels = match &args.labels {
+        Some(picks) => edit.resolve(known, "--labels", picks)?,
+        None => known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect(),
+    };
+    let cameras: Vec<DVec3> = views_of_model(&edit.model)?.iter().map(|view| view.camera.centre()).collect();
+    let gpu = open_gpu(context)?;
+    let (mut meshes, mut rows, mut text) = (Vec::new(), Vec::new(), String::new());
+    for label in labels {
+        let name = known.name(label).map_or_else(|| format!("label_{label}"), str::to_owned);
+        let mesh = object_mesh(&gpu, model, label, &cameras, args.mesh_cells).map_err(|error| match error {
+            Error::Usage { problem, .. } => Error::usage("--labels", format!("{}: {problem}", known.title(label))),
+            other => other,
+        })?;
+        let (corners, triangles) = (mesh.positions.len(), mesh.triangles.len());
+        rows.push(json!({ "label": label, "name": name, "vertices": corners, "triangles": triangles }));
+        text += &format!("{}: {}\n", known.title(label), counted(triangles, "triangle"));
+        meshes.push(Mesh { name, ..mesh });
+    }
+    write_meshes(&edit.output, &meshes)?;
+    let output = edit.output.display().to_string();
+    context.show(&json!({ "schema_version": 1, "output": output, "meshes": rows }), &text)
 }
 
 /// The file of a label: its id and name before the ending. Characters that a file system may refuse become `_`.

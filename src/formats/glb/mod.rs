@@ -4,9 +4,12 @@
 //! A GLB is a header of 12 bytes, a chunk of JSON and a chunk of numbers, on which accessors in the JSON are views.
 
 mod file;
+mod mesh;
 mod nodes;
 mod read;
 mod write;
+
+pub use mesh::{Mesh, write_meshes};
 
 use super::format::ModelFormat;
 use super::turn::Signs;

@@ -27,15 +27,15 @@ fn losses(export: &Export) -> Result<Vec<String>> {
 
 /// Numbers and the accessors on them.
 #[derive(Default)]
-struct Binary {
-    bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
+pub(super) struct Binary {
+    pub(super) bytes: Vec<u8>,
+    pub(super) views: Vec<Value>,
+    pub(super) accessors: Vec<Value>,
 }
 
 impl Binary {
     /// Adds a view of the bytes that `fill` appends, from a multiple of 8 on, as tables need it.
-    fn view(&mut self, fill: impl FnOnce(&mut Vec<u8>)) -> usize {
+    pub(super) fn view(&mut self, fill: impl FnOnce(&mut Vec<u8>)) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
         let start = self.bytes.len();
         fill(&mut self.bytes);
@@ -44,7 +44,7 @@ impl Binary {
     }
 
     /// Adds an attribute of floats; positions need their bounds.
-    fn attribute<const N: usize>(&mut self, bounds: bool, rows: impl Iterator<Item = [f32; N]>) -> usize {
+    pub(super) fn attribute<const N: usize>(&mut self, bounds: bool, rows: impl Iterator<Item = [f32; N]>) -> usize {
         let (mut least, mut most, mut count) = ([f32::MAX; N], [f32::MIN; N], 0);
         let view = self.view(|bytes| {
             for row in rows {

@@ -99,7 +99,7 @@ pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
 impl<'a> Layer<'a> {
     fn note_arc(&mut self, key: &str) {
         if ARCS.contains(&key) {
-            self.notes.insert(format!("its {key} were left out; flatten it first, as with usdcat --flatten"));
+            self.notes.insert(format!("its {key} were left out; flatten it first, as usdcat does"));
         }
     }
 

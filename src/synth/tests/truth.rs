@@ -1,5 +1,6 @@
 //! The made scene: its pictures, masks, depth and points must agree with each other.
 
+use glam::DVec3;
 use labelgs_files::LabelTable;
 use labelgs_masks::read_mask;
 use labelgs_scene::{Camera, Error};
@@ -83,7 +84,7 @@ fn depth_and_ids_agree_between_views() {
     assert!(seen > 500 && f64::from(same as u32) > 0.95 * f64::from(seen as u32), "{same} of {seen}");
 }
 
-fn unproject(camera: &Camera, x: f64, y: f64, z: f64) -> glam::DVec3 {
+fn unproject(camera: &Camera, x: f64, y: f64, z: f64) -> DVec3 {
     let own = glam::DVec3::new((x - camera.cx) / camera.fx * z, (y - camera.cy) / camera.fy * z, z);
     camera.rotation.transpose() * (own - camera.translation)
 }
@@ -331,4 +332,29 @@ fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
     });
     let touching = touching.count();
     assert!(touching >= 3, "the seam is seen in {touching} views");
+}
+
+/// Where a ray enters a shape is at distance 0, and a step along the normal is as far.
+#[test]
+fn distances_agree_with_rays() {
+    for preset in [Preset::Default, Preset::Hard] {
+        let world = World::new(preset, 0);
+        for (index, object) in world.objects.iter().enumerate() {
+            let mut met = 0;
+            for at in 0..200 {
+                let (z, turn) = (1.0 - f64::from(2 * at + 1) / 200.0, 2.4 * f64::from(at));
+                let from = DVec3::new(turn.cos(), turn.sin(), 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z;
+                let origin = object.position + 3.0 * object.shape.bound() * from;
+                let aim = object.position + 0.3 * object.shape.bound() * DVec3::new(z, turn.sin(), turn.cos());
+                let Some(hit) = world.hit_object(index, origin, (aim - origin).normalize()) else { continue };
+                met += 1;
+                let step = 1e-3 * object.shape.bound();
+                let [on, out] = [0.0, step].map(|step| object.distance_to(hit.place + step * hit.normal));
+                assert!(on.abs() < 1e-5, "{}: {on} at a hit", object.name);
+                // Another part or side may be nearer, but not through the surface.
+                assert!(out > 0.0 && out < 1.02 * step, "{}: {out} after a step of {step}", object.name);
+            }
+            assert!(met > 10, "{}: {met} rays met it", object.name);
+        }
+    }
 }
