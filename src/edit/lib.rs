@@ -3,7 +3,8 @@
 //! A [`Catalogue`] resolves ids and names, and [`choose()`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`], [`add()`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
 //! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
-//! moves a model; [`summarise`] lists the labels. An [`Edit`] is one change of an editor, [`EditsFile`] all of them.
+//! moves a model; [`summarise`] lists the labels; [`strokes`] finds objects by lines over photos. An [`Edit`] is one change of
+//! an editor, [`EditsFile`] all of them.
 
 pub mod add;
 pub mod catalogue;
@@ -19,6 +20,7 @@ pub mod rename;
 pub mod select;
 pub mod selection;
 pub mod simplify;
+pub mod strokes;
 
 pub use add::add;
 pub use catalogue::{Catalogue, Pick};

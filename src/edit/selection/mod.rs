@@ -6,6 +6,7 @@ mod nearby;
 mod region;
 
 pub use nearby::Nearby;
+pub(crate) use nearby::{colour, normal};
 pub use region::{Region, Shape, Side, beyond, in_region, in_sphere};
 
 use serde::Deserialize;

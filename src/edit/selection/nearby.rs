@@ -105,7 +105,7 @@ impl Nearby {
 }
 
 /// Returns the colour of a Gaussian without what depends on the direction, 0 to 1.
-fn colour(model: &Gaussians, row: usize) -> [f32; 3] {
+pub(crate) fn colour(model: &Gaussians, row: usize) -> [f32; 3] {
     model.sh0[row].map(|value| (value_of(value) as f32).clamp(0.0, 1.0))
 }
 
@@ -126,7 +126,7 @@ fn is_level(model: &Gaussians, a: usize, b: usize) -> bool {
 }
 
 /// Returns the thinnest axis of a flat Gaussian.
-fn normal(model: &Gaussians, row: usize) -> Option<DVec3> {
+pub(crate) fn normal(model: &Gaussians, row: usize) -> Option<DVec3> {
     let scales = model.scales[row].map(|scale| f64::from(scale).exp());
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| scales[a].total_cmp(&scales[b]));
