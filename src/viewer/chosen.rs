@@ -1,13 +1,19 @@
 //! The Gaussians that pages have chosen by hand. They stay here; a page knows how many there are.
 
-use super::message::Choose;
+use super::message::{Choose, Viewpoint};
 use super::painter::{Painter, SURFACE_PX, Source};
 use crate::edit::Rows;
-use crate::edit::selection::{Combine, Nearby, Region, beyond, in_region, in_sphere};
+use crate::edit::selection::{Combine, Nearby, Region, Shape, beyond, in_region, in_sphere};
+use crate::edit::strokes::{Cutting, Seed};
 use crate::error::{Error, Result};
 use crate::render::Parts;
-use crate::scene::Gaussians;
+use crate::scene::{Gaussians, MODEL_LABEL_MAX, UNLABELLED};
+use rayon::prelude::*;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
+
+/// Label of the object of strokes, as long as it is none of the model's.
+const OBJECT: u32 = MODEL_LABEL_MAX;
 
 /// What is chosen, and what cannot be.
 #[derive(Default)]
@@ -16,12 +22,14 @@ pub(super) struct Chosen {
     locked: Vec<bool>,
     /// The places of the model's Gaussians, once they were asked for.
     nearby: Option<Nearby>,
+    /// What strokes have hit since the last choice of another kind.
+    seeds: Vec<Seed>,
 }
 
 impl Chosen {
     pub(super) fn new(model: &Gaussians) -> Self {
         let none = vec![false; model.len()];
-        Self { rows: none.clone(), locked: none, nearby: None }
+        Self { rows: none.clone(), locked: none, nearby: None, seeds: Vec::new() }
     }
 
     /// Returns for each row whether it is chosen.
@@ -41,6 +49,9 @@ impl Chosen {
         is_drawn: &[bool],
         (painter, source): (&Painter, &mut dyn Source),
     ) -> Result<()> {
+        if !matches!(what, Choose::Stroke { .. }) {
+            self.seeds.clear();
+        }
         let is_free: Vec<bool> = is_drawn.iter().zip(&self.locked).map(|(&drawn, &locked)| drawn && !locked).collect();
         let (found, how) = match what {
             Choose::Draw { from, region, through, how } => {
@@ -64,6 +75,14 @@ impl Chosen {
                 let none = || Error::usage("place", "what is here is locked; unlock it first");
                 let first = Some(first).filter(|&row| is_free[row]).ok_or_else(none)?;
                 (self.nearby(model)?.flood(model, first, *tolerance, &is_free), *how)
+            }
+            Choose::Stroke { from, points, radius, on } => {
+                let hit = hit(from, (points, *radius), (painter, source))?;
+                let label = if *on { OBJECT } else { UNLABELLED };
+                self.seeds.extend(hit.into_iter().map(|row| Seed { row, label, is_on: true }));
+                let mut cutting = Cutting::new(model)?;
+                cutting.add(&self.seeds);
+                (cutting.cut()?.into_iter().map(|label| label == OBJECT).collect(), Combine::Replace)
             }
             Choose::Labels { labels, how } => {
                 ((0..model.len()).map(|row| labels.contains(&model.label(row))).collect(), *how)
@@ -104,4 +123,22 @@ impl Chosen {
         let count = |rows: &[bool]| rows.iter().filter(|is_in| **is_in).count();
         json!({ "kind": "chosen", "count": count(&self.rows), "locked": count(&self.locked) })
     }
+}
+
+/// Returns the main Gaussians of the pixels of a stroke over a full picture.
+fn hit(
+    from: &Viewpoint,
+    (points, radius): (&[[f64; 2]], f64),
+    (painter, source): (&Painter, &mut dyn Source),
+) -> Result<Vec<usize>> {
+    let (camera, scale, rendered) = painter.seen(from, Parts::MAIN, Some(SURFACE_PX), source)?;
+    let most = [f64::from(camera.width), f64::from(camera.height)].map(|side| side - 0.5);
+    let points = points.iter().map(|point| [0, 1].map(|axis| (point[axis] * scale[axis]).clamp(0.0, most[axis])));
+    let region = Region { shape: Shape::Along, points: points.collect(), radius: (radius * scale[0]).max(0.5) };
+    let is_hit = |pixel: &usize| region.has(camera.pixel_centre(*pixel));
+    let pixels: Vec<usize> = (0..rendered.top_id.len()).into_par_iter().filter(is_hit).collect();
+    let rows: BTreeSet<usize> =
+        pixels.iter().filter_map(|&pixel| usize::try_from(rendered.top_id[pixel]).ok()).collect();
+    let none = || Error::usage("stroke", "nothing of the model is here");
+    if rows.is_empty() { Err(none()) } else { Ok(rows.into_iter().map(|row| source.row(row)).collect()) }
 }

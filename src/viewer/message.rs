@@ -106,6 +106,17 @@ pub(super) enum Choose {
         side: Side,
         how: Combine,
     },
+    /// The object that strokes are on, and others are not.
+    Stroke {
+        /// Camera of the full picture.
+        from: Viewpoint,
+        /// The line, px from the corner of the first pixel.
+        points: Vec<[f64; 2]>,
+        /// How far it reaches to each side, px.
+        radius: f64,
+        /// It is on the object.
+        on: bool,
+    },
     /// By label.
     Labels { labels: Vec<u32>, how: Combine },
     /// With its neighbours.

@@ -87,8 +87,18 @@ fn choices_join_and_become_labels() {
     let behind = choose(&mut page, &with(json!({ "select": "depth", "side": "behind" })));
     assert!(front + behind <= all && behind > 0, "{front} {behind}");
 
-    // What is chosen is drawn in a colour of its own, and becomes a label; the list makes the same bytes.
+    // Strokes on it and on what is not it.
+    let pixel = pixel.expect("something");
+    let stroke = |points: &Value, on: bool| json!({ "select": "stroke", "from": { "view": 0 }, "points": points, "radius": 1.0, "on": on });
     choose(&mut page, &json!({ "select": "nothing" }));
+    let alone = choose(&mut page, &stroke(&json!([pixel]), true));
+    let row = page.pick(&json!({ "view": 0 }), pixel)["gaussian"].as_u64();
+    assert!(alone > 0 && row.is_some());
+    let less = choose(&mut page, &stroke(&json!([[2, 2], [60, 2], [60, 46], [2, 46]]), false));
+    assert!(less < alone, "{less} {alone}");
+
+    // What is chosen is drawn in a colour of its own, and becomes a label; the list makes the same bytes.
+    page.send(&json!({ "kind": "choose", "what": { "select": "nothing" } }));
     let plain = page.still(&json!({ "view": 0 }), &["colour"]).pictures.remove(0);
     choose(&mut page, &draw(&left, 0.0, true, "replace"));
     assert_ne!(page.still(&json!({ "view": 0 }), &["colour"]).pictures[0], plain);

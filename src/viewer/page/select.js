@@ -6,6 +6,7 @@ import { $, choose, counted, el, icon, svg } from "./dom.js";
 const TOOLS = {
   pointer: ["Select labels", "Escape", ["M4 2.5 12.5 8l-4 .8-2 4Z"]],
   find: ["Find an object: click on it, or drag a box around it", "O", ["M7 2.5a4.5 4.5 0 1 0 0 9 4.5 4.5 0 0 0 0-9Z", "M10.5 10.5 14 14"]],
+  strokes: ["Choose an object by strokes on it; Ctrl+drag or right click: not this", "Z", ["M2.5 11c2-5 4-6 5-4s1 4 3 1 2-3 3-3", "M4 13.5h8"], "Width", 8],
   box: ["Choose Gaussians in a rectangle", "R", ["M2.5 3.5h11v9h-11Z"]],
   lasso: ["Choose Gaussians in a drawn line", "T", ["M8 3c3.5 0 6 1.6 6 3.700S11.5 10.5 8 10.5 2 9 2 6.7 4.5 3 8 3Z", "M5.5 10.300c-1 1.2-.5 2.7 1 3.2"]],
   brush: ["Choose Gaussians with a brush", "B", ["M13.5 2.5 7 9", "M6.5 8.500c-2.5 0-2 3-4 4 3 1 5.5 0 5-3Z"], "Brush", 24],
@@ -76,8 +77,8 @@ export class Selecting {
     const { count, locked } = this.state;
     const isTool = this.isOn && this.hand === this;
     $("chosen").hidden = !isTool && count === 0;
-    const hint = { box: "Drag a rectangle", lasso: "Draw around them", brush: "Paint over them", ball: "Click on the middle", flood: "Click on a surface", depth: "Click: in front of it; right click: behind" }[this.tool];
-    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} chosen` : `${hint ?? ""} · Shift adds, Ctrl takes away`;
+    const hint = { strokes: "Draw on the object; Ctrl: on what is not it", box: "Drag a rectangle", lasso: "Draw around them", brush: "Paint over them", ball: "Click on the middle", flood: "Click on a surface", depth: "Click: in front of it; right click: behind" }[this.tool];
+    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} chosen` : `${hint ?? ""}${this.tool === "strokes" ? "" : " · Shift adds, Ctrl takes away"}`;
     $("chosen-tools").hidden = count === 0;
     $("chosen-unlock").hidden = locked === 0;
     $("chosen-unlock").textContent = `Unlock ${locked}`;
@@ -127,6 +128,13 @@ export class Selecting {
     else if (this.tool === "flood") this.send({ select: "flood", from, pixel, tolerance: size / 200, how: this.how(event, isOn) });
     else if (this.tool === "depth") this.send({ select: "depth", from, pixel, side: isOn ? "front" : "behind", how: this.how(event) });
     else if (this.tool === "brush") this.draw([at], "along", this.how(event, isOn));
+    else if (this.tool === "strokes") this.stroke([at], isOn && !event.ctrlKey && !event.metaKey);
+  }
+
+  /** Says what belongs to the object, or what does not. */
+  stroke(path, on) {
+    const points = thinned(path).map((at) => this.stage.place(...at));
+    this.send({ select: "stroke", from: this.from, points, radius: Number($("chosen-size").value) * this.stage.scale(), on });
   }
 
   get from() { return this.rig.view === null ? { camera: this.rig.file() } : { view: this.rig.view }; }
@@ -137,7 +145,8 @@ export class Selecting {
     if (Math.hypot(to[0] - last[0], to[1] - last[1]) >= 2) this.path.push(to);
     const { path } = this;
     const points = (this.tool === "box" ? corners(from, to) : path).map((at) => at.join()).join(" ");
-    const shape = this.tool === "brush"
+    const isBrush = this.tool === "brush" || this.tool === "strokes";
+    const shape = isBrush
       ? svg("polyline", { points, class: "brush", "stroke-width": 2 * $("chosen-size").value })
       : svg(this.tool === "box" || this.tool === "lasso" ? "polygon" : "polyline", { points });
     $("drawn").replaceChildren(shape);
@@ -152,6 +161,7 @@ export class Selecting {
     if (this.tool === "box") this.draw(corners(from, to), "inside", how);
     else if (this.tool === "lasso" && path.length > 2) this.draw(path, "inside", how);
     else if (this.tool === "brush") this.draw(path, "along", how);
+    else if (this.tool === "strokes") this.stroke(path, !event.ctrlKey && !event.metaKey);
     else this.click(to, true, event);
   }
 
