@@ -110,7 +110,7 @@ pub enum Command {
     ///
     /// Example: labelgs transform out --up z --scale 0.5 --origin 0,0,1 -o upright.ply
     Transform(transform::TransformArgs),
-    /// Write a model with labels from masks, for a model of any trainer.
+    /// Write a model with labels from masks, for a model of any trainer, or from the labelled model that it is a copy of.
     ///
     /// Example: labelgs label out --scene scene --masks scene/masks -o labelled.ply
     Label(label::LabelArgs),

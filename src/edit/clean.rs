@@ -56,7 +56,8 @@ pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> 
         false
     });
     let Some(most) = how.max_gap else { return Ok((kept, counts)) };
-    let gaps = gaps(&kept)?;
+    let places: Vec<[f64; 3]> = kept.means.iter().map(|mean| mean.map(f64::from)).collect();
+    let gaps = gaps(&places)?;
     let mut sorted = gaps.clone();
     sorted.sort_by(f64::total_cmp);
     let limit = sorted.get(sorted.len() / 2).map_or(f64::INFINITY, |median| most * median);
@@ -64,12 +65,11 @@ pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> 
     Ok((kept.filtered(|row| gaps[row] <= limit), counts))
 }
 
-/// Distance of each Gaussian to its eighth neighbour, or to the last one in a smaller model.
-fn gaps(model: &Gaussians) -> Result<Vec<f64>> {
-    let places: Vec<[f64; 3]> = model.means.iter().map(|mean| mean.map(f64::from)).collect();
+/// Distance of each place to its eighth neighbour, or to the last one of fewer.
+pub(super) fn gaps(places: &[[f64; 3]]) -> Result<Vec<f64>> {
     // One more, because each finds itself.
     let Some(asked) = NonZero::new((NEIGHBOUR + 1).min(places.len())) else { return Ok(Vec::new()) };
-    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&places)
+    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(places)
         .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
     let gap = |place: &[f64; 3]| {
         let found = tree.query(place).nearest_n::<SquaredEuclidean<f64>>(asked).execute();

@@ -3,10 +3,11 @@
 //! A [`Catalogue`] resolves ids and names, and [`choose()`] resolves points, boxes and masks in a view. [`extract`],
 //! [`remove`], [`recolour`], [`relabel`], [`add()`], [`merge()`] and [`split_components`] return changed models; [`fill()`] removes
 //! and closes the hole; [`clean()`] drops what disturbs, [`Simplifier`] makes fewer of many, [`Transform`]
-//! moves a model; [`summarise`] lists the labels; [`strokes`] finds objects by lines over photos. An [`Edit`] is one change of
-//! an editor, [`EditsFile`] all of them.
+//! moves a model; [`carry()`] gives labels back to a copy from another program; [`summarise`] lists the labels; [`strokes`] finds
+//! objects by lines over photos. An [`Edit`] is one change of an editor, [`EditsFile`] all of them.
 
 pub mod add;
+pub mod carry;
 pub mod catalogue;
 pub mod change;
 pub mod choose;
@@ -23,6 +24,7 @@ pub mod simplify;
 pub mod strokes;
 
 pub use add::add;
+pub use carry::{Carried, carry};
 pub use catalogue::{Catalogue, Pick};
 pub use change::{Specks, Split, recolour, relabel, split_components, without_specks};
 pub use clean::{Cleaned, Cleaning, clean};

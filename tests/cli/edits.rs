@@ -120,6 +120,30 @@ fn names_choose_labels_and_go_with_them() {
 }
 
 #[test]
+fn labels_return_to_a_copy_from_another_program() {
+    let folder = tempfile::tempdir().expect("folder");
+    let (model, out) = (model(folder.path()), folder.path().join("out.ply"));
+    let (copy, beside) = (folder.path().join("copy.spz"), folder.path().join("out.labels.json"));
+    // Without the spoon but for one Gaussian, backwards, rounded by the format, and one more from elsewhere.
+    let whole = read_model(&model).expect("PLY").gaussians;
+    let mut edited = Gaussians { labels: None, ..whole.picked(&[4, 2, 1, 0, 0]) };
+    edited.means[4] = [0.0, 50.0, 0.0];
+    write_model(&copy, &edited).expect("written");
+    let result = succeeds(&["label", text(&copy), "--like", text(&model), "-o", text(&out)]);
+    assert_eq!((&result["gaussians"], &result["none"]), (&5.into(), &1.into()), "{result}");
+    assert_eq!(result["same"].as_u64().zip(result["near"].as_u64()).map(|(same, near)| same + near), Some(4));
+    assert_eq!(labels_of(&out), [3, 1, 1, 0, 0]);
+    assert_eq!(names(&beside), [(1, "cup".to_owned()), (3, "spoon".to_owned())]);
+
+    edited.means.iter_mut().for_each(|mean| mean[2] += 30.0);
+    write_model(&copy, &edited).expect("written");
+    let message = refused(&["label", text(&copy), "--like", text(&model), "-o", text(&out)]);
+    assert!(message.contains("--like: only 0 of 5 Gaussians") && message.contains("looks moved"), "{message}");
+    let message = refused_with(&["label", text(&model), "--like", text(&copy), "-o", text(&out)], 3);
+    assert!(message.contains("copy.spz: the model has no labels"), "{message}");
+}
+
+#[test]
 fn labels_are_renumbered_merged_and_split() {
     let folder = tempfile::tempdir().expect("folder");
     let (model, out) = (model(folder.path()), folder.path().join("out.ply"));

@@ -394,6 +394,22 @@ fn help_and_version_are_results() {
 }
 
 #[test]
+fn labels_of_another_model_need_no_views() {
+    let parsed =
+        |more: &[&str]| Cli::try_parse_from([&["labelgs", "label", "model.ply", "-o", "x.ply"], more].concat());
+    assert!(parsed(&["--like", "labelled.ply", "--label-type", "uint"]).is_ok());
+    assert!(parsed(&["--scene", "scene", "--masks", "masks"]).is_ok());
+    assert!(parsed(&[]).is_err() && parsed(&["--masks", "masks"]).is_err() && parsed(&["--scene", "scene"]).is_err());
+    let others = "--scene s|--masks m|--per-view|--rule main|--mask-border 2|--min-confidence 0.5|--near 0.1|--click a:1,2|\
+                  --network n|--test-every 3|--ignore d|--poses c2w|--images d";
+    for other in others.split('|') {
+        let words: Vec<&str> = other.split(' ').collect();
+        let error = parsed(&[&["--like", "labelled.ply"], &words[..]].concat()).expect_err(other);
+        assert_eq!(error.kind(), clap::error::ErrorKind::ArgumentConflict, "{other}: {error}");
+    }
+}
+
+#[test]
 fn list_tells_every_label() {
     let folder = folder();
     let model = model(folder.path());

@@ -6,6 +6,7 @@
 )]
 
 mod edits; // changes of an editor, one by one and from a file
+mod carry; // labels given back to a copy from another program
 mod fill; // the place of a removed object is closed
 mod labels; // labels by name, pixel and box; parts, specks and colours of a model
 mod selection; // Gaussians chosen by hand

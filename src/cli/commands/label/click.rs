@@ -15,7 +15,7 @@ use crate::words::counted;
 use crate::{Error, Result};
 use clap::{ArgGroup, Args};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Clicks or a box instead of masks.
@@ -43,10 +43,10 @@ pub struct ClickArgs {
 }
 
 /// Labels one object.
-pub(super) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+pub(super) fn run(args: &LabelArgs, scene: &Path, context: &Context) -> Result<()> {
     let folder = args.clicks.network.as_ref().ok_or_else(|| Error::usage("--click", "needs --network"))?;
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let (photos, typed) = open_photos((&args.model, &model), (&args.scene, &args.reading), folder)?;
+    let (photos, typed) = open_photos((&args.model, &model), (scene, &args.reading), folder)?;
     let hints = hints(&args.clicks, &typed, &photos)?;
     let start = Instant::now();
     let mut clicking = Clicking::new(open_gpu(context)?, &model, &photos, near)?;

@@ -1,6 +1,7 @@
 //! `labelgs label`.
 
 mod click;
+mod like;
 
 use crate::cli::commands::masks::repair::table;
 use crate::cli::support::nested_masks::{MaskFolders, choose_objects};
@@ -19,7 +20,7 @@ use crate::stage::Stage;
 use crate::train::LabelRule;
 use crate::words::counted;
 use crate::{Error, Result};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,16 +28,19 @@ use std::time::Instant;
 
 /// `labelgs label`.
 #[derive(Args, Clone, Debug)]
+#[command(group = ArgGroup::new("views").multiple(true)
+    .args(["scene", "masks", "per_view", "rule", "mask_border", "min_confidence", "near"])
+    .args(["test_every", "max_resolution", "ignore", "poses"]))]
 pub struct LabelArgs {
     /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Existing labels are replaced.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the cameras of the masks.
-    #[arg(long, value_name = "SCENE")]
-    pub scene: PathBuf,
+    #[arg(long, value_name = "SCENE", required_unless_present = "like")]
+    pub scene: Option<PathBuf>,
     /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
     /// together choose which of the nested masks are objects.
-    #[arg(long, value_name = "DIR", required_unless_present = "places")]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["places", "like"])]
     pub masks: Option<PathBuf>,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
     /// `masks repair`.
@@ -49,6 +53,10 @@ pub struct LabelArgs {
     pub write: WriteArgs,
     #[command(flatten)]
     pub clicks: click::ClickArgs,
+    /// Instead of masks, another model with labels, of which MODEL is a copy that a program has changed: Gaussians may be gone,
+    /// merged, sorted or rounded. Each gets the label of the one at its place, else of the nearest there. Needs no device.
+    #[arg(long, value_name = "LABELLED", conflicts_with_all = ["views", "ClickArgs", "FileArgs"])]
+    pub like: Option<PathBuf>,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
     /// which it is the main Gaussian of a pixel.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
@@ -69,12 +77,16 @@ pub struct LabelArgs {
 
 /// Gives the Gaussians of a trained model their labels.
 pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
+    if let Some(labelled) = &args.like {
+        return like::run(args, labelled, context);
+    }
+    let scene = args.scene.as_ref().ok_or_else(|| Error::usage("--scene", "is missing; masks and clicks need it"))?;
     let Some(folder) = &args.masks else {
-        return click::run(args, context);
+        return click::run(args, scene, context);
     };
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let masks = MaskFolders::of(folder)?;
-    let mut dataset = open_scene(&args.scene, &args.reading, masks.pictures.clone(), [0.0; 3], true)?;
+    let mut dataset = open_scene(scene, &args.reading, masks.pictures.clone(), [0.0; 3], true)?;
     dataset.train.retain(|view| view.mask.is_some() || masks.lists.is_some());
     if dataset.train.is_empty() {
         return Err(Error::data(
@@ -87,7 +99,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     let gpu = open_gpu(context)?;
     let start = Instant::now();
     if let Some(lists) = &masks.lists {
-        choose_objects(lists, (&args.scene, &args.reading), &gpu, (&model, near, None), &mut dataset.train)?;
+        choose_objects(lists, (scene, &args.reading), &gpu, (&model, near, None), &mut dataset.train)?;
         dataset.train.retain(|view| view.mask.is_some());
     }
     let names = match masks.ids(args.per_view) {
