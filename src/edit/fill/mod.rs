@@ -5,12 +5,14 @@
 //! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them may
 //! err, as they do at contours). Planes are fitted
 //! to what the views show around the object. New flat Gaussians stand on these planes, only in holes between seen
-//! ones, so that they cover nothing that a view has seen. Their colours continue those around them. Where the scene has
+//! ones, so that they cover nothing that a view has seen. Their colours continue those around them, and a pattern that
+//! repeats there, such as tiles. Where the scene has
 //! one strong [`Light`], the shadow of the object on these planes goes with it.
 
 mod evidence;
 mod hidden;
 mod light;
+mod pattern;
 mod plane;
 mod shadow;
 mod sheet;
@@ -22,16 +24,21 @@ use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use labelgs_scene::harmonics::sh0_of;
 use labelgs_scene::{Camera, Error, Gaussians, LabelMap, Result, Setting};
+use pattern::Pattern;
 use plane::{Plane, planes};
 use shadow::{Disc, Shadows};
 use sheet::Sheet;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Longest side of a [`Sight`], px: finer ones take memory and add little.
 pub const SIGHT_SIDE: u32 = 640;
 /// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal, and its
 /// least width, in cells.
 const RING: (f64, f64) = (0.25, 8.0);
+/// Width of the ring in which a pattern is looked for, in the same measures, and cells across it and the object.
+const PATTERN_RING: (f64, f64) = (0.75, 96.0);
+const PATTERN_CELLS: f64 = 192.0;
 /// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
 const BLOCKER_SHARE_MAX: f64 = 0.25;
 /// Most points that one surface is looked for among.
@@ -85,29 +92,14 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&
     let hidden = is_hidden.iter().filter(|&&hidden| hidden).count() as u64;
     let mut filled = Filled { model: rest.filtered(|row| !is_hidden[row]), hidden, added: BTreeMap::new(), lit: 0 };
     let mut is_lit = vec![false; filled.model.len()];
-    // What stands in the light: the removed, and the rest.
-    let blockers = light.map(|light| {
-        let removed: Vec<Disc> = places.iter().flat_map(|place| &place.discs).copied().collect();
-        (light, removed, shadow::discs(&filled.model))
-    });
+    let blockers = light.map(|light| Blockers::new(light, &places, &filled.model));
     // Each label is an object of its own: two far from each other have no common surroundings.
     for place in &places {
         for (label, points) in place.ring(labels, sights) {
             for plane in planes(&points, place.cell) {
-                let plane = plane.facing(place.middle());
-                let towards = light.map(|light| light.towards);
-                let sheet = Sheet::new((plane, label), place, (towards, place.cell), labels, sights);
-                let shadows = blockers.as_ref().map(|(light, removed, kept)| {
-                    Shadows::of(&sheet, light, removed, &shadow::above(kept, place, &plane))
-                });
-                if let Some(shadows) = &shadows {
-                    shadows.lift(&sheet, &mut filled.model, &mut is_lit);
-                }
-                let added = sheet.holes(shadows.as_ref());
-                if !added.is_empty() {
-                    *filled.added.entry(label).or_default() += added.len() as u64;
-                    append(&mut filled.model, (&sheet.plane, place.cell), &added, label);
-                }
+                let surface = (plane.facing(place.middle()), label);
+                let seen = Seen { removed: labels, sights, blockers: blockers.as_ref() };
+                seen.close(place, surface, &mut filled, &mut is_lit);
             }
         }
     }
@@ -115,9 +107,63 @@ pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&
     Ok(filled)
 }
 
+/// What stands in the light.
+struct Blockers<'a> {
+    light: &'a Light,
+    removed: Vec<Disc>,
+    kept: Vec<Disc>,
+}
+
+impl<'a> Blockers<'a> {
+    fn new(light: &'a Light, places: &[Place], rest: &Gaussians) -> Self {
+        let removed = places.iter().flat_map(|place| &place.discs).copied().collect();
+        Self { light, removed, kept: shadow::discs(rest) }
+    }
+}
+
+/// What all views show, and whose shadows.
+struct Seen<'a> {
+    removed: &'a [u32],
+    sights: &'a [Sight],
+    blockers: Option<&'a Blockers<'a>>,
+}
+
+impl Seen<'_> {
+    /// Looks at a surface around a place, in cells of a size.
+    fn look(&self, place: &Place, surface: (Plane, u32), cell: f64) -> (Sheet, Option<Shadows>) {
+        let towards = self.blockers.map(|blockers| blockers.light.towards);
+        let sheet = Sheet::new(surface, place, (towards, cell), self.removed, self.sights);
+        let shadows = self.blockers.map(|Blockers { light, removed, kept }| {
+            Shadows::of(&sheet, light, removed, &shadow::above(kept, place, &sheet.plane))
+        });
+        (sheet, shadows)
+    }
+
+    /// Continues a surface where a removed object was.
+    fn close(&self, place: &Place, surface: (Plane, u32), filled: &mut Filled, is_lit: &mut [bool]) {
+        let (sheet, shadows) = self.look(place, surface, place.cell);
+        if let Some(shadows) = &shadows {
+            shadows.lift(&sheet, &mut filled.model, is_lit);
+        }
+        let holes = sheet.holes();
+        if holes.is_empty() {
+            return;
+        }
+        let (wide, cell) = place.wide();
+        let (around, their_shadows) = self.look(&wide, surface, cell);
+        let colours = around.lit(their_shadows.as_ref());
+        let pattern = Pattern::of(&around, &colours);
+        let added = sheet.painted(&holes, shadows.as_ref(), pattern.as_ref());
+        if !added.is_empty() {
+            *filled.added.entry(sheet.label).or_default() += added.len() as u64;
+            append(&mut filled.model, (&sheet.plane, place.cell), &added, sheet.label);
+        }
+    }
+}
+
 /// Where a removed object was.
 struct Place {
-    tree: ImmutableKdTree<f64, 3>,
+    tree: Arc<ImmutableKdTree<f64, 3>>,
     /// Its Gaussians.
     discs: Vec<Disc>,
     /// Corners of the object.
@@ -162,7 +208,7 @@ impl Place {
         let places: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
         let tree = ImmutableKdTree::new_from_slice(&places)
             .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
-        let mut place = Self { tree, discs: Vec::new(), low, high, cell, ring: 0.0 };
+        let mut place = Self { tree: Arc::new(tree), discs: Vec::new(), low, high, cell, ring: 0.0 };
         place.ring = (RING.0 * place.size()).max(RING.1 * cell);
         place.discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, place.ring)).collect();
         Ok(Some(place))
@@ -172,6 +218,13 @@ impl Place {
     /// shadow.
     fn has(&self, disc: &Disc, margin: f64) -> bool {
         self.is_near(disc.middle, margin) && disc.radius < BLOCKER_SHARE_MAX * self.size()
+    }
+
+    /// Returns the place with a ring in which a pattern is looked for, and the size of the cells there.
+    fn wide(&self) -> (Self, f64) {
+        let ring = (PATTERN_RING.0 * self.size()).max(PATTERN_RING.1 * self.cell);
+        let cell = self.cell.max((self.size() + 2.0 * ring) / PATTERN_CELLS);
+        (Self { ring, tree: Arc::clone(&self.tree), discs: Vec::new(), ..*self }, cell)
     }
 
     /// Returns the diagonal of the object.

@@ -1,6 +1,7 @@
 //! A plane as a grid of cells: what the views show of each, and the colour of those that none shows.
 
 use super::evidence::{Evidence, Shown, State};
+use super::pattern::Pattern;
 use super::plane::Plane;
 use super::shadow::{Shadows, thrown};
 use super::{Place, Sight};
@@ -117,9 +118,9 @@ impl Sheet {
         (state, colour)
     }
 
-    /// Returns positions and colours of the holes that seen surface surrounds. What was closed bounds the next ones: a hole
-    /// beside another that nothing bounds is closed up to it. `shadows` on the sheet change the colours.
-    pub(super) fn holes(&self, shadows: Option<&Shadows>) -> Vec<(DVec3, DVec3)> {
+    /// Returns the cells of the holes that seen surface surrounds. What was closed bounds the next ones: a hole beside another
+    /// that nothing bounds is closed up to it.
+    pub(super) fn holes(&self) -> Vec<usize> {
         let mut states = self.states.clone();
         let mut open: Vec<usize> = (0..states.len()).filter(|&index| states[index] == State::Hole).collect();
         let mut closed = Vec::new();
@@ -133,12 +134,19 @@ impl Sheet {
             closed.extend(found);
             open = left;
         }
-        if closed.is_empty() {
-            return Vec::new();
-        }
         closed.sort_unstable();
-        let Some(colours) = self.continued(shadows) else { return Vec::new() };
-        closed.into_iter().map(|index| (self.place(index), colours[index])).collect()
+        closed
+    }
+
+    /// Returns positions and colours of some cells. `shadows` on the sheet change the colours, and a pattern of it goes on.
+    pub(super) fn painted(
+        &self,
+        cells: &[usize],
+        shadows: Option<&Shadows>,
+        pattern: Option<&Pattern>,
+    ) -> Vec<(DVec3, DVec3)> {
+        let Some(colours) = self.continued(shadows, pattern) else { return Vec::new() };
+        cells.iter().map(|&index| (self.place(index), colours[index])).collect()
     }
 
     /// Returns true if there is seen surface in most directions, before anything free.
@@ -151,7 +159,8 @@ impl Sheet {
     }
 
     /// Returns the colours without any shadow, but for those at edges of shadows if there are others.
-    fn lit(&self, shadows: &Shadows) -> Vec<Option<DVec3>> {
+    pub(super) fn lit(&self, shadows: Option<&Shadows>) -> Vec<Option<DVec3>> {
+        let Some(shadows) = shadows else { return self.colours.clone() };
         let lit = |index: usize| self.colours[index].map(|colour| colour / shadows.before(index));
         let sure = |index: usize| lit(index).filter(|_| !shadows.is_unsure(index));
         let cells = 0..self.colours.len();
@@ -160,10 +169,13 @@ impl Sheet {
     }
 
     /// Returns a colour for each cell: where none is known, the smoothest continuation (each the mean of its four
-    /// neighbours, free cells left out). `None` without any known colour. What has a shadow continues as if it had none, and
-    /// has that of the rest in the end.
-    fn continued(&self, shadows: Option<&Shadows>) -> Option<Vec<DVec3>> {
-        let lit = shadows.map_or_else(|| self.colours.clone(), |shadows| self.lit(shadows));
+    /// neighbours, free cells left out) of what a pattern leaves, with the pattern. `None` without any known colour. What has
+    /// a shadow continues as if it had none, and has that of the rest in the end.
+    fn continued(&self, shadows: Option<&Shadows>, pattern: Option<&Pattern>) -> Option<Vec<DVec3>> {
+        let added = |index: usize| pattern.map_or(DVec3::ZERO, |pattern| pattern.at(self.place(index)));
+        let added: Vec<DVec3> = (0..self.colours.len()).into_par_iter().map(added).collect();
+        let lit = self.lit(shadows).into_iter().zip(&added);
+        let lit: Vec<Option<DVec3>> = lit.map(|(colour, &added)| Some(colour? - added)).collect();
         let known: Vec<DVec3> = lit.iter().flatten().copied().collect();
         if known.is_empty() {
             return None;
@@ -185,7 +197,8 @@ impl Sheet {
             }
         }
         let after = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.after(index));
-        let shaded = |(index, colour): (usize, DVec3)| (colour * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
+        let shaded =
+            |(index, colour): (usize, DVec3)| ((colour + added[index]) * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
         Some(colours.into_iter().enumerate().map(shaded).collect())
     }
 }
