@@ -3,7 +3,8 @@
 use super::compared::{Compared, Watch};
 use crate::files::atomic;
 use crate::files::image::write_png_rgb8;
-use crate::report::panels::difference;
+use crate::report::panels::heat;
+use crate::report::text::{DECIBELS, SCORE};
 use crate::report::{Figure, Panel, page, section};
 use crate::scene::colour::to_byte;
 use crate::{Error, Result};
@@ -37,8 +38,8 @@ impl Page {
         let path = self.folder.join("index.html");
         let pictures = html! {
             p.quiet {
-                "Difference of masks: green is in both, red only in the prediction, blue only in the ground truth. \
-                 Without a mask it is the absolute difference of colours."
+                "Green is in both masks, red only in the prediction, blue only in the ground truth. Errors are mean \
+                 absolute differences of the channels, which go from 0 to 1."
             }
             // Escaped by `Figure::markup`.
             (PreEscaped(&self.figures))
@@ -62,26 +63,35 @@ impl Watch for Page {
         let kinds = [("truth", "ground truth"), ("prediction", "prediction"), ("difference", "difference")];
         let mut panels = Vec::new();
         for ((kind, name), pixels) in kinds.into_iter().zip(pixels(picture)) {
-            panels.push(Panel { name: name.to_owned(), source: self.picture(kind, picture, &pixels)? });
+            let is_heat = kind == "difference" && picture.masks.is_none();
+            let name = if is_heat { "error" } else { name };
+            panels.push(Panel { name: name.to_owned(), source: self.picture(kind, picture, &pixels)?, is_heat });
         }
-        let number = |&(name, value): &(&str, Option<f64>)| Some((name.to_owned(), format!("{:.4}", value?)));
+        let number = |&(name, value): &(&str, Option<f64>)| Some((name.to_owned(), told(name, value?)));
         let figure = Figure {
             view: picture.view.to_owned(),
             object: picture.object.clone(),
             numbers: picture.numbers.iter().filter_map(number).collect(),
             note: picture.note.clone(),
             panels,
+            ..Figure::default()
         };
         self.figures += &figure.markup().into_string();
         Ok(())
     }
 }
 
+/// A score with its digits and unit.
+fn told(name: &str, value: f64) -> String {
+    let is_decibels = name.to_lowercase().contains("psnr");
+    if is_decibels { format!("{value:.DECIBELS$} dB") } else { format!("{value:.SCORE$}") }
+}
+
 /// Ground truth, prediction and difference.
 fn pixels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
     let (photo, found) = (picture.photo.rgb(), picture.rgb.iter().map(|colour| colour.map(to_byte)).collect());
     let Some((inside, outline)) = picture.masks else {
-        return [photo, found, difference(picture.photo, picture.rgb)];
+        return [photo, found, heat(picture.photo, picture.rgb)];
     };
     let truth = photo.iter().zip(outline).map(|(&colour, &inside)| if inside { colour } else { [0; 3] }).collect();
     let difference = |index: usize| match (inside[index], outline[index]) {

@@ -1,5 +1,19 @@
 //! Axes with round ticks.
 
+use super::text::count;
+
+/// How values become places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// In proportion.
+    #[default]
+    Linear,
+    /// In proportion, from 0 on.
+    FromZero,
+    /// By their logarithm. Values that are not positive have no place.
+    Logarithmic,
+}
+
 /// The range of an axis, and its ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
@@ -10,6 +24,7 @@ pub struct Axis {
     /// Values of the ticks.
     pub ticks: Vec<f64>,
     digits: usize,
+    is_logarithmic: bool,
 }
 
 impl Axis {
@@ -33,35 +48,60 @@ impl Axis {
         let (low, high) =
             if is_rounded { (low.min(first as f64 * step), high.max(last as f64 * step)) } else { (low, high) };
         let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
-        Self { low, high, ticks, digits }
+        Self { low, high, ticks, digits, is_logarithmic: false }
+    }
+
+    /// Makes a logarithmic axis for positive values from `low` to `high`, which ends at ticks: powers of ten, and where
+    /// these are few also twice and five times those.
+    pub fn logarithmic(low: f64, high: f64) -> Self {
+        const DECADES: i32 = 2;
+        let low = low.max(f64::MIN_POSITIVE);
+        let decade = |value: f64| value.log10().floor() as i32;
+        let (first, last) = (decade(low), decade(high.max(low)));
+        let factors: &[f64] = if last - first < DECADES { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        // By division below one: 2 / 1000 is the nearest number to 0.002, and 2 times a power is not.
+        let tick = |power: i32, factor: f64| {
+            if power < 0 { factor / 10_f64.powi(-power) } else { factor * 10_f64.powi(power) }
+        };
+        let all: Vec<f64> = (first..=last + 1).flat_map(|power| factors.iter().map(move |&f| tick(power, f))).collect();
+        let start = all.iter().rposition(|&tick| tick <= low).unwrap_or(0);
+        let end = all.iter().position(|&tick| tick >= high && tick > all[start]).unwrap_or(all.len() - 1);
+        let ticks = all[start..=end].to_vec();
+        Self { low: low.min(ticks[0]), high: high.max(ticks[ticks.len() - 1]), ticks, digits: 0, is_logarithmic: true }
     }
 
     /// Returns the place of a value: 0 at the start, 1 at the end.
     pub fn place(&self, value: f64) -> f64 {
-        (value - self.low) / (self.high - self.low)
+        let of = |value: f64| if self.is_logarithmic { value.max(f64::MIN_POSITIVE).ln() } else { value };
+        (of(value) - of(self.low)) / (of(self.high) - of(self.low))
     }
 
     /// Returns the text of a tick, with the digits that tell ticks apart.
     pub fn text(&self, tick: f64) -> String {
         let size = tick.abs();
-        let short = |value: f64, unit: &str| {
-            let text = format!("{value:.2}");
-            format!("{}{unit}", text.trim_end_matches('0').trim_end_matches('.'))
-        };
-        if size >= 1e6 && self.digits == 0 {
-            short(tick / 1e6, "M")
-        } else if size >= 1e4 && self.digits == 0 {
-            short(tick / 1e3, "k")
-        } else {
-            let digits = self.digits;
-            format!("{:.digits$}", if size == 0.0 { 0.0 } else { tick })
+        if self.is_logarithmic {
+            return if (1e-4..1e6).contains(&size) { format!("{tick}") } else { format!("{tick:e}") };
         }
+        if size >= 1e6 && self.digits == 0 {
+            let text = format!("{:.2}", tick / 1e6);
+            return format!("{}M", text.trim_end_matches('0').trim_end_matches('.'));
+        }
+        if size >= 1e3 && self.digits == 0 {
+            let sign = if tick < 0.0 { "-" } else { "" };
+            return format!("{sign}{}", count(size.round() as u64));
+        }
+        let digits = self.digits;
+        format!("{:.digits$}", if size == 0.0 { 0.0 } else { tick })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::Axis;
+
+    fn texts(axis: &Axis) -> Vec<String> {
+        axis.ticks.iter().map(|&tick| axis.text(tick)).collect()
+    }
 
     #[test]
     fn ticks_are_round_and_few() {
@@ -70,17 +110,24 @@ mod tests {
                 let axis = Axis::new(low, high, is_rounded);
                 assert!((2..=8).contains(&axis.ticks.len()), "{axis:?}");
                 assert!(axis.low <= low && axis.high >= high, "{axis:?}");
-                let texts: std::collections::BTreeSet<String> =
-                    axis.ticks.iter().map(|&tick| axis.text(tick)).collect();
-                assert_eq!(texts.len(), axis.ticks.len(), "{texts:?}");
+                let apart: std::collections::BTreeSet<String> = texts(&axis).into_iter().collect();
+                assert_eq!(apart.len(), axis.ticks.len(), "{apart:?}");
             }
         }
         let axis = Axis::new(0.031, 0.27, true);
-        assert_eq!(
-            axis.ticks.iter().map(|&tick| axis.text(tick)).collect::<Vec<_>>(),
-            ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25", "0.30"]
-        );
-        assert_eq!(Axis::new(0.0, 30_000.0, false).text(30_000.0), "30k");
+        assert_eq!(texts(&axis), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25", "0.30"]);
+        assert_eq!(Axis::new(0.0, 30_000.0, false).text(30_000.0), "30,000");
+        assert_eq!(Axis::new(0.0, 3e6, false).text(2.5e6), "2.5M");
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_powers_of_ten() {
+        assert_eq!(texts(&Axis::logarithmic(0.003, 0.4)), ["0.001", "0.01", "0.1", "1"]);
+        assert_eq!(texts(&Axis::logarithmic(0.011, 0.13)), ["0.01", "0.02", "0.05", "0.1", "0.2"]);
+        assert_eq!(texts(&Axis::logarithmic(0.02, 0.02)), ["0.02", "0.05"]);
+        let axis = Axis::logarithmic(1e-7, 1e3);
+        assert!((axis.place(1e-2) - 0.5).abs() < 1e-12 && axis.ticks.len() == 11, "{axis:?}");
+        assert!(axis.place(0.0).is_finite());
     }
 
     #[test]

@@ -8,7 +8,8 @@ pub mod panels;
 pub mod series;
 pub mod text;
 
-pub use chart::{Chart, Mark};
+pub use axis::Scale;
+pub use chart::{Chart, Digits, Mark};
 pub use figure::{Figure, Panel};
 pub use page::{page, section};
 pub use series::Series;

@@ -4,26 +4,23 @@ use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
 use labelgs_files::image::jpeg_rgb8;
 use labelgs_files::resize::bounded_size;
-use labelgs_scene::colour::to_byte;
+use labelgs_scene::colour::{HEAT, HEAT_MAX, on_scale};
 use labelgs_scene::{Error, Photo, Result};
 use std::io::Cursor;
 
 /// Longest side of a picture inside a page, px.
-const LONGEST: u32 = 800;
+pub const LONGEST: u32 = 800;
 const QUALITY: u8 = 85;
 
-/// Returns the absolute difference of a render and its photo.
-pub fn difference(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
-    let of = |([r, g, b, _], &found): (&[u8; 4], &[f32; 3])| {
-        let found = found.map(to_byte);
-        [found[0].abs_diff(*r), found[1].abs_diff(*g), found[2].abs_diff(*b)]
+/// Returns the error of a render against its photo, the mean absolute difference of the channels, on the scale
+/// [`HEAT`]; black where the photo has no pixel.
+pub fn heat(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
+    let of = |([r, g, b, valid], colour): (&[u8; 4], &[f32; 3])| {
+        let difference = |value: f32, truth: u8| (value.clamp(0.0, 1.0) - f32::from(truth) / 255.0).abs();
+        let sum = difference(colour[0], *r) + difference(colour[1], *g) + difference(colour[2], *b);
+        if *valid == 0 { [0; 3] } else { on_scale(&HEAT, sum / 3.0 / HEAT_MAX) }
     };
     photo.rgba.iter().zip(rgb).map(of).collect()
-}
-
-/// Returns a difference that is easier to see.
-pub fn brighter(difference: &[[u8; 3]], times: u8) -> Vec<[u8; 3]> {
-    difference.iter().map(|colour| colour.map(|value| value.saturating_mul(times))).collect()
 }
 
 /// How a small copy is stored.
@@ -35,13 +32,13 @@ pub enum Kind {
     Flat,
 }
 
-/// Encodes a copy that fits into a page.
-pub fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kind) -> Result<Vec<u8>> {
+/// Encodes a copy whose longest side has at most `longest` px.
+pub fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kind, longest: u32) -> Result<Vec<u8>> {
     let broken = |text: String| Error::Bug(format!("a picture of a page: {text}"));
     let bytes = bytemuck::cast_slice(pixels).to_vec();
     let mut picture =
         RgbImage::from_raw(width, height, bytes).ok_or_else(|| broken("has too few pixels".to_owned()))?;
-    let small = bounded_size((width, height), Some(LONGEST));
+    let small = bounded_size((width, height), Some(longest));
     if small != (width, height) {
         let filter = if kind == Kind::Flat { FilterType::Nearest } else { FilterType::Triangle };
         picture = resize(&picture, small.0, small.1, filter);

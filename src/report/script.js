@@ -22,44 +22,40 @@ for (const table of document.querySelectorAll("table.sortable")) {
     };
   });
 }
-// Shows the values of all curves below the pointer.
+// Shows the values of all curves at the step below the pointer.
 for (const chart of document.querySelectorAll("figure.chart")) {
-  const [x0, x1] = chart.dataset.x.split(" ").map(Number);
-  const [y0, y1] = chart.dataset.y.split(" ").map(Number);
   const plot = chart.querySelector(".plot");
   const readout = chart.querySelector(".readout");
   const curves = [...chart.querySelectorAll("polyline")].map((line) => ({
     name: line.dataset.name,
     colour: line.getAttribute("class"),
-    points: line.getAttribute("points").split(" ").map((point) => point.split(",").map(Number)),
+    values: new Map(line.dataset.values.split(" ").map((pair) => pair.split(":"))),
   }));
-  // Half the narrowest spacing of a curve: points closer than that are of the same step.
-  const gaps = curves.flatMap(({ points }) => points.slice(1).map((point, index) => point[0] - points[index][0]));
-  const reach = Math.min(2, ...gaps.filter((gap) => gap > 0).map((gap) => gap / 2));
-  const digits = Math.min(8, Math.max(0, Math.ceil(3 - Math.log10(Math.max(y1 - y0, 1e-9)))));
+  // The steps of all curves, with their places: 0 to 1000.
+  const places = new Map();
+  for (const line of chart.querySelectorAll("polyline")) {
+    const points = line.getAttribute("points").split(" ");
+    line.dataset.values.split(" ").forEach((pair, index) => places.set(pair.split(":")[0], Number(points[index].split(",")[0])));
+  }
   const show = (event) => {
     const box = plot.getBoundingClientRect();
     const at = (1000 * (event.clientX - box.left)) / box.width;
-    const nearestTo = (x, points) => points.reduce((a, b) => (Math.abs(b[0] - x) < Math.abs(a[0] - x) ? b : a));
-    const step = nearestTo(at, curves.flatMap((curve) => curve.points))[0];
+    const [step, place] = [...places].reduce((a, b) => (Math.abs(b[1] - at) < Math.abs(a[1] - at) ? b : a));
     // A curve without a point at this step has no value to show.
-    const rows = curves.flatMap((curve) => {
-      const nearest = nearestTo(step, curve.points);
-      if (Math.abs(nearest[0] - step) > reach) return [];
+    const rows = curves.filter(({ values }) => values.has(step)).map(({ name, colour, values }) => {
       const row = document.createElement("div");
       const swatch = document.createElement("i");
-      swatch.className = curve.colour;
-      const value = (y0 + (1 - nearest[1] / 1000) * (y1 - y0)).toFixed(digits);
-      row.append(swatch, curves.length > 1 ? `${curve.name} ${value}` : value);
+      swatch.className = colour;
+      row.append(swatch, curves.length > 1 ? `${name} ${values.get(step)}` : values.get(step));
       return row;
     });
     const title = document.createElement("div");
-    title.textContent = `step ${Math.round(x0 + (step / 1000) * (x1 - x0))}`;
+    title.textContent = `step ${Number(step).toLocaleString("en")}`;
     readout.replaceChildren(title, ...rows);
     readout.hidden = false;
-    readout.style.left = `${step / 10}%`;
-    readout.classList.toggle("left", step > 600);
-    plot.style.setProperty("--at", `${step / 10}%`);
+    readout.style.left = `${place / 10}%`;
+    readout.classList.toggle("left", place > 600);
+    plot.style.setProperty("--at", `${place / 10}%`);
     plot.classList.add("pointed");
   };
   plot.addEventListener("pointermove", show);
@@ -69,27 +65,49 @@ for (const chart of document.querySelectorAll("figure.chart")) {
     plot.classList.remove("pointed");
   });
 }
-// Lays one picture of a view over the first, with a slider between them.
+// Lays one picture of a view over the first; the border between them follows the pointer or the arrow keys.
 for (const view of document.querySelectorAll("figure.view")) {
-  const panels = [...view.querySelectorAll(".panel")];
+  const stage = view.querySelector(".panels");
+  const panels = [...stage.querySelectorAll(".panel")];
   if (panels.length < 2) continue;
   const bar = document.createElement("div");
   bar.className = "bar";
-  const slider = document.createElement("input");
-  slider.type = "range";
-  slider.max = 1000;
-  slider.value = 500;
-  slider.setAttribute("aria-label", "share of the first picture");
-  slider.oninput = () => view.style.setProperty("--cut", `${slider.value / 10}%`);
+  const grip = document.createElement("div");
+  grip.className = "grip";
+  let cut = 50;
+  const move = (to) => {
+    cut = Math.max(0, Math.min(100, to));
+    view.style.setProperty("--cut", `${cut}%`);
+    stage.setAttribute("aria-valuenow", Math.round(cut));
+  };
+  const isStacked = () => view.classList.contains("stacked");
+  const drag = (event) => {
+    if (!isStacked() || (event.pointerType === "touch" && event.buttons === 0)) return;
+    const box = stage.getBoundingClientRect();
+    move((100 * (event.clientX - box.left)) / box.width);
+  };
+  stage.addEventListener("pointermove", drag);
+  stage.addEventListener("pointerdown", drag);
+  stage.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: -2, ArrowRight: 2 }[event.key];
+    if (!isStacked() || !by) return;
+    event.preventDefault();
+    move(cut + by);
+  });
   const pick = (over) => {
     view.classList.toggle("stacked", over !== null);
-    slider.hidden = over === null;
     panels.forEach((panel, index) => {
       panel.classList.toggle("under", index === 0);
       panel.classList.toggle("over", panel === over);
     });
     buttons.forEach(([button, panel]) => button.setAttribute("aria-pressed", panel === over));
-    slider.oninput();
+    for (const [name, value] of Object.entries({ tabindex: 0, role: "slider", "aria-label": "share of the first picture" })) {
+      if (over) stage.setAttribute(name, value);
+      else stage.removeAttribute(name);
+    }
+    grip.remove();
+    if (over) stage.append(grip);
+    move(cut);
   };
   const button = (text, panel) => {
     const made = document.createElement("button");
@@ -100,7 +118,6 @@ for (const view of document.querySelectorAll("figure.view")) {
   };
   const buttons = [button("side by side", null)];
   panels.slice(1).forEach((panel) => buttons.push(button(`${panels[0].dataset.name} | ${panel.dataset.name}`, panel)));
-  view.querySelector(".panels").before(bar);
-  view.querySelector(".panels").after(slider);
+  stage.before(bar);
   pick(null);
 }

@@ -23,7 +23,7 @@ impl Series {
 
     /// Returns at most [`POINTS_MAX`] of the points: the least and the largest of each of equally long runs of points,
     /// with the first and the last point.
-    pub fn thinned(&self) -> Vec<(f64, f64)> {
+    fn thinned(&self) -> Vec<(f64, f64)> {
         let all = &self.points;
         let [first, inner @ .., last] = all.as_slice() else { return all.clone() };
         if all.len() <= POINTS_MAX {
@@ -45,9 +45,31 @@ impl Series {
     }
 }
 
+/// Returns curves with the steps that any of them keeps, so that all have a value where one has.
+pub fn thinned(all: &[Series]) -> Vec<Series> {
+    let mut kept: Vec<f64> = all.iter().flat_map(Series::thinned).map(|point| point.0).collect();
+    kept.sort_by(f64::total_cmp);
+    let is_kept = |at: f64| kept.binary_search_by(|other| other.total_cmp(&at)).is_ok();
+    let of = |series: &Series| {
+        let points = series.points.iter().copied().filter(|point| is_kept(point.0)).collect();
+        Series { points, ..series.clone() }
+    };
+    all.iter().map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn curves_of_the_same_steps_keep_the_same() {
+        let curve =
+            |factor: f64| Series::new("a", 0, (0..5000).map(|at| (f64::from(at), (f64::from(at) * factor).sin())));
+        let both = thinned(&[curve(0.3), curve(0.7)]);
+        let steps = |index: usize| both[index].points.iter().map(|point| point.0).collect::<Vec<_>>();
+        assert_eq!(steps(0), steps(1));
+        assert!(steps(0).len() > POINTS_MAX && steps(0).len() <= 2 * POINTS_MAX, "{}", steps(0).len());
+    }
 
     #[test]
     fn spikes_stay() {

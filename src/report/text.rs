@@ -1,4 +1,4 @@
-//! Numbers, sizes and times as text.
+//! Numbers, sizes and times as text: one style for all pages.
 
 /// What stands for a missing number.
 const NONE: &str = "–";
@@ -8,13 +8,27 @@ pub fn number(value: Option<f64>, digits: usize) -> String {
     value.filter(|value| value.is_finite()).map_or(NONE.to_owned(), |value| format!("{value:.digits$}"))
 }
 
-/// Returns a count with thin spaces between thousands.
+/// Digits of decibels.
+pub const DECIBELS: usize = 2;
+/// Digits of scores from 0 to 1: SSIM, IoU, confidence.
+pub const SCORE: usize = 3;
+
+/// Returns a number with three significant digits, and no more than three after the point from 1 on.
+pub fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2 - value.abs().log10().floor() as i32).max(0) as usize;
+    if value.abs() < 1e-4 { format!("{value:.2e}") } else { format!("{value:.digits$}") }
+}
+
+/// Returns a count with commas between thousands.
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {
         if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push('\u{202f}');
+            text.push(',');
         }
         text.push(digit);
     }
@@ -62,10 +76,9 @@ mod tests {
             (number(Some(1.25), 1), number(None, 2), number(Some(f64::NAN), 2)),
             ("1.2".into(), "–".into(), "–".into())
         );
-        assert_eq!(
-            (count(0), count(999), count(1_234_567)),
-            ("0".into(), "999".into(), "1\u{202f}234\u{202f}567".into())
-        );
+        assert_eq!((count(0), count(999), count(1_234_567)), ("0".into(), "999".into(), "1,234,567".into()));
+        let texts = [0.0, 1.5e-5, 0.012_345, 0.123_45, 1.2345, 123.45, 12_345.6].map(significant);
+        assert_eq!(texts, ["0", "1.50e-5", "0.0123", "0.123", "1.23", "123", "12346"]);
         assert_eq!((bytes(3 << 20), bytes(3 << 29)), ("3.0 MiB".into(), "1.50 GiB".into()));
         assert_eq!(
             (duration(9.04), duration(125.2), duration(7260.0)),

@@ -25,6 +25,7 @@ mod resume;
 pub(crate) mod settings;
 mod steps;
 pub(crate) mod summary;
+mod thumbnails;
 
 pub use every::Every;
 pub use models::{latest_model, model_file};

@@ -1,11 +1,12 @@
 //! Small copies of the worst held-out views, for the report.
 
 use super::info::Pictured;
+use super::thumbnails::{self, Thumbnails};
 use crate::error::{Error, Result};
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::metrics::label_iou;
 use crate::files::atomic;
-use crate::report::panels::{self, Kind, encoded};
+use crate::report::panels::{Kind, LONGEST, encoded, heat};
 use crate::scene::LabelMap;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
@@ -18,8 +19,8 @@ const VIEWS: usize = 6;
 /// Most bytes of all copies.
 const BYTES_MAX: usize = 6 << 20;
 
-/// Factor of the differences; those of a trained scene are dark.
-const BRIGHTER: u8 = 4;
+/// File of the map of errors.
+pub(crate) const HEAT: &str = "error.jpg";
 
 /// The pictures of a view: name in the page, name of the file.
 pub(crate) const KINDS: [(&str, &str); 5] = [
@@ -27,7 +28,7 @@ pub(crate) const KINDS: [(&str, &str); 5] = [
     ("render", "render.jpg"),
     ("labels", "labels.png"),
     ("masks", "masks.png"),
-    ("4 × difference", "difference.jpg"),
+    ("error", HEAT),
 ];
 
 /// Returns the path of a picture.
@@ -35,22 +36,24 @@ pub(crate) fn path(out: &Path, number: u32, file: &str) -> PathBuf {
     out.join(FOLDER).join(format!("{number}-{file}"))
 }
 
-/// The worst views that were seen.
+/// The worst views that were seen, and the objects of all.
 #[derive(Default)]
 pub(super) struct Worst {
     views: Vec<(Pictured, Vec<Option<Vec<u8>>>)>,
+    objects: Thumbnails,
 }
 
 impl Watch for Worst {
     fn see(&mut self, picture: &Compared) -> Result<()> {
         let Some(psnr) = picture.number("PSNR").filter(|_| picture.object.is_none()) else { return Ok(()) };
+        self.objects.see(picture)?;
         let worse = |view: &(Pictured, _)| view.0.psnr.is_some_and(|other| other <= psnr);
         let place = self.views.iter().take_while(|view| worse(view)).count();
         if place >= VIEWS {
             return Ok(());
         }
         let size = (picture.photo.width, picture.photo.height);
-        let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind).map(Some);
+        let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind, LONGEST).map(Some);
         let map = |map: Option<&LabelMap>| map.map_or(Ok(None), |map| copy(&label_colours(&map.ids), Kind::Flat));
         let render: Vec<[u8; 3]> = picture.rgb.iter().map(|colour| colour.map(to_byte)).collect();
         let files = vec![
@@ -58,7 +61,7 @@ impl Watch for Worst {
             copy(&render, Kind::Smooth)?,
             map(picture.labels)?,
             map(picture.truth)?,
-            copy(&panels::brighter(&panels::difference(picture.photo, picture.rgb), BRIGHTER), Kind::Smooth)?,
+            copy(&heat(picture.photo, picture.rgb), Kind::Smooth)?,
         ];
         let iou = picture.labels.zip(picture.truth).and_then(|(found, truth)| label_iou(&found.ids, truth));
         let (view, ssim) = (picture.view.to_owned(), picture.number("SSIM"));
@@ -72,6 +75,8 @@ impl Worst {
     /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst first.
     pub(super) fn write(self, out: &Path) -> Result<Vec<Pictured>> {
         remove_old(out)?;
+        thumbnails::remove_old(out)?;
+        self.objects.write(out)?;
         let mut written = Vec::new();
         let mut bytes = 0;
         for (number, (view, files)) in (1..).zip(self.views) {

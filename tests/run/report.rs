@@ -38,16 +38,19 @@ fn a_report_is_made_anew_and_compares_runs() {
     let page = read(&place.path(out).join("report.html"));
     is_harmless(&page);
     assert!(page.contains("&lt;img src=x onerror=alert(1)&gt;&quot;'&amp;"), "the name of the object");
-    assert!(page.contains("<h1>&lt;b&gt;bold out</h1>") && page.contains("of 20 steps"), "{}", &page[..2000]);
-    for part in ["PSNR", "Largest photo loss", "IoU of labels", "Time of a step", "growth ends", "labels begin"] {
+    assert!(page.contains("<h1>scene</h1>") && page.contains("20 of 20 steps"), "{}", &page[..2000]);
+    assert!(page.contains("&lt;b&gt;bold out"), "the folder");
+    for part in ["PSNR", "Photo loss", "IoU of labels", "Time of a step", "growth ends", "labels begin"] {
         assert!(page.contains(part), "{part}");
     }
-    for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned for the last model", "None."] {
+    for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned for the last model"] {
         assert!(page.contains(part), "{part}");
     }
     // A photo, render, label map, mask and difference of the one view that is held out.
-    assert_eq!(page.matches("src=\"data:image/jpeg;base64,").count(), 3);
+    let objects = page.matches("<img class=\"thumb\"").count();
+    assert_eq!(page.matches("src=\"data:image/jpeg;base64,").count(), 3 + objects);
     assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 2);
+    assert!(!page.contains("<h2>Warnings"), "there are none");
 
     // It depends on the folder alone.
     std::fs::rename(place.path("scene"), place.path("elsewhere")).expect("moved");
@@ -62,14 +65,14 @@ fn a_report_is_made_anew_and_compares_runs() {
     succeeded(&place.labelgs(&["report", &place.text(out), &place.text("other"), "-o", &again]));
     let both = read(Path::new(&again));
     is_harmless(&both);
-    assert!(both.contains("<h1>2 runs</h1>") && both.contains("other") && both.contains("&lt;b&gt;bold out"));
+    assert!(both.contains("<h1>scene: 2 runs</h1>") && both.contains("other") && both.contains("&lt;b&gt;bold out"));
     // Each run has a curve in each chart, and a render of the view.
-    for chart in ["photo loss", "L1", "Gaussians", "Time of a step"] {
+    for chart in ["Photo loss", "L1", "Gaussians", "Time of a step"] {
         let at = both.find(&format!("<strong>{chart}</strong>")).unwrap_or_else(|| panic!("{chart}"));
         let end = at + both[at..].find("</figure>").expect("an end");
         assert_eq!(both[at..end].matches("<polyline").count(), 2, "{chart}");
     }
-    assert_eq!(both.matches("src=\"data:image/jpeg;base64,").count(), 3);
+    assert_eq!(both.matches("src=\"data:image/jpeg;base64,").count(), 3 + both.matches("<img class=\"thumb\"").count());
     damaged(&place, out);
 }
 

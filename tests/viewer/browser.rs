@@ -363,30 +363,60 @@ fn many_labels_and_none(browser: &mut Browser, place: &Place) {
     assert_eq!(browser.complaints, Vec::<String>::new(), "complaints on the console");
 }
 
-/// Points at each step of each chart: the values are those of the curves that have one at that step.
+/// Points at each step of each chart: the values are those of the history, of the curves that have one at that step.
 fn a_report_tells_the_values_of_the_step(browser: &mut Browser, place: &Place) {
     place.succeeds(&["train", "scene", "--iterations", "12", "--set", "preview_every=4", "-o", "reported"]);
     let tab = browser.open(&format!("file://{}", place.path("reported/report.html").display()), WIDE);
     browser.until(&tab, "document.readyState === 'complete' && document.querySelector('figure.chart polyline')");
     let found = browser.js(
         &tab,
-        "(() => { let partial = 0; const wrong = [];
+        "(() => { let partial = 0; const wrong = []; const told = {};
             for (const chart of document.querySelectorAll('figure.chart')) {
               const plot = chart.querySelector('.plot');
               const box = plot.getBoundingClientRect();
               const xs = (line) => line.getAttribute('points').split(' ').map((point) => Number(point.split(',')[0]));
               const curves = [...chart.querySelectorAll('polyline')].map(xs);
+              const title = chart.querySelector('strong').textContent;
               for (const x of new Set(curves.flat())) {
                 plot.dispatchEvent(new PointerEvent('pointermove', { clientX: box.left + (x * box.width) / 1000 }));
-                const shown = chart.querySelector('.readout').children.length - 1;
+                const rows = [...chart.querySelector('.readout').children].map((row) => row.textContent);
+                const shown = rows.length - 1;
+                for (const row of rows.slice(1)) (told[title] ??= []).push(`${rows[0]}: ${row}`);
                 const there = curves.filter((curve) => curve.includes(x)).length;
                 partial += there < curves.length;
                 if (shown !== there) wrong.push([chart.textContent.slice(0, 80), x, shown, there]);
               }
             }
-            return { partial, wrong }; })()",
+            return { partial, wrong, told }; })()",
     );
     assert_eq!(found["wrong"], serde_json::json!([]), "{found}");
+    let mut expected = std::collections::BTreeMap::<&str, Vec<String>>::new();
+    for line in std::fs::read_to_string(place.path("reported/history.jsonl")).expect("a history").lines() {
+        let entry: Value = serde_json::from_str(line).expect("JSON");
+        let at = format!("step {}", entry["step"]);
+        let score = |name: &str, of: &str| Some(format!("{at}: {of} {:.2}", entry[name].as_f64()?));
+        match entry["kind"].as_str().expect("a kind") {
+            "steps" => {
+                expected.entry("Gaussians").or_default().push(format!("{at}: {}", entry["gaussians"]));
+                expected
+                    .entry("Loss")
+                    .or_default()
+                    .push(format!("{at}: Photo loss {:.3}", entry["loss"].as_f64().expect("loss")));
+            }
+            "preview" => expected
+                .entry("PSNR")
+                .or_default()
+                .extend(score("psnr", &format!("view {}", entry["view"].as_str().expect("a view")))),
+            "scores" => expected.entry("PSNR").or_default().extend(score("psnr", "all held-out views")),
+            _ => {}
+        }
+    }
+    assert!(expected["PSNR"].len() > 2, "{expected:?}");
+    for (chart, lines) in &expected {
+        let told: Vec<&str> =
+            found["told"][chart].as_array().expect("lines").iter().filter_map(Value::as_str).collect();
+        assert!(lines.iter().all(|line| told.contains(&line.as_str())), "{chart}: {lines:?} are not all in {told:?}");
+    }
     assert!(found["partial"].as_u64().is_some_and(|count| count > 0), "a curve without a point at some step: {found}");
     browser.kill(&tab);
 }

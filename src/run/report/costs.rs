@@ -2,23 +2,23 @@
 
 use super::load::Ran;
 use super::{columns, row, run_name};
-use crate::report::text::{bytes, count, number};
+use crate::report::text::{bytes, count, number, significant};
 use crate::run::passes::Pass;
 use maud::{Markup, html};
+
+/// Most stages with a bar of their own.
+const STAGES_MAX: usize = 8;
 
 /// Returns both.
 pub(super) fn costs(runs: &[Ran]) -> Markup {
     let rows = [
-        row(runs, "device memory planned at the start", |run| run.info.memory.planned_start.map(bytes)),
+        row(runs, "planned for the first model", |run| run.info.memory.planned_start.map(bytes)),
         row(runs, "planned for the last model", |run| run.info.memory.planned_end.map(bytes)),
-        row(runs, "most used by buffers", |run| run.info.memory.device_peak.map(bytes)),
-        row(runs, "most host memory of the process", |run| run.info.memory.host_peak.map(bytes)),
+        row(runs, "most used on the device", |run| run.info.memory.device_peak.map(bytes)),
+        row(runs, "most used in the host's memory", |run| run.info.memory.host_peak.map(bytes)),
     ];
     html! {
-        h3 { "Memory" }
-        (columns(runs, &rows))
-        @if let [run] = runs { (buffers(run)) }
-        h3 { "Time by pass" }
+        h3 { "Time of a step by stage" }
         @for (index, run) in runs.iter().enumerate() {
             @if runs.len() > 1 { p { (run_name(index, run)) } }
             @match &run.profile {
@@ -42,6 +42,9 @@ pub(super) fn costs(runs: &[Ran]) -> Markup {
                 }
             }
         }
+        h3 { "Memory" }
+        (columns(runs, &rows))
+        @if let [run] = runs { (buffers(run)) }
     }
 }
 
@@ -59,12 +62,38 @@ fn buffers(run: &Ran) -> Markup {
     }
 }
 
+/// A bar for each of the largest stages and one for the others; all passes on demand.
 fn passes(passes: &[Pass]) -> Markup {
-    let largest = passes.iter().map(|pass| pass.share).fold(f64::MIN_POSITIVE, f64::max);
-    bars(passes.iter().map(|pass| {
-        let title = if pass.name.is_empty() { pass.stage.clone() } else { format!("{}: {}", pass.stage, pass.name) };
-        let time = format!("{} ms, {} %", number(Some(pass.ms), 3), number(Some(100.0 * pass.share), 1));
-        (title, time, pass.share / largest)
+    let mut stages: Vec<(String, f64, f64)> = Vec::new();
+    for pass in passes {
+        match stages.iter_mut().find(|stage| stage.0 == pass.stage) {
+            Some(stage) => (stage.1, stage.2) = (stage.1 + pass.ms, stage.2 + pass.share),
+            None => stages.push((pass.stage.clone(), pass.ms, pass.share)),
+        }
+    }
+    let mut by_share: Vec<f64> = stages.iter().map(|stage| stage.2).collect();
+    by_share.sort_by(|a, b| b.total_cmp(a));
+    let least = by_share.get(STAGES_MAX - 1).copied().unwrap_or(0.0);
+    let (large, small): (Vec<_>, Vec<_>) = stages.into_iter().partition(|stage| stage.2 >= least);
+    let rest = small.iter().fold((0.0, 0.0), |sum, stage| (sum.0 + stage.1, sum.1 + stage.2));
+    let rest = (!small.is_empty()).then(|| ("others".to_owned(), rest.0, rest.1));
+    let title = |pass: &Pass| {
+        if pass.name.is_empty() { pass.stage.clone() } else { format!("{}: {}", pass.stage, pass.name) }
+    };
+    html! {
+        (times(large.into_iter().chain(rest).collect()))
+        details {
+            summary { "All " (passes.len()) " passes" }
+            (times(passes.iter().map(|pass| (title(pass), pass.ms, pass.share)).collect()))
+        }
+    }
+}
+
+/// Bars of names, times in ms, and shares.
+fn times(rows: Vec<(String, f64, f64)>) -> Markup {
+    let largest = rows.iter().map(|row| row.2).fold(f64::MIN_POSITIVE, f64::max);
+    bars(rows.into_iter().map(|(name, ms, share)| {
+        (name, format!("{} ms, {} %", significant(ms), number(Some(100.0 * share), 1)), share / largest)
     }))
 }
 

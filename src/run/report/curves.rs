@@ -1,57 +1,70 @@
 //! Curves over the steps.
 
 use super::load::Ran;
-use crate::report::{Chart, Mark, Series};
+use crate::report::text::{DECIBELS, SCORE};
+use crate::report::{Chart, Digits, Mark, Scale, Series};
 use crate::run::history::{Entry, Scored, Steps};
 use maud::{Markup, html};
+use std::collections::BTreeMap;
 
 /// Most marks of a kind that may come often.
 const MARKS_MAX: usize = 12;
+/// Least length of the axes of PSNR, dB, and IoU.
+const SPANS: (f64, f64) = (5.0, 0.1);
 
 /// Returns all charts.
 pub(super) fn curves(runs: &[Ran]) -> Markup {
     if runs.iter().all(|run| run.history.is_empty()) {
         return html! { p.quiet { "There is no history.jsonl." } };
     }
-    let marks: Vec<Mark> =
-        runs.iter().enumerate().flat_map(|(index, run)| marks(run, (runs.len() > 1).then_some(index))).collect();
+    let marks = marks(runs);
     let mut charts = losses(runs);
-    charts.push(chart("PSNR", "dB", views_of(runs, |scored| scored.psnr)));
-    charts.push(chart("IoU of labels", "mean over objects", views_of(runs, |scored| scored.iou)));
-    charts.push(Chart { from_zero: true, ..chart("Gaussians", "", steps_of(runs, |steps| steps.gaussians.into())) });
-    charts.push(Chart { from_zero: true, ..chart("Time of a step", "ms", steps_of(runs, |steps| steps.ms)) });
+    charts.push(Chart {
+        least_span: SPANS.0,
+        digits: Digits::Fixed(DECIBELS),
+        ..chart("PSNR", "dB", views_of(runs, |scored| scored.psnr))
+    });
+    charts.push(Chart {
+        least_span: SPANS.1,
+        ceiling: Some(1.0),
+        digits: Digits::Fixed(SCORE),
+        ..chart("IoU of labels", "mean over objects", views_of(runs, |scored| scored.iou))
+    });
+    charts.push(Chart {
+        scale: Scale::FromZero,
+        digits: Digits::Count,
+        ..chart("Gaussians", "", steps_of(runs, |steps| steps.gaussians.into()))
+    });
+    charts.push(Chart { scale: Scale::FromZero, ..chart("Time of a step", "ms", steps_of(runs, |steps| steps.ms)) });
     html! {
         p.quiet {
-            "Points are means over ten steps, of one photo each; PSNR and IoU are of the view of the previews, and of all \
-             held-out views at the end. Dashed lines are events."
+            "Each point of a loss is the mean over ten steps. PSNR and IoU are those of one view during the training, and \
+             of all held-out views at the end."
         }
-        div.charts { @for chart in charts { (Chart { marks: marks.clone(), ..chart }.markup()) } }
+        div.charts {
+            @for (index, chart) in charts.into_iter().enumerate() {
+                (Chart { marks: marks.clone(), has_legend: index == 0, ..chart }.markup())
+            }
+        }
     }
 }
 
 /// The parts of the loss: in one chart for one run, in a chart each for several.
 fn losses(runs: &[Ran]) -> Vec<Chart> {
-    let parts: [(&str, fn(&Steps) -> f64); 5] = [
-        ("photo loss", |steps| steps.loss),
+    let parts: [(&str, fn(&Steps) -> f64); 4] = [
+        ("Photo loss", |steps| steps.loss),
         ("L1", |steps| steps.l1),
         ("1 − SSIM", |steps| 1.0 - steps.ssim),
-        ("label loss", |steps| steps.label_loss),
-        ("largest photo loss of ten steps", |steps| steps.loss_max),
+        ("Label loss", |steps| steps.label_loss),
     ];
-    let is_there = |part: &(&str, fn(&Steps) -> f64)| {
-        part.0 != "label loss" || runs.iter().flat_map(|run| &run.history).any(is_labelled)
-    };
-    let parts = parts.into_iter().filter(is_there);
+    let has_labels = runs.iter().flat_map(|run| &run.history).any(is_labelled);
+    let parts = parts.into_iter().filter(|part| part.0 != "Label loss" || has_labels);
+    let on_log = |title: &str, note: &str, series| Chart { scale: Scale::Logarithmic, ..chart(title, note, series) };
     if let [run] = runs {
-        let (worst, parts): (Vec<_>, Vec<_>) = parts.partition(|part| part.0.starts_with("largest"));
-        let series = parts.into_iter().enumerate().map(|(index, (name, value))| of_steps(run, name, index, value));
-        let worst = worst.into_iter().map(|(name, value)| of_steps(run, name, 1, value));
-        return vec![
-            Chart { from_zero: true, ..chart("Loss", "", series.collect()) },
-            Chart { from_zero: true, ..chart("Largest photo loss of ten steps", "", worst.collect()) },
-        ];
+        let series = parts.enumerate().map(|(index, (name, value))| of_steps(run, name, index, value));
+        return vec![on_log("Loss", "logarithmic", series.collect())];
     }
-    parts.map(|(name, value)| Chart { from_zero: true, ..chart(name, "", steps_of(runs, value)) }).collect()
+    parts.map(|(name, value)| on_log(name, "logarithmic", steps_of(runs, value))).collect()
 }
 
 fn is_labelled(entry: &Entry) -> bool {
@@ -91,38 +104,52 @@ fn views_of(runs: &[Ran], value: impl Fn(&Scored) -> Option<f64>) -> Vec<Series>
     series
 }
 
-/// Events of a run. Those of several runs have the colours of the runs.
-fn marks(run: &Ran, colour: Option<usize>) -> Vec<Mark> {
-    let train = &run.settings.train;
-    let last = f64::from(train.iterations);
-    let mark = |step: u32, text: &str| {
-        let text = if colour.is_some() { format!("{}: {text}", run.name) } else { text.to_owned() };
-        Mark { step: f64::from(step), text, colour }
+/// Events by step. Those of one of several runs have its name and colour; those of all runs have neither.
+fn marks(runs: &[Ran]) -> Vec<Mark> {
+    let mut known: BTreeMap<u32, Vec<(&str, Vec<usize>)>> = BTreeMap::new();
+    for (index, run) in runs.iter().enumerate() {
+        for (step, text) in events(run) {
+            let of_step = known.entry(step).or_default();
+            match of_step.iter_mut().find(|(other, _)| *other == text) {
+                Some((_, of)) if of.contains(&index) => {}
+                Some((_, of)) => of.push(index),
+                None => of_step.push((text, vec![index])),
+            }
+        }
+    }
+    let mark = |(step, events): (u32, Vec<(&str, Vec<usize>)>)| {
+        let is_of_all = |of: &[usize]| of.len() == runs.len();
+        let text = |(text, of): &(&str, Vec<usize>)| {
+            let names: Vec<&str> = of.iter().map(|&index| runs[index].name.as_str()).collect();
+            if is_of_all(of) { (*text).to_owned() } else { format!("{text} ({})", names.join(", ")) }
+        };
+        let colour = match events.as_slice() {
+            [(_, of)] if of.len() == 1 && !is_of_all(of) => of.first().copied(),
+            _ => None,
+        };
+        Mark { step: f64::from(step), text: events.iter().map(text).collect::<Vec<_>>().join(", "), colour }
     };
-    let mut marks = vec![mark(train.densify_until(), "growth ends")];
-    if run.info.masks.is_some() {
-        marks.push(mark(train.labels_from(), "labels begin"));
-    }
+    known.into_iter().map(mark).collect()
+}
+
+/// Events of a run with their steps.
+fn events(run: &Ran) -> Vec<(u32, &'static str)> {
+    let train = &run.settings.train;
+    let mut events = Vec::new();
     if train.full_size_from() > 0 {
-        marks.push(mark(train.full_size_from(), "photos at full size"));
+        events.push((train.full_size_from(), "photos at full size"));
     }
+    if run.info.masks.is_some() {
+        events.push((train.labels_from(), "labels begin"));
+    }
+    events.push((train.densify_until(), "growth ends"));
     let again = run.info.parts.iter().filter(|part| part.after > 0).take(MARKS_MAX);
-    marks.extend(again.map(|part| mark(part.after, "went on")));
+    events.extend(again.map(|part| (part.after, "resumed")));
     let warned = run.history.iter().filter_map(|entry| match entry {
         Entry::Warning { step, .. } => Some(*step),
         _ => None,
     });
-    marks.extend(warned.take(MARKS_MAX).map(|step| mark(step, "warning")));
-    marks.retain(|mark| mark.step > 0.0 && mark.step < last);
-    marks.sort_by(|a, b| a.step.total_cmp(&b.step));
-    // Events of one step share a mark.
-    let mut joined: Vec<Mark> = Vec::new();
-    for mark in marks {
-        match joined.last_mut().filter(|before| before.step == mark.step && colour.is_none()) {
-            Some(before) if before.text.contains(&mark.text) => {}
-            Some(before) => before.text += &format!(", {}", mark.text),
-            None => joined.push(mark),
-        }
-    }
-    joined
+    events.extend(warned.take(MARKS_MAX).map(|step| (step, "warning")));
+    events.retain(|event| event.0 > 0 && event.0 < train.iterations);
+    events
 }

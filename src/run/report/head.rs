@@ -2,43 +2,62 @@
 
 use super::load::Ran;
 use super::{columns, row, run_name};
-use crate::report::text::{bytes, count, duration, number, utc};
+use crate::report::text::{DECIBELS, SCORE, bytes, count, duration, number, utc};
 use crate::run::Settings;
 use maud::{Markup, html};
+use std::path::Path;
 
 /// What a run decides by itself where the default leaves it open.
 const AUTOMATIC: &str = "by the scene and the length of the run";
 
+/// Returns the title: the name of the scene, or that of the run where a run does not tell.
+pub(super) fn title(runs: &[Ran]) -> String {
+    let scene = |run: &Ran| {
+        let name = Path::new(&run.info.scene).file_name();
+        name.map_or_else(|| run.name.clone(), |name| name.to_string_lossy().into_owned())
+    };
+    let mut scenes: Vec<String> = runs.iter().map(scene).collect();
+    scenes.dedup();
+    match (runs, scenes.as_slice()) {
+        ([_], [scene]) => scene.clone(),
+        (_, [scene]) => format!("{scene}: {} runs", runs.len()),
+        _ => format!("{} runs", runs.len()),
+    }
+}
+
 /// Returns the line below the title.
 pub(super) fn lead(runs: &[Ran]) -> Markup {
     let [run] = runs else {
-        return html! { p.quiet { "Trainings of labelgs beside each other." } };
+        return html! { p.quiet { "Trainings with labelgs, side by side." } };
     };
     let state = match run.info.ended {
-        Some(ended) if ended.stopped => "was stopped",
-        Some(_) => "has ended",
-        None => "has not ended",
+        Some(ended) if ended.stopped => "stopped",
+        Some(_) => "finished",
+        None => "not finished",
     };
     let of = run.settings.train.iterations;
-    html! { p.quiet { "A training of labelgs. It " (state) ": " (count(run.steps().into())) " of " (count(of.into())) " steps." } }
+    html! {
+        p.quiet {
+            "labelgs training, " (state) ": " (count(run.steps().into())) " of " (count(of.into())) " steps"
+            @if let Some(gaussians) = run.gaussians() { ", " (count(gaussians)) " Gaussians" }
+        }
+    }
 }
 
 /// Returns the main numbers.
 pub(super) fn numbers(runs: &[Ran]) -> Markup {
-    let rows = [
-        row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), 2) + " dB")),
-        row(runs, "SSIM", |run| run.test()?.ssim.map(|value| number(Some(value), 4))),
-        row(runs, "IoU of labels", |run| run.test()?.iou_map.map(|value| number(Some(value), 4))),
-        row(runs, "IoU of objects, visible parts", |run| run.test()?.iou_object.map(|value| number(Some(value), 4))),
-        row(runs, "Gaussians", |run| run.gaussians().map(count)),
+    let score = |value: f64| number(Some(value), SCORE);
+    let main = [
+        row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBELS) + " dB")),
+        row(runs, "SSIM", |run| run.test()?.ssim.map(score)),
+        row(runs, "IoU of labels", |run| run.test()?.iou_map.map(score)),
         row(runs, "Time", |run| run.seconds().map(duration)),
-        row(runs, "Device memory", |run| run.info.memory.device_peak.map(bytes)),
-        row(runs, "Host memory", |run| run.info.memory.host_peak.map(bytes)),
     ];
     if runs.len() > 1 {
-        return columns(runs, &rows);
+        let size = row(runs, "Gaussians", |run| run.gaussians().map(count));
+        return columns(runs, &main.into_iter().chain([size]).chain(more_numbers(runs)).collect::<Vec<_>>());
     }
-    let tiles = rows.iter().filter_map(|(name, cells)| Some((name, cells.first()?.as_ref()?)));
+    let tiles = main.iter().filter_map(|(name, cells)| Some((name, cells.first()?.as_ref()?)));
     let unscored = runs[0].test().is_none_or(|test| test.psnr.is_none());
     html! {
         dl.numbers { @for (name, value) in tiles { div { dt { (name) } dd { (value) } } } }
@@ -46,10 +65,20 @@ pub(super) fn numbers(runs: &[Ran]) -> Markup {
     }
 }
 
+/// Numbers for a second look.
+fn more_numbers(runs: &[Ran]) -> [(String, Vec<Option<String>>); 3] {
+    let objects = "IoU of objects, visible parts";
+    [
+        row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE))),
+        row(runs, "Device memory", |run| run.info.memory.device_peak.map(bytes)),
+        row(runs, "Host memory", |run| run.info.memory.host_peak.map(bytes)),
+    ]
+}
+
 /// Returns command, version, device and inputs.
 pub(super) fn what(runs: &[Ran]) -> Markup {
     let part = |run: &Ran| run.info.parts.last().cloned();
-    let rows = [
+    let mut rows = vec![
         row(runs, "scene", |run| Some(run.info.scene.clone()).filter(|scene| !scene.is_empty())),
         row(runs, "masks", |run| run.info.masks.clone()),
         row(runs, "views", |run| {
@@ -59,8 +88,8 @@ pub(super) fn what(runs: &[Ran]) -> Markup {
         row(runs, "seed", |run| Some(run.settings.train.seed.to_string())),
         row(runs, "device", |run| Some(part(run)?.device)),
         row(runs, "labelgs", |run| Some(part(run)?.labelgs)),
-        row(runs, "began", |run| Some(utc(run.info.parts.first()?.began))),
-        row(runs, "went on", |run| {
+        row(runs, "started", |run| Some(utc(run.info.parts.first()?.began))),
+        row(runs, "resumed", |run| {
             let again = run.info.parts.iter().filter(|part| part.after > 0);
             let again: Vec<String> =
                 again.map(|part| format!("after step {} on {}", count(part.after.into()), utc(part.began))).collect();
@@ -68,28 +97,33 @@ pub(super) fn what(runs: &[Ran]) -> Markup {
         }),
         row(runs, "folder", |run| Some(run.name.clone())),
     ];
+    if runs.len() == 1 {
+        rows.extend(more_numbers(runs));
+    }
     html! {
-        @for (index, run) in runs.iter().enumerate() {
-            @for command in run.info.parts.iter().filter_map(|part| part.command.as_deref()) {
-                @if runs.len() > 1 { p { (run_name(index, run)) } }
-                pre.command { (command) }
+        div.commands {
+            @for (index, run) in runs.iter().enumerate() {
+                @for command in run.info.parts.iter().filter_map(|part| part.command.as_deref()) {
+                    @if runs.len() > 1 { (run_name(index, run)) }
+                    pre.command { (command) }
+                }
             }
         }
-        div.below { (columns(runs, &rows)) }
+        (columns(runs, &rows))
     }
 }
 
-/// Returns all warnings.
-pub(super) fn warnings(runs: &[Ran]) -> Markup {
+/// Returns all warnings; none if there are none.
+pub(super) fn warnings(runs: &[Ran]) -> Option<Markup> {
     let of = |run: &Ran| run.info.parts.iter().flat_map(|part| part.warnings.clone()).collect::<Vec<String>>();
-    html! {
-        @for (index, run) in runs.iter().enumerate() {
-            @let all = of(run);
-            @if runs.len() > 1 { h3 { (run_name(index, run)) } }
-            @if all.is_empty() { p.quiet { "None." } }
-            @else { ul.warnings { @for text in &all { li { (text) } } } }
+    let all: Vec<(usize, Vec<String>)> = runs.iter().map(of).enumerate().filter(|(_, all)| !all.is_empty()).collect();
+    let markup = html! {
+        @for (index, all) in &all {
+            @if runs.len() > 1 { h3 { (run_name(*index, &runs[*index])) } }
+            ul.warnings { @for text in all { li { (text) } } }
         }
-    }
+    };
+    (!all.is_empty()).then_some(markup)
 }
 
 /// Returns the settings that differ from the defaults, or between the runs.
@@ -107,15 +141,15 @@ pub(super) fn settings(runs: &[Ran]) -> Markup {
     html! {
         @if rows.is_empty() { p { "All settings are the defaults." } }
         @else {
-            p.quiet { "Settings that are not the default; all others are." }
+            p.quiet { "The settings that are not the default, by their names in config.toml." }
             div.scroll {
                 table {
                     thead {
                         tr {
-                            th { "setting" }
-                            @if let [_] = runs { th { "value" } }
+                            th { "Setting" }
+                            @if let [_] = runs { th { "Value" } }
                             @else { @for (index, run) in runs.iter().enumerate() { th { (run_name(index, run)) } } }
-                            th { "default" }
+                            th { "Default" }
                         }
                     }
                     tbody {

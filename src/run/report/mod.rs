@@ -45,27 +45,24 @@ pub(crate) fn write_with(folders: &[PathBuf], path: &Path, text: &str) -> Result
 }
 
 fn compose(runs: &[Ran], text: &str) -> Result<String> {
-    let title = match runs {
-        [run] => run.name.clone(),
-        _ => format!("{} runs", runs.len()),
-    };
-    let parts = [
-        ("", head::numbers(runs)),
-        ("What was run", head::what(runs)),
-        ("Curves", curves::curves(runs)),
-        ("Objects", objects::objects(runs)),
-        ("Views", views::views(runs)?),
-        ("Time and memory", costs::costs(runs)),
-        ("Warnings", head::warnings(runs)),
-        ("Settings", head::settings(runs)),
-    ];
+    let mut book = views::Book::default();
+    let (first, views) = views::views(&mut book, runs)?;
+    let objects = objects::objects(&mut book, runs)?;
     let body = html! {
+        (first)
+        (head::numbers(runs))
         @if !text.is_empty() { div.scroll { pre { (text) } } }
-        @for (title, part) in &parts {
-            @if title.is_empty() { (part) } @else { (section(title, part)) }
-        }
+        @if let Some(warnings) = head::warnings(runs) { (section("Warnings", &warnings)) }
+        (section("Curves", &curves::curves(runs)))
+        (section("Objects", &objects))
+        (section("Views", &views))
+        (section("Time and memory", &costs::costs(runs)))
+        (section("Run and settings", &html! {
+            details { summary { "Commands and inputs" } (head::what(runs)) }
+            details { summary { "Settings" } (head::settings(runs)) }
+        }))
     };
-    Ok(page(&title, &head::lead(runs), &body))
+    Ok(page(&head::title(runs), &head::lead(runs), &body))
 }
 
 /// Returns a table with a column for each run; rows without any value are left out.

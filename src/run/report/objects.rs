@@ -2,14 +2,16 @@
 
 use super::load::Ran;
 use super::run_name;
-use crate::report::text::{count, number};
-use crate::run::ObjectSummary;
+use super::views::Book;
+use crate::Result;
+use crate::report::text::{DECIBELS, SCORE, count, number};
+use crate::run::{ObjectSummary, thumbnails};
 use crate::scene::labels::label_colour;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
 /// Returns the table of all objects.
-pub(super) fn objects(runs: &[Ran]) -> Markup {
+pub(super) fn objects(book: &mut Book, runs: &[Ran]) -> Result<Markup> {
     let of = |run: &Ran| run.metrics.as_ref().map(|metrics| metrics.objects.clone()).unwrap_or_default();
     let all: Vec<BTreeMap<u32, ObjectSummary>> =
         runs.iter().map(|run| of(run).into_iter().map(|object| (object.id, object)).collect()).collect();
@@ -22,35 +24,49 @@ pub(super) fn objects(runs: &[Ran]) -> Markup {
     }
     ids.sort();
     if ids.is_empty() {
-        return html! { p.quiet { "There are none: the run has no masks, or has not ended." } };
+        return Ok(html! { p.quiet { "There are none: the run has no masks, or has not ended." } });
     }
-    match all.as_slice() {
-        [one] => single(one.values()),
-        _ => several(runs, &all, &ids),
+    // Objects look alike in all runs.
+    let mut pictures = BTreeMap::new();
+    for &(id, _) in &ids {
+        for run in runs {
+            if let Some(source) = book.source(&thumbnails::path(&run.folder, id))? {
+                pictures.insert(id, source);
+                break;
+            }
+        }
     }
+    Ok(match all.as_slice() {
+        [one] => single(one.values(), &pictures),
+        _ => several(runs, &all, &ids, &pictures),
+    })
 }
 
-fn single<'a>(objects: impl Iterator<Item = &'a ObjectSummary>) -> Markup {
+/// Pictures by object.
+type Pictures = BTreeMap<u32, String>;
+
+fn single<'a>(objects: impl Iterator<Item = &'a ObjectSummary>, pictures: &Pictures) -> Markup {
     html! {
         div.scroll {
-            table.sortable.wide {
+            table.sortable.wide.cards.pictured[!pictures.is_empty()] {
                 thead {
                     tr {
-                        th { "object" } th.right { "id" } th.right { "Gaussians" } th.right { "confidence" }
-                        th.right { "IoU" } th.right { "PSNR, dB" } th { "worst view" } th.right { "IoU there" }
+                        th { "Object" } th.right { "Label" } th.right { "Gaussians" } th.right { "Confidence" }
+                        th.right { "IoU" } th.right { "PSNR, dB" } th.right { "Worst IoU" } th.right { "in view" }
                     }
                 }
                 tbody {
                     @for object in objects {
+                        @let worst = object.worst_view.as_deref().unwrap_or("–");
                         tr {
-                            (title(object.id, object.name.as_deref()))
-                            (cell(Some(f64::from(object.id)), 0))
-                            td.right data-value=(object.gaussians) { (count(object.gaussians)) }
-                            (cell(object.confidence, 3))
-                            (cell(object.iou, 4))
-                            (cell(object.psnr, 2))
-                            td { (object.worst_view.as_deref().unwrap_or("–")) }
-                            (cell(object.worst_iou, 4))
+                            (title(object.id, object.name.as_deref(), pictures))
+                            (cell("Label", Some(f64::from(object.id)), 0))
+                            td.right data-title="Gaussians" data-value=(object.gaussians) { (count(object.gaussians)) }
+                            (cell("Confidence", object.confidence, SCORE))
+                            (cell("IoU", object.iou, SCORE))
+                            (cell("PSNR, dB", object.psnr, DECIBELS))
+                            (cell("Worst IoU", object.worst_iou, SCORE))
+                            td.right data-title="in view" { (worst) }
                         }
                     }
                 }
@@ -60,24 +76,29 @@ fn single<'a>(objects: impl Iterator<Item = &'a ObjectSummary>) -> Markup {
 }
 
 /// IoU, PSNR and Gaussians by run.
-fn several(runs: &[Ran], all: &[BTreeMap<u32, ObjectSummary>], ids: &[(u32, Option<String>)]) -> Markup {
+fn several(
+    runs: &[Ran],
+    all: &[BTreeMap<u32, ObjectSummary>],
+    ids: &[(u32, Option<String>)],
+    pictures: &Pictures,
+) -> Markup {
     html! {
         div.scroll {
-            table.sortable {
+            table.sortable.pictured[!pictures.is_empty()] {
                 thead {
                     tr {
-                        th { "object" } th.right { "id" }
+                        th { "Object" } th.right { "Label" }
                         @for (index, run) in runs.iter().enumerate() { th.right { "IoU " (run_name(index, run)) } }
-                        @for (index, run) in runs.iter().enumerate() { th.right { "PSNR " (run_name(index, run)) } }
+                        @for (index, run) in runs.iter().enumerate() { th.right { "PSNR, dB " (run_name(index, run)) } }
                     }
                 }
                 tbody {
                     @for (id, name) in ids {
                         tr {
-                            (title(*id, name.as_deref()))
-                            (cell(Some(f64::from(*id)), 0))
-                            @for run in all { (cell(run.get(id).and_then(|object| object.iou), 4)) }
-                            @for run in all { (cell(run.get(id).and_then(|object| object.psnr), 2)) }
+                            (title(*id, name.as_deref(), pictures))
+                            (cell("Label", Some(f64::from(*id)), 0))
+                            @for run in all { (cell("IoU", run.get(id).and_then(|object| object.iou), SCORE)) }
+                            @for run in all { (cell("PSNR, dB", run.get(id).and_then(|object| object.psnr), DECIBELS)) }
                         }
                     }
                 }
@@ -86,15 +107,20 @@ fn several(runs: &[Ran], all: &[BTreeMap<u32, ObjectSummary>], ids: &[(u32, Opti
     }
 }
 
-/// The colour and name of an object.
-fn title(id: u32, name: Option<&str>) -> Markup {
+/// The picture, colour and name of an object.
+fn title(id: u32, name: Option<&str>, pictures: &Pictures) -> Markup {
     let [r, g, b] = label_colour(id);
     let name = name.map_or_else(|| format!("object {id}"), str::to_owned);
-    html! { td data-value=(name) { i.swatch style=(format!("background:rgb({r},{g},{b})")) {} " " (name) } }
+    html! {
+        td data-value=(name) {
+            @if let Some(source) = pictures.get(&id) { img.thumb alt="" loading="lazy" src=(source); }
+            i.swatch style=(format!("background:rgb({r},{g},{b})")) {} " " (name)
+        }
+    }
 }
 
-/// A number that tables are sorted by.
-fn cell(value: Option<f64>, digits: usize) -> Markup {
+/// A number that tables are sorted by, with the title of its column for narrow screens.
+fn cell(title: &str, value: Option<f64>, digits: usize) -> Markup {
     let key = value.map_or(String::new(), |value| value.to_string());
-    html! { td.right data-value=(key) { (number(value, digits)) } }
+    html! { td.right data-title=(title) data-value=(key) { (number(value, digits)) } }
 }

@@ -3,31 +3,38 @@
 use super::load::Ran;
 use crate::error::Result;
 use crate::files::read;
-use crate::report::text::number;
+use crate::report::text::{DECIBELS, SCORE, number};
 use crate::report::{Figure, Panel};
 use crate::run::info::Pictured;
-use crate::run::pictures::{KINDS, path};
+use crate::run::pictures::{HEAT, KINDS, path};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
+use std::path::Path;
 
+/// Names of the pictures that are shown at once.
+const FIRST: [&str; 3] = [KINDS[0].0, KINDS[1].0, KINDS[2].0];
 /// Most bytes of all pictures in a page, before they become text.
 const BYTES_MAX: u64 = 12 << 20;
 
-/// Returns the pictures, the worst views first.
-pub(super) fn views(runs: &[Ran]) -> Result<Markup> {
-    let mut book = Book::default();
-    let figures = match runs {
-        [run] => run.info.pictures.iter().map(|view| single(&mut book, run, view)).collect::<Result<Vec<_>>>()?,
-        _ => several(&mut book, runs)?,
+/// Returns the figure that stands first, and the other pictures.
+pub(super) fn views(book: &mut Book, runs: &[Ran]) -> Result<(Markup, Markup)> {
+    let mut figures = match runs {
+        [run] => run.info.pictures.iter().map(|view| single(book, run, view)).collect::<Result<Vec<_>>>()?,
+        _ => several(book, runs)?,
     };
-    let figures: Vec<&Figure> = figures.iter().filter(|figure| !figure.panels.is_empty()).collect();
-    Ok(html! {
-        @if figures.is_empty() { p.quiet { "There are no pictures: the run has not ended, or holds out no views." } }
-        @else { p.quiet { "The held-out views with the lowest PSNR." } }
-        @for figure in figures { (figure.markup()) }
+    figures.retain(|figure| !figure.panels.is_empty());
+    // The worst view is no picture of the whole run, and neither is the best.
+    let middle = figures.len() / 2;
+    let first = (!figures.is_empty()).then(|| Figure { is_large: true, ..figures.remove(middle) });
+    let rest = html! {
+        @if first.is_none() { p.quiet { "There are no pictures: the run has not ended, or holds out no views." } }
+        @else if figures.is_empty() { p.quiet { "All pictures are at the top." } }
+        @else { p.quiet { "Other held-out views, the lowest PSNR first." } }
+        @for figure in &figures { (figure.markup()) }
         @if book.is_full { p.quiet { "More pictures would make this page too large." } }
-    })
+    };
+    Ok((html! { @if let Some(first) = first { (first.markup()) } }, rest))
 }
 
 fn single(book: &mut Book, run: &Ran, view: &Pictured) -> Result<Figure> {
@@ -35,10 +42,12 @@ fn single(book: &mut Book, run: &Ran, view: &Pictured) -> Result<Figure> {
     for (name, file) in KINDS {
         panels.extend(book.panel(run, view.number, file, name)?);
     }
-    let numbers = [("PSNR", view.psnr, 2, " dB"), ("SSIM", view.ssim, 4, ""), ("IoU", view.iou, 4, "")];
+    let numbers = [("PSNR", view.psnr, DECIBELS, " dB"), ("SSIM", view.ssim, SCORE, ""), ("IoU", view.iou, SCORE, "")];
     let numbers = numbers.into_iter().filter(|(_, value, ..)| value.is_some());
     let numbers = numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
-    Ok(Figure { view: view.view.clone(), numbers, panels, ..Figure::default() })
+    // Masks and errors are for a second look.
+    let (more, panels) = panels.into_iter().partition(|panel: &Panel| !FIRST.contains(&panel.name.as_str()));
+    Ok(Figure { view: view.view.clone(), numbers, panels, more, ..Figure::default() })
 }
 
 /// The photo of each view, and what each run makes of it.
@@ -58,7 +67,7 @@ fn several(book: &mut Book, runs: &[Ran]) -> Result<Vec<Figure>> {
                 figure.panels.extend(book.panel(run, view.number, KINDS[0].1, KINDS[0].0)?);
             }
             figure.panels.extend(book.panel(run, view.number, KINDS[1].1, &run.name)?);
-            figure.numbers.push((run.name.clone(), number(view.psnr, 2) + " dB"));
+            figure.numbers.push((run.name.clone(), number(view.psnr, DECIBELS) + " dB"));
         }
         figures.push(figure);
     }
@@ -67,7 +76,7 @@ fn several(book: &mut Book, runs: &[Ran]) -> Result<Vec<Figure>> {
 
 /// The pictures of a page.
 #[derive(Default)]
-struct Book {
+pub(super) struct Book {
     bytes: u64,
     is_full: bool,
 }
@@ -75,16 +84,20 @@ struct Book {
 impl Book {
     /// Returns a picture of a view if there is one, and room for it.
     fn panel(&mut self, run: &Ran, number: u32, file: &str, name: &str) -> Result<Option<Panel>> {
-        let path = path(&run.folder, number, file);
-        let Ok(found) = std::fs::metadata(&path) else { return Ok(None) };
+        let source = self.source(&path(&run.folder, number, file))?;
+        Ok(source.map(|source| Panel { name: name.to_owned(), source, is_heat: file == HEAT }))
+    }
+
+    /// Returns the address of a picture inside the page if there is one, and room for it.
+    pub(super) fn source(&mut self, path: &Path) -> Result<Option<String>> {
+        let Ok(found) = std::fs::metadata(path) else { return Ok(None) };
         if !found.is_file() || self.is_full || self.bytes + found.len() > BYTES_MAX {
             self.is_full |= found.is_file();
             return Ok(None);
         }
-        let bytes = read::bytes(&path)?;
+        let bytes = read::bytes(path)?;
         self.bytes += bytes.len() as u64;
-        let kind = if file.ends_with(".png") { "png" } else { "jpeg" };
-        let source = format!("data:image/{kind};base64,{}", STANDARD.encode(bytes));
-        Ok(Some(Panel { name: name.to_owned(), source }))
+        let kind = if path.extension().is_some_and(|ending| ending == "png") { "png" } else { "jpeg" };
+        Ok(Some(format!("data:image/{kind};base64,{}", STANDARD.encode(bytes))))
     }
 }
