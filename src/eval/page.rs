@@ -8,7 +8,7 @@ use crate::report::text::{DECIBELS, SCORE};
 use crate::report::{Figure, Panel, page, section};
 use crate::scene::colour::to_byte;
 use crate::{Error, Result};
-use maud::{PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use std::path::{Path, PathBuf};
 
 /// Colours in the difference of two masks.
@@ -34,7 +34,7 @@ impl Page {
     }
 
     /// Writes `index.html`, with `summary` above the pictures.
-    pub fn finish(self, summary: &str) -> Result<PathBuf> {
+    pub fn finish(self, summary: &Markup) -> Result<PathBuf> {
         let path = self.folder.join("index.html");
         let pictures = html! {
             p.quiet {
@@ -44,7 +44,7 @@ impl Page {
             // Escaped by `Figure::markup`.
             (PreEscaped(&self.figures))
         };
-        let body = html! { div.scroll { pre { (summary) } } (section("Pictures", &pictures)) };
+        let body = html! { (summary) (section("Pictures", &pictures)) };
         let page = page("Scores", &html! { p.quiet { "A model of labelgs against its ground truth." } }, &body);
         atomic::write(&path, |out| out.write_all(page.as_bytes()))?;
         Ok(path)

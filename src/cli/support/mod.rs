@@ -21,7 +21,7 @@ pub(crate) mod shell_words;
 pub(crate) mod signals;
 pub(crate) mod stage_progress;
 pub(crate) mod stdout;
-pub(crate) mod table;
+pub(crate) mod tables;
 
 pub(crate) use args::{FileArgs, GlobalArgs, ReadArgs, SceneArgs};
 pub(crate) use context::{Context, open_model};

@@ -7,6 +7,7 @@ use crate::cli::support::log::Progress;
 use crate::cli::support::model_drawer::MemoryArg;
 use crate::cli::support::model_edit::MinConfidenceArg;
 use crate::cli::support::parsers::near;
+use crate::cli::support::tables::Parts;
 use crate::eval::compared::{Compared, Watch};
 use crate::eval::page::Page;
 use clap::Args;
@@ -56,10 +57,10 @@ impl Watcher {
     }
 
     /// Writes the page.
-    pub(crate) fn finish(self, summary: &str) -> Result<()> {
+    pub(crate) fn finish(self, summary: &Parts) -> Result<()> {
         drop(self.progress);
         if let Some(page) = self.page {
-            let path = page.finish(summary)?;
+            let path = page.finish(&summary.markup())?;
             tracing::info!("page: {}", path.display());
         }
         Ok(())

@@ -123,7 +123,7 @@ fn the_page_shows_each_picture_and_needs_no_network() {
     };
     page.see(&picture).expect("written");
     page.see(&Compared::new("b", &photo, &rgb)).expect("written");
-    let index = page.finish("mean <1>").expect("written");
+    let index = page.finish(&maud::html! { "mean <1>" }).expect("written");
     let html = std::fs::read_to_string(index).expect("HTML");
     assert!(html.contains("&lt;cup&gt; &amp; saucer") && html.contains("iou 0.250") && html.contains("mean &lt;1&gt;"));
     assert!(!html.contains("://") && !html.contains("<cup>") && !html.contains("psnr"), "{html}");

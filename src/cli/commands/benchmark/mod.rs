@@ -3,7 +3,8 @@
 mod table;
 
 use crate::cli::support::{
-    Context, SceneArgs, ScoreArgs, TableArg, Watcher, near_plane, open_gpu, open_model, open_scene, require_labels,
+    Context, SceneArgs, ScoreArgs, TableArg, Watcher, near_plane, open_gpu, open_model, open_scene,
+    require_labels,
 };
 use crate::engine::{Engine, EngineSize};
 use crate::eval::lpips::Weights;
@@ -21,7 +22,7 @@ use crate::{Error, Result};
 use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use table::table;
+use table::tables;
 
 /// `labelgs benchmark`.
 #[derive(Args, Clone, Debug)]
@@ -94,9 +95,9 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let min_confidence = args.scoring.sure.min_confidence;
     let mut whole = Whole { engine: &mut engine, model: &model, min_confidence };
     let report = run_bench(&layout, &bench, &mut whole, &mut watcher)?;
-    let table = table(&report);
-    watcher.finish(&table)?;
-    args.scoring.json.put_out(&report, &table, context)?;
+    let tables = tables(&report);
+    watcher.finish(&tables)?;
+    args.scoring.json.put_out(&report, &tables.text(), context)?;
     report.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 

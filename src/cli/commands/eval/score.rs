@@ -1,10 +1,10 @@
 //! Scores by the masks of the scene: photos, visible masks, whole outlines, objects without occluders.
 
 use super::EvalArgs;
-use super::table::table;
+use super::table::tables;
 use crate::blocks::Seams;
 use crate::cli::support::{
-    Context, Watcher, largest, near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit,
+    Context, TableArg, Watcher, largest, near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit,
 };
 use crate::engine::{Engine, EngineSize};
 use crate::eval::by_place;
@@ -15,6 +15,7 @@ use crate::eval::removal::{self, RemovalTruth, removals};
 use crate::eval::scores::Scores;
 use crate::eval::subject::{Subject, Whole};
 use crate::files::image::read_rgba;
+use crate::files::label_table::LabelTable;
 use crate::formats::ModelRef;
 use crate::gpu::Gpu;
 use crate::label::vote::model::{columns_of, limited_vote_engine};
@@ -32,8 +33,17 @@ use std::sync::Arc;
 /// Scores a model and prints the scores.
 pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
     let scores = score(args, context)?;
-    args.scoring.json.put_out(&scores, &table(&scores), context)?;
+    let tables = tables(&scores, names(args)?.as_ref());
+    args.scoring.json.put_out(&scores, &tables.text(), context)?;
     scores.check(args.scoring.min_psnr, args.scoring.min_iou)
+}
+
+/// Returns the names of the labels: those of the model, or of the masks if it has none.
+fn names(args: &EvalArgs) -> Result<Option<LabelTable>> {
+    let own = models::open_lazily(&args.model)?.names().cloned();
+    let of_model = TableArg::default().open(&args.model, own)?;
+    let of_masks = || args.masks.as_deref().map_or(Ok(None), LabelTable::of_folder);
+    if of_model.is_some() { Ok(of_model) } else { of_masks() }
 }
 
 /// Scores a model.
@@ -108,7 +118,7 @@ impl Job<'_> {
             let (options, truth) = (how.options, &self.wholes);
             scores.removal = Some(removals(&mut engine, &model, &views, &train, options, truth, &mut watcher)?);
         }
-        watcher.finish(&table(&scores))?;
+        watcher.finish(&tables(&scores, names(args)?.as_ref()))?;
         Ok(scores)
     }
 
@@ -126,7 +136,7 @@ impl Job<'_> {
         models::log_notes(&args.model, &notes);
         let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
         let scores = self.of(&mut painter, views, &mut watcher)?;
-        watcher.finish(&table(&scores))?;
+        watcher.finish(&tables(&scores, names(args)?.as_ref()))?;
         Ok(scores)
     }
 

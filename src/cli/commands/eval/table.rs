@@ -1,76 +1,88 @@
-//! Scores as text.
+//! Scores as tables.
 
-use crate::cli::support::table::{self, Column, number};
+use crate::cli::support::tables::{Column, DB, Part, Parts, SHARE, Table, column, number};
 use crate::eval::PlaceScore;
 use crate::eval::removal::ObjectRemoval;
 use crate::eval::scores::{MeanScores, ObjectScores, Scores, ViewScores};
+use crate::files::label_table::LabelTable;
 
 const VIEWS: [Column<MeanScores>; 4] = [
-    ("PSNR", 8, 2, |row| row.psnr),
-    ("corrected", 9, 2, |row| row.psnr_corrected),
-    ("SSIM", 8, 4, |row| row.ssim),
-    ("LPIPS", 8, 4, |row| row.lpips),
+    column("PSNR", "PSNR, dB", DB, |row| row.psnr),
+    column("corrected", "PSNR corrected, dB", DB, |row| row.psnr_corrected),
+    column("SSIM", "SSIM", SHARE, |row| row.ssim),
+    column("LPIPS", "LPIPS", SHARE, |row| row.lpips),
 ];
 const OBJECTS: [Column<ObjectScores>; 8] = [
-    ("iou_map", 8, 4, |row| row.iou_map),
-    ("boundary_iou", 12, 4, |row| row.boundary_iou),
-    ("iou_object", 10, 4, |row| row.iou_object),
-    ("paper_iou", 9, 4, |row| row.paper_iou),
-    ("object_psnr", 11, 2, |row| row.object_psnr),
-    ("object_ssim", 11, 4, |row| row.object_ssim),
-    ("iou_hidden", 10, 4, |row| row.iou_hidden),
-    ("psnr_hidden", 11, 2, |row| row.psnr_hidden),
+    column("IoU", "IoU of the label map", SHARE, |row| row.iou_map),
+    column("bIoU", "IoU of boundaries", SHARE, |row| row.boundary_iou),
+    column("whole", "IoU of the whole object", SHARE, |row| row.iou_object),
+    column("paper", "IoU of the paper", SHARE, |row| row.paper_iou),
+    column("PSNR", "PSNR alone, dB", DB, |row| row.object_psnr),
+    column("SSIM", "SSIM alone", SHARE, |row| row.object_ssim),
+    column("hidden", "IoU where hidden", SHARE, |row| row.iou_hidden),
+    column("dB hidden", "PSNR where hidden, dB", DB, |row| row.psnr_hidden),
 ];
-const PLACES: [Column<PlaceScore>; 2] =
-    [("PSNR", 8, 2, |row| Some(row.psnr)), ("pixels", 10, 0, |row| Some(row.pixels as f64))];
-const REMOVED: [Column<ObjectRemoval>; 8] = [
-    ("removed", 11, 2, |row| row.votes.psnr),
-    ("filled", 11, 2, |row| row.filled.psnr),
-    ("mean colour", 11, 2, |row| row.mean_colour.psnr),
-    ("paper's", 11, 2, |row| row.main.psnr),
-    ("removed", 11, 2, |row| row.votes.psnr_shadowed),
-    ("filled", 11, 2, |row| row.filled.psnr_shadowed),
-    ("mean colour", 11, 2, |row| row.mean_colour.psnr_shadowed),
-    ("paper's", 11, 2, |row| row.main.psnr_shadowed),
+const PLACES: [Column<PlaceScore>; 2] = [
+    column("PSNR", "PSNR, dB", DB, |row| Some(row.psnr)),
+    column("pixels", "Pixels", 0, |row| Some(row.pixels as f64)),
 ];
-const LEFT: [Column<ObjectRemoval>; 10] = [
-    ("leftover", 10, 4, |row| row.votes.leftover),
-    ("paper's", 10, 4, |row| row.main.leftover),
-    ("weight left", 13, 4, |row| row.votes.leftover_weight),
-    ("paper's", 13, 4, |row| row.main.leftover_weight),
-    ("hole", 8, 4, |row| row.hole),
-    ("filled", 8, 4, |row| row.hole_filled),
-    ("added", 8, 0, |row| Some(row.added as f64)),
-    ("in holes", 9, 2, |row| row.holes.filled),
-    ("shadowed", 9, 2, |row| row.holes.filled_shadowed),
-    ("ring mean", 9, 2, |row| row.holes.mean_colour),
+const REMOVED: [Column<ObjectRemoval>; 4] = [
+    column("removed", "Removed, dB", DB, |row| row.votes.psnr),
+    column("filled", "Filled, dB", DB, |row| row.filled.psnr),
+    column("mean colour", "Mean colour, dB", DB, |row| row.mean_colour.psnr),
+    column("paper's", "Paper's rule, dB", DB, |row| row.main.psnr),
+];
+const SHADOWED: [Column<ObjectRemoval>; 4] = [
+    column("removed", "Removed, dB", DB, |row| row.votes.psnr_shadowed),
+    column("filled", "Filled, dB", DB, |row| row.filled.psnr_shadowed),
+    column("mean colour", "Mean colour, dB", DB, |row| row.mean_colour.psnr_shadowed),
+    column("paper's", "Paper's rule, dB", DB, |row| row.main.psnr_shadowed),
+];
+const LEFT: [Column<ObjectRemoval>; 7] = [
+    column("area", "Area left", SHARE, |row| row.votes.leftover),
+    column("paper's", "Paper's rule", SHARE, |row| row.main.leftover),
+    column("weight", "Weight left", SHARE, |row| row.votes.leftover_weight),
+    column("paper's", "Paper's rule", SHARE, |row| row.main.leftover_weight),
+    column("hole", "Hole", SHARE, |row| row.hole),
+    column("filled", "Hole after --fill", SHARE, |row| row.hole_filled),
+    column("added", "Gaussians added", 0, |row| Some(row.added as f64)),
+];
+const HOLES: [Column<ObjectRemoval>; 3] = [
+    column("filled", "Filled, dB", DB, |row| row.holes.filled),
+    column("with shadow", "Filled, with its shadow, dB", DB, |row| row.holes.filled_shadowed),
+    column("ring mean", "Mean of the ring around, dB", DB, |row| row.holes.mean_colour),
 ];
 
-/// Returns the table of views, then of objects.
-pub(super) fn table(scores: &Scores) -> String {
-    let mut text = if scores.refined_poses { "poses refined by the model\n".to_owned() } else { String::new() };
+/// Returns the tables of views, then of objects, which have names from a table.
+pub(super) fn tables(scores: &Scores, names: Option<&LabelTable>) -> Parts {
+    let mut parts = Vec::new();
+    if scores.refined_poses {
+        parts.push(Part::Note("Poses are refined by the model.".to_owned()));
+    }
     let mean = &scores.mean;
-    // A column for LPIPS only where it was asked for.
-    let columns = if mean.lpips.is_some() { &VIEWS[..] } else { &VIEWS[..3] };
     let views: Vec<(String, MeanScores)> =
         scores.views.iter().map(|(name, view)| (name.clone(), of_view(view))).collect();
     let rows = views.iter().map(|(name, view)| (name.clone(), view));
-    text += &table::table(("view", 10), columns, rows.chain([("mean".to_owned(), mean)]));
-    text += &regions(scores);
+    parts.push(Part::Table(Table::new("view", &VIEWS, rows.chain([("mean".to_owned(), mean)]))));
+    parts.extend(regions(scores));
     if !scores.places.is_empty() {
+        parts.push(Part::Title("places".to_owned()));
         let rows = scores.places.iter().map(|(name, score)| (name.clone(), score));
-        text += &format!("\n{}", table::table(("place", 14), &PLACES, rows));
+        parts.push(Part::Table(Table::new("place", &PLACES, rows)));
     }
     if scores.objects.is_empty() {
-        return text;
+        return Parts(parts);
     }
-    let rows = scores.objects.iter().map(|(id, scores)| (id.to_string(), scores));
-    let rows = rows.chain([("mean".to_owned(), &mean.objects)]);
-    text += &format!("\n{}", table::table(("object", 10), &OBJECTS, rows));
+    let title = |id: u32| names.and_then(|names| names.name(id)).map_or_else(|| format!("label {id}"), str::to_owned);
+    let rows = scores.objects.iter().map(|(&id, scores)| (title(id), scores));
+    parts.push(Part::Title("objects".to_owned()));
+    parts.push(Part::Table(Table::new("object", &OBJECTS, rows.chain([("mean".to_owned(), &mean.objects)]))));
     if mean.specks.is_some() {
-        text += &format!("specks of the label map that masks do not have: {} in a view\n", number(mean.specks, 1));
+        let count = number(mean.specks, 1);
+        parts.push(Part::Note(format!("Fragments of the label map that masks do not have: {count} in a view.")));
     }
-    text + &removals(scores)
+    parts.extend(removals(scores, &title));
+    Parts(parts)
 }
 
 fn of_view(view: &ViewScores) -> MeanScores {
@@ -85,22 +97,31 @@ fn of_view(view: &ViewScores) -> MeanScores {
 }
 
 /// Returns the tables of removals.
-fn removals(scores: &Scores) -> String {
-    let Some(removal) = &scores.removal else { return String::new() };
-    let rows = || removal.objects.iter().map(|(id, row)| (id.to_string(), row)).chain([("mean".into(), &removal.mean)]);
-    format!(
-        "\nPSNR at the place of a removed object, against photos without it, and with its shadow\n{}\n{}",
-        table::table(("object", 10), &REMOVED, rows()),
-        table::table(("object", 10), &LEFT, rows())
-    )
+fn removals(scores: &Scores, title: &impl Fn(u32) -> String) -> Vec<Part> {
+    let Some(removal) = &scores.removal else { return Vec::new() };
+    let table = |columns: &[Column<ObjectRemoval>]| {
+        let rows = removal.objects.iter().map(|(&id, row)| (title(id), row));
+        Part::Table(Table::new("object", columns, rows.chain([("mean".to_owned(), &removal.mean)])))
+    };
+    let heading = |text: &str| Part::Title(text.to_owned());
+    vec![
+        heading("PSNR at the place of a removed object, against photos without it"),
+        table(&REMOVED),
+        heading("the same, against photos without it but with its shadow"),
+        table(&SHADOWED),
+        heading("what a removal leaves: shares of the object, and of its area the hole"),
+        table(&LEFT),
+        heading("PSNR in the holes"),
+        table(&HOLES),
+    ]
 }
 
 /// Returns the PSNR by region.
-fn regions(scores: &Scores) -> String {
-    let Some(mean) = &scores.mean.regions else { return String::new() };
-    let psnr = |value| number(value, 2);
+fn regions(scores: &Scores) -> Option<Part> {
+    let mean = scores.mean.regions.as_ref()?;
+    let psnr = |value| number(value, DB);
     let mut text = format!(
-        "\nPSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
+        "PSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
         psnr(mean.psnr_seen),
         psnr(mean.psnr_seen_corrected),
         100.0 * mean.seen_share.unwrap_or(0.0),
@@ -110,5 +131,5 @@ fn regions(scores: &Scores) -> String {
         let [objects, contours, rest] = [mean.psnr_objects, mean.psnr_contours, mean.psnr_rest].map(psnr);
         text += &format!("; objects {objects}, contours {contours}, rest {rest}");
     }
-    text + "\n"
+    Some(Part::Note(text + "."))
 }
