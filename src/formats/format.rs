@@ -82,6 +82,8 @@ pub struct Export<'a> {
     pub origin: DVec3,
     /// Choices.
     pub options: WriteOptions,
+    /// Title of a page: the name of its file, without the extension.
+    pub title: &'a str,
 }
 
 impl<'a> Export<'a> {
@@ -89,7 +91,7 @@ impl<'a> Export<'a> {
     pub fn new(model: &'a Gaussians, rows: &'a [usize], names: Option<&'a LabelTable>, options: WriteOptions) -> Self {
         let is_rounded = |&row: &usize| model.world(row) != model.world(row).as_vec3().as_dvec3();
         let is_far = model.origin != DVec3::ZERO && rows.iter().any(is_rounded);
-        Self { model, rows, names, origin: if is_far { model.origin } else { DVec3::ZERO }, options }
+        Self { model, rows, names, origin: if is_far { model.origin } else { DVec3::ZERO }, options, title: "" }
     }
 
     /// Returns a position relative to the origin of the file.

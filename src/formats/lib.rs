@@ -166,7 +166,8 @@ fn write(
     model.check()?;
     let writer = writer_for(path)?;
     let rows: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
-    let export = Export::new(model, &rows, names, options);
+    let title = path.file_stem().unwrap_or_default().to_string_lossy();
+    let export = Export { title: &title, ..Export::new(model, &rows, names, options) };
     (writer.losses)(&export)?.iter().for_each(|loss| tracing::warn!("{}: {loss}", path.display()));
     atomic::write(path, |out| (writer.write)(&export, out))?;
     // A pipe or a device has no files beside it.

@@ -40,6 +40,87 @@ fn rich(place: &Place) -> Gaussians {
     Gaussians { sh_rest, sh_degree: 3, ..plain }
 }
 
+/// Clicks on pixels inside of objects: the object of the label map is chosen and named. Twice, it is alone. Escape goes
+/// back.
+fn clicks_choose_objects(browser: &mut Browser, tab: &Tab, map: &Picture) {
+    let (width, height) = (map.size.0 as usize, map.size.1 as usize);
+    let id = |x: usize, y: usize| map.values[y * width + x];
+    let is_inside =
+        |x: usize, y: usize| id(x, y) != 0 && (0..9).all(|step| id(x + step % 3 - 1, y + step / 3 - 1) == id(x, y));
+    let inner = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y)));
+    let inside: Vec<(usize, usize)> = inner.filter(|&(x, y)| is_inside(x, y)).collect();
+    let stage = browser
+        .js(tab, "[document.getElementById('picture').clientWidth, document.getElementById('picture').clientHeight]");
+    let side = |index: usize| stage[index].as_f64().expect("a number");
+    let place = |(x, y): (usize, usize)| {
+        ((x as f64 + 0.5) * side(0) / width as f64, (y as f64 + 0.5) * side(1) / height as f64)
+    };
+    // Not below the cards of the page.
+    let free = "(([x, y]) => document.elementFromPoint(x, y)?.id === 'picture')";
+    let mut clicked = Vec::new();
+    for &pixel in inside.iter().step_by(inside.len() / 60 + 1) {
+        let (x, y) = place(pixel);
+        if browser.js(tab, &format!("{free}([{x}, {y}])")) == true && clicked.len() < 20 {
+            clicked.push(pixel);
+        }
+    }
+    let mut right = 0;
+    let mut seen = std::collections::BTreeSet::new();
+    for &(x, y) in &clicked {
+        browser.click(tab, place((x, y)), 0);
+        let chosen = "(() => { const at = [...document.querySelectorAll('#labels .name')].findIndex((one) => one.ariaPressed === 'true'); \
+                      return at < 0 ? null : [about.labels[at].id, document.getElementById('chosen-name').textContent === (about.labels[at].name ?? `label ${about.labels[at].id}`)]; })()";
+        let found =
+            browser.js(tab, &chosen.replace("about", "JSON.parse(document.getElementById('about').textContent)"));
+        if found == serde_json::json!([id(x, y), true]) {
+            right += 1;
+            seen.insert(id(x, y));
+        }
+        browser.key(tab, "Escape", "Escape", 0);
+        assert_eq!(browser.js(tab, "document.getElementById('chosen').hidden"), true);
+    }
+    // Bytes of SPZ and centres in depth order move borders.
+    assert!(clicked.len() > 8 && right * 10 >= clicked.len() * 9 && seen.len() > 1, "{right} of {}", clicked.len());
+
+    let frame = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
+    let before = pixels(browser, tab);
+    let at = place(clicked[0]);
+    // A busy machine may take too long between two clicks.
+    for _ in 0..20 {
+        browser.click(tab, at, 0);
+        browser.click(tab, at, 0);
+        if browser.js(tab, "document.getElementById('alone').ariaPressed") == "true" {
+            break;
+        }
+        browser.key(tab, "Escape", "Escape", 0);
+    }
+    assert_eq!(browser.js(tab, "document.getElementById('alone').ariaPressed"), "true");
+    browser.js(tab, frame);
+    let alone = pixels(browser, tab);
+    let changed = alone.values.iter().zip(&before.values).filter(|(a, b)| a != b).count();
+    assert!(changed * 3 > before.values.len(), "the other objects are gone");
+    browser.key(tab, "Escape", "Escape", 0);
+    browser.until(
+        tab,
+        "document.getElementById('alone').ariaPressed === 'false' && !document.getElementById('chosen').hidden",
+    );
+    browser.key(tab, "Escape", "Escape", 0);
+    browser.until(tab, "document.getElementById('chosen').hidden");
+    browser.js(tab, frame);
+    assert!(pixels(browser, tab).values == before.values, "everything is back");
+
+    // Numbers on demand, and words for the hand at hand.
+    let shown = "getComputedStyle(document.querySelector('#labels .number')).display";
+    assert_eq!(browser.js(tab, shown), "none");
+    browser.js(tab, "document.getElementById('counts').click()");
+    assert_eq!(browser.js(tab, shown), "inline");
+    assert_eq!(browser.js(tab, "document.getElementById('full').hidden"), false);
+    let hint = "document.getElementById('hint').textContent";
+    assert!(browser.js(tab, hint).as_str().is_some_and(|text| text.contains("Click an object")), "a mouse");
+    browser.js(tab, "window.dispatchEvent(new PointerEvent('pointerdown', { pointerType: 'touch' }))");
+    assert!(browser.js(tab, hint).as_str().is_some_and(|text| text.contains("Tap an object")), "a finger");
+}
+
 /// Converts a model with labels and looks at it from the camera of a photo.
 pub fn a_page_shows_its_model(browser: &mut Browser, place: &Place) {
     write_model(place.path("rich.ply"), &rich(place)).expect("written");
@@ -49,7 +130,8 @@ pub fn a_page_shows_its_model(browser: &mut Browser, place: &Place) {
     let camera = serde_json::to_string(&CameraFile::from(&scene.train[0].camera)).expect("JSON");
     std::fs::write(place.path("camera.json"), &camera).expect("written");
     for (name, more) in [("all", &[][..]), ("some", &["--without", "3"])] {
-        let typed = ["render", "page.html", "--camera", "camera.json", "--near", "0.01", "--what", "rgb", "-o", name];
+        let what = "rgb,labels";
+        let typed = ["render", "page.html", "--camera", "camera.json", "--near", "0.01", "--what", what, "-o", name];
         place.succeeds(&[&typed[..], more].concat());
     }
     let encoded = camera.bytes().fold(String::new(), |mut text, byte| {
@@ -68,6 +150,10 @@ pub fn a_page_shows_its_model(browser: &mut Browser, place: &Place) {
     let hidden = psnr(&pixels(browser, &tab), &place.picture("some/camera.rgb.png"));
     println!("a page in a browser against `render`: {whole:.1} dB, {hidden:.1} dB with a label hidden");
     assert!(whole > LEAST && hidden > LEAST, "{whole} dB, {hidden} dB with a label hidden");
+
+    browser.js(&tab, "document.querySelectorAll('#labels input')[3].click()");
+    assert_eq!(browser.js(&tab, "document.title"), "page – labelgs", "the name of the file");
+    clicks_choose_objects(browser, &tab, &place.picture("all/camera.labels.png"));
 
     // Tinted, turned by mouse and keys, and back.
     browser.click_on(&tab, "#tint-all");

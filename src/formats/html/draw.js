@@ -2,6 +2,8 @@
 
 const BUCKETS = 65536;
 const NEAR = 0.01;
+// How the Gaussians of a label look.
+const LOOK = { hidden: 0, shown: 1, tinted: 2, dim: 3 };
 
 class Picture {
   constructor(canvas) {
@@ -26,7 +28,6 @@ class Picture {
     gl.vertexAttribDivisor(row, 1);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.clearColor(0, 0, 0, 1);
     this.shown = 0;
   }
 
@@ -76,7 +77,7 @@ class Picture {
     looks.forEach((look, row) => bytes.set(look, 4 * row));
     gl.activeTexture(gl.TEXTURE1);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 256, this.lookRows, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, bytes);
-    this.hidden = looks.map((look) => look[3] === 0);
+    this.hidden = looks.map((look) => look[3] === LOOK.hidden);
   }
 
   // Puts the rows that are shown in order, the farthest first.
@@ -117,6 +118,8 @@ class Picture {
     gl.uniform3fv(place.eye, [0, 1, 2].map((axis) => -turn.reduce((sum, row, at) => sum + row[axis] * shift[at], 0)));
     gl.uniform4fv(place.lens, camera.lens);
     gl.uniform2fv(place.size, camera.size);
+    this.camera = camera;
+    gl.clearColor(...(camera.ground ?? [0, 0, 0]), 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.shown);
   }

@@ -9,6 +9,7 @@ use glam::DVec3;
 use labelgs_files::read as file;
 use labelgs_scene::UNLABELLED;
 use labelgs_scene::labels::label_colour;
+use labelgs_scene::words::counted;
 use labelgs_scene::{Error, Result};
 use labelgs_web as web;
 use maud::{Markup, PreEscaped, html};
@@ -29,13 +30,14 @@ pub(super) const FORMAT: ModelFormat = ModelFormat {
 const WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
 
 /// One script, in this order.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     web::ALGEBRA,
     web::CAMERA,
     web::INPUT,
     include_str!("decode.js"),
     include_str!("shaders.js"),
     include_str!("draw.js"),
+    include_str!("pick.js"),
     include_str!("page.js"),
 ];
 /// Start and end of the model in a page.
@@ -64,38 +66,51 @@ fn page(export: &Export, model: &str) -> String {
     let about = json!({ "labels": labels.collect::<Vec<_>>(), "origin": export.origin.to_array(), "view": view });
     // Nothing in a name may end the script.
     let about = about.to_string().replace('<', "\\u003c");
-    let title = format!("{} Gaussians", export.rows.len());
+    let title = if export.title.is_empty() { "Model" } else { export.title };
     let body = html! {
-        canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn, Shift and drag to move, scroll to come nearer." {}
-        (panels(&title))
+        canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn it, click an object to select it." {}
+        (panels(title, export.rows.len()))
         script type="application/json" id="about" { (PreEscaped(about)) }
         script type="text/plain" id="model" { (PreEscaped(model)) }
     };
-    web::page(&title, include_str!("style.css"), &body, &web::joined(&SCRIPTS))
+    web::page(title, include_str!("style.css"), &body, &web::joined(&SCRIPTS))
 }
 
-fn panels(title: &str) -> Markup {
+fn panels(title: &str, count: usize) -> Markup {
     html! {
         header.card id="head" {
             h1 { (title) }
-            p { "Drag to turn, Shift and drag to move, scroll to come nearer." }
+            // Of the device at hand: the script fills it.
+            p id="hint" {}
         }
-        section.card id="panel" aria-label="Labels" hidden {
+        details.card id="panel" aria-label="Objects" hidden {
+            summary { "Objects" }
             div {
                 button type="button" id="show-all" { "Show all" }
                 button type="button" id="tint-all" { "Tint all" }
             }
             ul id="labels" {}
         }
-        details.card id="foot" {
-            summary { "What this picture leaves out" }
-            p {
-                "Values have the steps of SPZ: positions, sizes, rotations, colours. The browser sorts Gaussians by the \
-                 depth of their centres and adds their colours in steps of 1/256, where the engine has 32-bit \
-                 floats and stops behind opaque ones. Labels are those of Gaussians, so outlines are as sharp as the \
-                 Gaussians, not as a label map."
+        div.card id="chosen" role="status" hidden {
+            strong id="chosen-name" {}
+            button type="button" id="alone" aria-pressed="false" { "Show alone" }
+            button type="button" id="back" { "Back" }
+        }
+        footer id="foot" {
+            div.card.tools {
+                button type="button" id="reset" { "Reset camera" }
+                button type="button" id="full" hidden { "Full screen" }
             }
-            p { button type="button" id="reset" { "Reset camera" } }
+            details.card id="notes" {
+                summary { "Made with labelgs" }
+                p {
+                    "Values have the steps of SPZ: positions, sizes, rotations, colours. The browser sorts Gaussians by the \
+                     depth of their centres and adds their colours in steps of 1/256, where the engine has 32-bit \
+                     floats and stops behind opaque ones. Labels are those of Gaussians, so outlines are as sharp as the \
+                     Gaussians, not as a label map."
+                }
+                p { (counted(count, "Gaussian")) ". " label { input type="checkbox" id="counts"; " Show the number of each object" } }
+            }
         }
         div.card id="message" role="status" { "Reading the model …" }
     }

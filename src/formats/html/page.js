@@ -27,6 +27,11 @@ function cameraOf(text) {
   return { w2c: rows, ...lens };
 }
 
+// The widest lens that a tall window gets, which would see past the ends of most scenes: focal length in heights.
+const TALL = 0.7;
+// Behind an object that is shown alone, so that a dark one is seen too.
+const GROUND = [0.16, 0.17, 0.19];
+
 const byId = (id) => document.getElementById(id);
 const about = JSON.parse(byId('about').textContent);
 
@@ -44,76 +49,132 @@ async function start() {
   const ratio = Math.min(2, window.devicePixelRatio || 1);
   const size = () => [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
   const rig = rigOf(model.positions, about, size());
-  const looks = about.labels.map(({ colour }) => [...colour, 1]);
-  let asked = false, changed = true;
+  const states = about.labels.map(() => ({ shown: true, tinted: false }));
+  const nameOf = ({ id, name }) => name ?? (id === 0 ? 'without a label' : `label ${id}`);
+  let asked = false, changed = true, chosen = null, isAlone = false;
 
+  function lookOf(row) {
+    const { shown, tinted } = states[row];
+    if (isAlone) return row === chosen ? LOOK.shown : LOOK.hidden;
+    if (!shown) return LOOK.hidden;
+    if (chosen !== null && chosen !== row) return LOOK.dim;
+    return tinted ? LOOK.tinted : LOOK.shown;
+  }
   function draw() {
     asked = false;
-    if (changed) picture.look(looks);
+    if (changed) picture.look(about.labels.map(({ colour }, row) => [...colour, lookOf(row)]));
     changed = false;
     rig.size = size();
     const { w2c, fx, fy, cx, cy, W, H } = rig.file();
     const rows = w2c.slice(0, 3);
-    picture.draw({ turn: rows.map((row) => row.slice(0, 3)), shift: rows.map((row) => row[3]), lens: [fx, fy, cx, cy], size: [W, H] });
+    const camera = { turn: rows.map((row) => row.slice(0, 3)), shift: rows.map((row) => row[3]), lens: [fx, fy, cx, cy], size: [W, H] };
+    picture.draw({ ...camera, ground: isAlone ? GROUND : [0, 0, 0] });
   }
   function ask() {
     if (asked) return;
     asked = true;
     requestAnimationFrame(draw);
   }
-  function look(row, state) {
-    looks[row][3] = state;
+
+  const list = byId('labels');
+  const items = about.labels.map((label, row) => {
+    const item = document.createElement('li');
+    const [box, tint, text, number] = ['input', 'button', 'button', 'span'].map((tag) => document.createElement(tag));
+    const words = nameOf(label);
+    Object.assign(box, { type: 'checkbox', ariaLabel: `Show ${words}` });
+    box.addEventListener('change', () => { states[row].shown = box.checked; update(); });
+    Object.assign(tint, { type: 'button', className: 'tint', title: 'Tint', ariaLabel: `Tint ${words}` });
+    tint.style.setProperty('--colour', `rgb(${label.colour.join(' ')})`);
+    tint.addEventListener('click', () => { states[row].tinted = !states[row].tinted; update(); });
+    Object.assign(text, { type: 'button', textContent: words, className: 'name' });
+    text.addEventListener('click', () => choose(chosen === row ? null : row));
+    Object.assign(number, { textContent: label.gaussians.toLocaleString('en'), className: 'number' });
+    item.append(box, tint, text, number);
+    list.append(item);
+    return { box, tint, text };
+  });
+  // Shows the state of all labels in the picture and the list.
+  function update() {
+    items.forEach(({ box, tint, text }, row) => {
+      box.checked = states[row].shown;
+      tint.ariaPressed = String(states[row].tinted);
+      text.ariaPressed = String(chosen === row);
+    });
+    byId('chosen').hidden = chosen === null;
+    byId('chosen-name').textContent = chosen === null ? '' : nameOf(about.labels[chosen]);
+    byId('alone').ariaPressed = String(isAlone);
     changed = true;
     ask();
   }
-
-  function fromAddress() {
-    const found = location.hash.match(/^#camera=(.*)$/);
-    if (!found) return;
-    try {
-      rig.views = [{ camera: cameraOf(decodeURIComponent(found[1])) }];
-      rig.home();
-    } catch {
-      fail(new Error('The camera in the address is not one of “render --camera”.'));
-    }
-    ask();
+  function choose(row, alone = false) {
+    [chosen, isAlone] = [row, row !== null && alone];
+    update();
   }
+  // First to all objects, then to no choice.
+  const back = () => choose(isAlone ? chosen : null);
+  const isLabelled = about.labels.length > 1 || about.labels.some(({ id }) => id !== 0);
+  const at = (point) => {
+    const pixel = [(point[0] * canvas.width) / canvas.clientWidth, (point[1] * canvas.height) / canvas.clientHeight];
+    const row = isLabelled ? picked(picture, pixel) : null;
+    return row !== null && about.labels[row].id !== 0 ? row : null;
+  };
 
-  const list = byId('labels');
-  about.labels.forEach(({ id, name, colour, gaussians }, row) => {
-    const item = document.createElement('li');
-    const [shown, tint, text, number] = ['input', 'button', 'span', 'span'].map((tag) => document.createElement(tag));
-    const words = name ?? (id === 0 ? 'without a label' : `label ${id}`);
-    Object.assign(shown, { type: 'checkbox', checked: true, ariaLabel: `Show ${words}` });
-    shown.addEventListener('change', () => look(row, shown.checked ? (tint.ariaPressed === 'true' ? 2 : 1) : 0));
-    Object.assign(tint, { type: 'button', className: 'tint', title: 'Tint', ariaLabel: `Tint ${words}`, ariaPressed: 'false' });
-    tint.style.setProperty('--colour', `rgb(${colour.join(' ')})`);
-    tint.addEventListener('click', () => {
-      tint.ariaPressed = tint.ariaPressed === 'true' ? 'false' : 'true';
-      if (shown.checked) look(row, tint.ariaPressed === 'true' ? 2 : 1);
-    });
-    Object.assign(text, { textContent: words, className: 'name' });
-    Object.assign(number, { textContent: gaussians.toLocaleString('en'), className: 'number' });
-    item.append(shown, tint, text, number);
-    list.append(item);
+  const panel = byId('panel');
+  panel.hidden = about.labels.length < 2;
+  panel.open = window.innerWidth > 640;
+  byId('show-all').addEventListener('click', () => {
+    states.forEach((state) => { state.shown = true; });
+    choose(null);
   });
-  byId('panel').hidden = about.labels.length < 2;
-  const all = (what) => list.querySelectorAll(what);
-  byId('show-all').addEventListener('click', () => all('input:not(:checked)').forEach((box) => box.click()));
   byId('tint-all').addEventListener('click', () => {
-    const buttons = [...all('.tint')];
-    const on = buttons.some((button) => button.ariaPressed !== 'true');
-    buttons.filter((button) => (button.ariaPressed === 'true') !== on).forEach((button) => button.click());
+    const on = states.some(({ tinted }) => !tinted);
+    states.forEach((state) => { state.tinted = on; });
+    choose(null);
   });
+  byId('alone').addEventListener('click', () => choose(chosen, !isAlone));
+  byId('back').addEventListener('click', back);
+  byId('counts').addEventListener('change', (event) => document.body.classList.toggle('counted', event.target.checked));
+
+  function hint(isTouch) {
+    const [move, pick] = isTouch ? ['Two fingers move and zoom.', 'Tap'] : ['Right button moves, wheel zooms.', 'Click'];
+    const twice = isTouch ? 'twice' : 'double-click';
+    byId('hint').textContent = `Drag to turn. ${move}${isLabelled ? ` ${pick} an object to select it, ${twice} to see it alone.` : ''}`;
+  }
+  hint(matchMedia('(pointer: coarse)').matches);
+  window.addEventListener('pointerdown', ({ pointerType }) => hint(pointerType === 'touch'), true);
 
   const zoom = (factor) => () => { rig.dolly(factor); ask(); };
-  const reset = () => { rig.home(); ask(); };
-  const keys = { KeyR: reset, Minus: zoom(1.1), Equal: zoom(0.9), 'Shift+Equal': zoom(0.9), NumpadAdd: zoom(0.9), NumpadSubtract: zoom(1.1) };
-  new Input({ box: canvas, change: ask }, rig, { keys, click() {}, pivot() {} });
-  byId('reset').addEventListener('click', reset);
+  function home() {
+    rig.home();
+    // A tall window shows less at the sides instead of nothing above and below.
+    if (rig.view === null) rig.focal = rig.focal.map((focal) => Math.max(focal, TALL));
+    ask();
+  }
+  function fromAddress() {
+    const found = location.hash.match(/^#camera=(.*)$/);
+    if (found) {
+      try {
+        rig.views = [{ camera: cameraOf(decodeURIComponent(found[1])) }];
+      } catch {
+        fail(new Error('The camera in the address is not one of “render --camera”.'));
+      }
+    }
+    home();
+  }
+  const keys = { KeyR: home, Escape: back, Minus: zoom(1.1), Equal: zoom(0.9), 'Shift+Equal': zoom(0.9), NumpadAdd: zoom(0.9), NumpadSubtract: zoom(1.1) };
+  const click = (point) => { if (!isAlone) choose(at(point)); };
+  // The first click of two has chosen already.
+  const pivot = () => { if (chosen !== null) choose(chosen, !isAlone); };
+  new Input({ box: canvas, change: ask }, rig, { keys, click, pivot });
+  byId('reset').addEventListener('click', home);
+  const full = byId('full');
+  full.hidden = !document.fullscreenEnabled;
+  full.addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
+  document.addEventListener('fullscreenchange', () => { full.textContent = document.fullscreenElement ? 'Leave full screen' : 'Full screen'; });
   window.addEventListener('resize', ask);
   window.addEventListener('hashchange', fromAddress);
   fromAddress();
+  update();
   draw();
   byId('message').hidden = true;
 }

@@ -5,7 +5,7 @@ precision highp float;
 precision highp int;
 precision highp usampler2D;
 uniform usampler2D data;     // the model, as decode() makes it
-uniform usampler2D looks;    // a row of the list of labels: tint r, g, b, and 0 hidden, 1 shown, 2 tinted
+uniform usampler2D looks;    // a row of the list of labels: tint r, g, b, and a LOOK
 uniform int width, stride, degree;
 uniform bool antialiased;    // blur takes opacity
 uniform mat3 turn;           // camera from world: x right, y down, z forward
@@ -84,7 +84,9 @@ void main() {
   vec3 shade = 0.5 + 0.2820948 * (bytes.rgb - 0.5) / 0.15;
   if (degree > 0) shade += bands(base, normalize(place - eye));
   shade = max(shade, 0.0);
-  colour = vec4(look.a == 2u ? mix(shade, vec3(look.rgb) / 255.0, 0.6) : shade, bytes.a);
+  if (look.a == 2u) shade = mix(shade, vec3(look.rgb) / 255.0, 0.6);
+  if (look.a == 3u) shade = mix(vec3(dot(shade, vec3(0.299, 0.587, 0.114))), shade, 0.3) * 0.4;
+  colour = vec4(shade, bytes.a);
 }`;
 
 const FRAGMENT = `#version 300 es

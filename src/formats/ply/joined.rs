@@ -46,7 +46,7 @@ pub fn write_joined(
 }
 
 fn export<'a>(model: &'a Gaussians, rows: &'a [usize], like: &Gaussians) -> Export<'a> {
-    Export { model, rows, names: None, origin: like.origin, options: WriteOptions::default() }
+    Export { model, rows, names: None, origin: like.origin, options: WriteOptions::default(), title: "" }
 }
 
 /// Returns a part with the columns and the origin of `like`.
