@@ -199,8 +199,10 @@ impl Folders {
     /// Logs what objects are compared with: hidden parts cost a score that counts them.
     fn tell(&self) {
         match &self.amodal {
-            Some(folder) => tracing::info!("iou_object compares with whole outlines: {}", folder.display()),
-            None => tracing::info!("iou_object compares with the visible masks; --amodal DIR has whole outlines"),
+            Some(folder) => tracing::info!("whole objects are compared with their outlines in {}", folder.display()),
+            None => {
+                tracing::info!("whole objects are compared with their visible masks; --amodal DIR has whole outlines")
+            }
         }
     }
 }
