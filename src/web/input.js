@@ -103,7 +103,8 @@ export class Input {
     }
     if (event.type === "pointercancel" || this.moved > CLICK || event.button !== 0) return;
     const at = this.at(event);
-    const now = performance.now();
+    // Of the hand, not of the picture that a slow machine drew in between.
+    const now = event.timeStamp;
     if (this.last && now - this.last.when < DOUBLE && Math.hypot(at[0] - this.last.at[0], at[1] - this.last.at[1]) < 6) {
       this.last = null;
       return this.actions.pivot(at);

@@ -64,7 +64,7 @@ fn clicks_choose_objects(browser: &mut Browser, tab: &Tab, map: &Picture) {
             clicked.push(pixel);
         }
     }
-    let mut right = 0;
+    let mut right = Vec::new();
     let mut seen = std::collections::BTreeSet::new();
     for &(x, y) in &clicked {
         browser.click(tab, place((x, y)), 0);
@@ -73,27 +73,32 @@ fn clicks_choose_objects(browser: &mut Browser, tab: &Tab, map: &Picture) {
         let found =
             browser.js(tab, &chosen.replace("about", "JSON.parse(document.getElementById('about').textContent)"));
         if found == serde_json::json!([id(x, y), true]) {
-            right += 1;
+            right.push((x, y));
             seen.insert(id(x, y));
         }
         browser.key(tab, "Escape", "Escape", 0);
         assert_eq!(browser.js(tab, "document.getElementById('chosen').hidden"), true);
     }
     // Bytes of SPZ and centres in depth order move borders.
-    assert!(clicked.len() > 8 && right * 10 >= clicked.len() * 9 && seen.len() > 1, "{right} of {}", clicked.len());
+    assert!(
+        clicked.len() > 8 && right.len() * 10 >= clicked.len() * 9 && seen.len() > 1,
+        "{} of {}",
+        right.len(),
+        clicked.len()
+    );
 
     let frame = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))";
+    browser.js(tab, frame);
     let before = pixels(browser, tab);
-    let at = place(clicked[0]);
-    // A busy machine may take too long between two clicks.
-    for _ in 0..20 {
-        browser.click(tab, at, 0);
-        browser.click(tab, at, 0);
-        if browser.js(tab, "document.getElementById('alone').ariaPressed") == "true" {
-            break;
-        }
-        browser.key(tab, "Escape", "Escape", 0);
-    }
+    let at = place(right[0]);
+    // Both clicks in one go: a busy machine may take too long between two of a protocol. The mouse is pointer 1.
+    let twice = format!(
+        "(() => {{ const canvas = document.getElementById('picture'); \
+         const at = {{ clientX: {}, clientY: {}, pointerId: 1, pointerType: 'mouse', button: 0, bubbles: true }}; \
+         for (const kind of ['down', 'up', 'down', 'up']) canvas.dispatchEvent(new PointerEvent(`pointer${{kind}}`, at)); }})()",
+        at.0, at.1
+    );
+    browser.js(tab, &twice);
     assert_eq!(browser.js(tab, "document.getElementById('alone').ariaPressed"), "true");
     browser.js(tab, frame);
     let alone = pixels(browser, tab);
@@ -113,7 +118,7 @@ fn clicks_choose_objects(browser: &mut Browser, tab: &Tab, map: &Picture) {
     let shown = "getComputedStyle(document.querySelector('#labels .number')).display";
     assert_eq!(browser.js(tab, shown), "none");
     browser.js(tab, "document.getElementById('counts').click()");
-    assert_eq!(browser.js(tab, shown), "inline");
+    assert_ne!(browser.js(tab, shown), "none");
     assert_eq!(browser.js(tab, "document.getElementById('full').hidden"), false);
     let hint = "document.getElementById('hint').textContent";
     assert!(browser.js(tab, hint).as_str().is_some_and(|text| text.contains("Click an object")), "a mouse");
