@@ -239,21 +239,21 @@ fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
     needs
 }
 
-/// Optional features; without them, the engine runs with a drawback.
+/// Optional features; without them, the engine runs with a drawback, which the reason says.
 fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
     let wish = |what, is_met, found: String, reason| Need {
         is_required: false,
-        ..need(what, is_met, "wished", found, reason)
+        ..need(what, is_met, "optional", found, reason)
     };
     let operations = if subgroup.has_operations() { "yes" } else { "no" }.to_owned();
     let pins = format!("{} of {}..{}", subgroup.size, subgroup.min, subgroup.max);
     let (range, bits, period) = (limits.plan.max_storage_range, limits.timestamp_bits, limits.timestamp_period);
     [
-        wish("subgroup shuffle, arithmetic", subgroup.has_operations(), operations, "else through shared memory"),
-        wish("subgroups of 8 to 64", subgroup.has_size(), subgroup.size.to_string(), "else through shared memory"),
-        wish("one subgroup size, or pinned", subgroup.is_certain, pins, "else through shared memory"),
-        wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "bounds the number of Gaussians"),
-        wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "time of each pass"),
+        wish("subgroup shuffle, arithmetic", subgroup.has_operations(), operations, "slower, through shared memory"),
+        wish("subgroups of 8 to 64", subgroup.has_size(), subgroup.size.to_string(), "slower, through shared memory"),
+        wish("one subgroup size, or pinned", subgroup.is_certain, pins, "slower, through shared memory"),
+        wish("storage binding of 1 GiB", range >= 1 << 30, format!("{range} B"), "fewer Gaussians at most"),
+        wish("timestamps", bits > 0, format!("{bits} bits, {period} ns"), "no time by pass"),
     ]
 }
 

@@ -15,6 +15,22 @@ pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
     format!("{count} {noun}{ending}")
 }
 
+/// Returns a count in at most five letters: `9120`, `16.8k`, `1.69M`.
+pub fn brief(count: u64) -> String {
+    let scaled = |unit: f64, letter: &str| {
+        let value = count as f64 / unit;
+        // One digit less for each before the point.
+        let digits = if value >= 99.95 { 0 } else { usize::from(value < 9.995) + 1 };
+        format!("{value:.digits$}{letter}")
+    };
+    match count {
+        0..10_000 => count.to_string(),
+        10_000..999_500 => scaled(1e3, "k"),
+        999_500..999_500_000 => scaled(1e6, "M"),
+        _ => scaled(1e9, "G"),
+    }
+}
+
 /// Returns `name`, with the first number appended after `gap` that makes it unlike those in `taken`, where it is put.
 pub fn unique(name: String, gap: &str, taken: &mut BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}{gap}{number}"));
@@ -46,6 +62,14 @@ mod tests {
     #[test]
     fn one_thing_is_singular() {
         assert_eq!([0_u32, 1, 2].map(|count| counted(count, "object")), ["0 objects", "1 object", "2 objects"]);
+    }
+
+    #[test]
+    fn a_brief_count_has_three_digits() {
+        let counts =
+            [0, 9120, 16_786, 99_960, 123_456, 999_499, 999_500, 1_687_860, 99_960_000, 250_000_000, 2_500_000_000];
+        let texts = ["0", "9120", "16.8k", "100k", "123k", "999k", "1.00M", "1.69M", "100M", "250M", "2.50G"];
+        assert_eq!(counts.map(brief), texts);
     }
 
     #[test]

@@ -277,6 +277,10 @@ fn a_made_scene_is_trained_scored_edited_and_rendered() {
     succeeds(&["extract", &out, "--labels", "2", "-o", &object]);
     let sure = read_model(&object).expect("PLY").gaussians.label_confidence.expect("votes tell how sure they are");
     assert!(sure.iter().all(|&share| share >= 0.6));
+    let said = json(&succeeds(&["extract", &out, "--labels", "2", "-o", &object, "--json"]));
+    let whole = listed["labels"].as_array().and_then(|rows| rows.iter().find(|row| row["label"] == 2));
+    let count = whole.and_then(|row| row["count"].as_u64());
+    assert_eq!(count, Some(sure.len() as u64 + said["unsure"].as_u64().expect("a number")), "{said}");
     succeeds(&["extract", &out, "--labels", "2", "--min-confidence", "0", "-o", &object]);
     succeeds(&["remove", &out, "--labels", "2", "-o", &rest]);
     let (object_model, rest_model) =

@@ -74,8 +74,12 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
 /// Returns the required and optional features of a device, a row each.
 pub(crate) fn needs_text(device: &Capabilities) -> String {
     let row = |need: &Need| {
-        let (what, needed, found) = (need.what, &need.needed, &need.found);
-        format!("   {:<7} {what:<29} needed {needed:<7} found {found:<18} {}\n", state(need), need.reason)
+        let (what, found) = (need.what, &need.found);
+        let needed = if need.is_required { format!("needs {}", need.needed) } else { need.needed.clone() };
+        let what = format!("{what} ({needed})");
+        // A met optional feature has no drawback.
+        let reason = if need.is_required || !need.is_met { need.reason } else { "" };
+        format!("   {:<7} {what:<39} {found:<18} {reason}", state(need)).trim_end().to_owned() + "\n"
     };
     device.needs.iter().map(row).collect()
 }
@@ -119,6 +123,6 @@ fn state(need: &Need) -> &'static str {
     match (need.is_met, need.is_required) {
         (true, _) => "ok",
         (false, true) => "MISSING",
-        (false, false) => "no",
+        (false, false) => "without",
     }
 }

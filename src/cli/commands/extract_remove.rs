@@ -101,7 +101,15 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let table = known.table.as_ref().map(|table| keep(table, |id| labels.contains(&id)));
     let of = known.gaussians.values().sum::<u64>() as usize;
     let specks = whole.len() - part.len();
-    edit.finish(context, &Edited::new(&part, table, of, labels), json!({ "specks": specks }))
+    let chosen: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
+    let unsure = chosen - (whole.len() as u64).min(chosen);
+    let least = args.sure.min_confidence;
+    let note = match unsure {
+        0 => String::new(),
+        _ => format!("; {unsure} of the object left out, with a confidence below {least} (--min-confidence)"),
+    };
+    let edited = Edited { note, ..Edited::new(&part, table, of, labels) };
+    edit.finish(context, &edited, json!({ "specks": specks, "unsure": unsure }))
 }
 
 /// Fits the opacities of objects that stand alone.

@@ -103,14 +103,27 @@ pub(crate) fn final_error(error: &Error) {
     });
 }
 
-/// Adds a bar over `total` items called `what`; one that only turns if their number is not known.
-pub(crate) fn bar(total: u64, what: String) -> ProgressBar {
-    let template = match total {
-        0 => "{spinner} {msg} {elapsed}",
-        _ => "{bar:30} {pos}/{len} {msg} {per_sec} {eta} left",
-    };
+/// Adds a bar over `total` items beside a message; one that only turns if their number is not known.
+pub(crate) fn bar(total: u64) -> ProgressBar {
+    // Short, so that a line with bar and message fits 80 columns.
+    let template = if total == 0 { "{spinner} {msg}" } else { "{bar:6} {msg}" };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    BARS.add(ProgressBar::new(total).with_style(style).with_message(what))
+    BARS.add(ProgressBar::new(total).with_style(style))
+}
+
+/// Returns how far long work is, for bars and lines alike. `rate` is that of a second.
+pub(crate) fn told((done, total): (u64, u64), what: &str, rate: f64, more: &str) -> String {
+    let mut text = format!("{done}/{total} {what}");
+    if rate > 0.0 {
+        let left = (total.saturating_sub(done) as f64 / rate).ceil() as u64;
+        let left = match left {
+            0..100 => format!("{left}s"),
+            100..6000 => format!("{}m", left.div_ceil(60)),
+            _ => format!("{}h", left.div_ceil(3600)),
+        };
+        text += &format!(", {rate:.1}/s, {left} left");
+    }
+    if more.is_empty() { text } else { format!("{text}, {more}") }
 }
 
 /// Progress of long work: a bar on a terminal, otherwise log lines, from [`PLAIN_AFTER`] on.
@@ -118,6 +131,8 @@ pub(crate) struct Progress {
     bar: Option<ProgressBar>,
     what: &'static str,
     total: u64,
+    /// Items done before the first that this process did.
+    first: Option<u64>,
     start: Instant,
     last: Instant,
     /// Time until the next line.
@@ -127,23 +142,28 @@ pub(crate) struct Progress {
 impl Progress {
     /// Starts progress over `total` items called `what`, such as `steps`.
     pub(crate) fn new(total: u64, what: &'static str, args: &GlobalArgs) -> Self {
-        let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| bar(total, what.to_owned()));
+        let bar = (!args.quiet && std::io::stderr().is_terminal()).then(|| bar(total));
         let now = Instant::now();
-        Self { bar, what, total, start: now, last: now, wait: PLAIN_AFTER }
+        Self { bar, what, total, first: None, start: now, last: now, wait: PLAIN_AFTER }
     }
 
     /// Shows that `done` items are done. `message` adds details, such as the loss; it is only called when shown.
     pub(crate) fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
+        // A resumed run has the time of its own steps only.
+        let first = *self.first.get_or_insert(done.saturating_sub(1));
+        let wait = if self.bar.is_some() { Duration::from_millis(100) } else { self.wait };
         if let Some(bar) = &self.bar {
             bar.set_position(done);
-            if self.last.elapsed() > Duration::from_millis(100) {
-                self.last = Instant::now();
-                bar.set_message(format!("{} {}", self.what, message()));
-            }
-        } else if self.last.elapsed() > self.wait {
-            (self.last, self.wait) = (Instant::now(), PLAIN_EVERY);
-            let rate = done as f64 / self.start.elapsed().as_secs_f64();
-            tracing::info!("{done} of {} {} ({rate:.1}/s) {}", self.total, self.what, message());
+        }
+        if self.last.elapsed() <= wait {
+            return;
+        }
+        (self.last, self.wait) = (Instant::now(), PLAIN_EVERY);
+        let rate = done.saturating_sub(first) as f64 / self.start.elapsed().as_secs_f64();
+        let text = told((done, self.total), self.what, rate, &message());
+        match &self.bar {
+            Some(bar) => bar.set_message(text),
+            None => tracing::info!("{text}"),
         }
     }
 }
@@ -154,5 +174,23 @@ impl Drop for Progress {
             bar.finish_and_clear();
             BARS.remove(bar);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told;
+
+    #[test]
+    fn a_line_of_a_training_fits_beside_a_bar() {
+        let more = "loss 0.123 + 0.045, 16.8k Gaussians";
+        let line = told((12_345, 30_000), "steps", 39.44, more);
+        assert_eq!(line, "12345/30000 steps, 39.4/s, 8m left, loss 0.123 + 0.045, 16.8k Gaussians");
+        for rate in [0.3, 39.0, 402.1] {
+            let line = told((12_345, 30_000), "steps", rate, more);
+            assert!("123456 ".len() + line.len() <= 80, "{line}");
+        }
+        assert_eq!(told((5, 9), "pictures", 2.0, ""), "5/9 pictures, 2.0/s, 2s left");
+        assert_eq!(told((0, 9), "pictures", 0.0, ""), "0/9 pictures");
     }
 }

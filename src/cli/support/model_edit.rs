@@ -68,7 +68,7 @@ impl EditArgs {
 
     /// Writes model and table of an edit and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, context: &Context, edited: &Edited, more: Value) -> Result<()> {
-        let Edited { model, table, of, added, labels } = edited;
+        let Edited { model, table, of, added, labels, note } = edited;
         let options = self.write.options(&self.model, &self.output)?;
         let left_out = export_model(&self.output, model, table.as_ref(), options)?;
         let written = model.len() as u64 - left_out;
@@ -90,7 +90,7 @@ impl EditArgs {
                 let count = counted(written, "Gaussian");
                 format!("{output}: {count}: of {of} before, {removed} removed; {added} added\n")
             }
-            None => format!("{output}: {written} of {}\n", counted(of, "Gaussian")),
+            None => format!("{output}: {written} of {}{note}\n", counted(of, "Gaussian")),
         };
         context.show(&result, &text)
     }
@@ -108,12 +108,14 @@ pub(crate) struct Edited<'a> {
     pub added: u64,
     /// Labels that were chosen or made.
     pub labels: BTreeSet<u32>,
+    /// More about the result, for the terminal.
+    pub note: String,
 }
 
 impl<'a> Edited<'a> {
     /// The result of an edit that adds no Gaussians to the `of` before.
     pub(crate) fn new(model: &'a Gaussians, table: Option<LabelTable>, of: usize, labels: BTreeSet<u32>) -> Self {
-        Self { model, table, of, added: 0, labels }
+        Self { model, table, of, added: 0, labels, note: String::new() }
     }
 
     /// The result of an edit that leaves the labels alone.

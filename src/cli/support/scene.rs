@@ -14,7 +14,7 @@ use crate::segment::Network;
 use crate::train::setup::near_plane::NEAR;
 use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 /// Returns the near plane to render a model with, world units: the typed value, else that of the model's run (its
 /// config.toml), else 0.2 (3DGS).
@@ -25,14 +25,27 @@ pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     }
 }
 
-/// Opens the chosen device and logs its name.
+/// Opens the chosen device.
 pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
     let pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
     let gpu = Gpu::new(&GpuOptions { pipelines, ..context.gpu_options()? })?;
     context.listen(&gpu);
     let found = gpu.capabilities();
-    let cpu = if gpu.is_cpu() { ", a processor: expect it to be slower than a graphics card" } else { "" };
-    tracing::info!("device: {} ({}){cpu}", found.name, found.driver_info);
+    tracing::debug!("device: {} ({})", found.name, found.driver_info);
+    Ok(gpu)
+}
+
+/// Opens the chosen device for long work, and says once which one it is.
+pub(crate) fn open_gpu_for_long(context: &Context) -> Result<Arc<Gpu>> {
+    static TOLD: Once = Once::new();
+    let gpu = open_gpu(context)?;
+    let name = &gpu.capabilities().name;
+    // What follows in brackets are versions of the compiler inside of the driver.
+    let short = name.split(" (").next().unwrap_or(name);
+    TOLD.call_once(|| match gpu.is_cpu() {
+        true => tracing::info!("Using the CPU ({short}). A GPU is much faster."),
+        false => tracing::info!("Using the GPU {short}."),
+    });
     Ok(gpu)
 }
 

@@ -54,9 +54,10 @@ impl Running {
             return None;
         }
         if is_terminal {
-            let (total, what) = (self.total, &self.what);
-            let bar = self.bar.get_or_insert_with(|| bar(total, what.clone()));
+            let (total, text) = (self.total, self.text(self.start.elapsed()));
+            let bar = self.bar.get_or_insert_with(|| bar(total));
             bar.set_position(self.done);
+            bar.set_message(text);
             bar.tick();
             return None;
         }
@@ -64,11 +65,16 @@ impl Running {
             return None;
         }
         let is_first = self.told.replace(Instant::now()).is_none();
-        Some(match self.total {
-            0 if is_first => self.what.clone(),
-            0 => format!("{}: {} s so far", self.what, self.start.elapsed().as_secs()),
-            total => format!("{}: {} of {total}", self.what, self.done),
-        })
+        Some(self.text(if is_first { Duration::ZERO } else { self.start.elapsed() }))
+    }
+
+    /// How far the stage is, or how long it has run if that is not known.
+    fn text(&self, spent: Duration) -> String {
+        match (self.total, spent.as_secs()) {
+            (0, 0) => self.what.clone(),
+            (0, seconds) => format!("{}: {seconds} s so far", self.what),
+            (total, _) => format!("{}: {} of {total}", self.what, self.done),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 mod table;
 
 use crate::cli::support::{
-    Context, SceneArgs, ScoreArgs, TableArg, Watcher, near_plane, open_gpu, open_model, open_scene,
+    Context, SceneArgs, ScoreArgs, TableArg, Watcher, near_plane, open_gpu_for_long, open_model, open_scene,
     require_labels,
 };
 use crate::engine::{Engine, EngineSize};
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let mut watcher = Watcher::new(picture_count(&layout), args.scoring.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let size = EngineSize::of_model(&model, sizes);
-    let mut engine = Engine::new(open_gpu(context)?, size, args.scoring.memory.options())?;
+    let mut engine = Engine::new(open_gpu_for_long(context)?, size, args.scoring.memory.options())?;
     let min_confidence = args.scoring.sure.min_confidence;
     let mut whole = Whole { engine: &mut engine, model: &model, min_confidence };
     let report = run_bench(&layout, &bench, &mut whole, &mut watcher)?;

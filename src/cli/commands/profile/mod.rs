@@ -6,7 +6,7 @@ pub mod timed;
 
 use crate::cli::commands::profile::report::{Clocks, Measured, Profile, Window, Workers};
 use crate::cli::support::parsers::share;
-use crate::cli::support::{Context, JsonFileArg, Progress, SceneArgs, open_gpu, open_model, open_scene};
+use crate::cli::support::{Context, JsonFileArg, Progress, SceneArgs, open_gpu_for_long, open_model, open_scene};
 use crate::gpu::Gpu;
 use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians};
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
         return compare::run([old, new], args.tolerance.into(), context.json || args.json.file.is_some());
     }
     let config = decide(args)?;
-    let gpu = open_gpu(context)?;
+    let gpu = open_gpu_for_long(context)?;
     let dataset = open(args, &config)?;
     let model = match &args.model {
         Some(path) => open_model(path)?,

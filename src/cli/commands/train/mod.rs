@@ -7,11 +7,11 @@ use crate::Result;
 use crate::cli::commands::train::args::TrainArgs;
 use crate::cli::commands::view::Typed;
 use crate::cli::support::shell_words::typed;
-use crate::cli::support::{Context, Progress, log, open_gpu, signals};
+use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted, signals};
 use crate::report::text::duration;
 use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
 use crate::viewer::Watched;
-use crate::words::counted;
+use crate::words::{brief, counted};
 
 /// Trains a model and prints a summary.
 pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
@@ -19,7 +19,7 @@ pub(crate) fn run(args: &TrainArgs, context: &Context) -> Result<()> {
         Some(folder) => network::run(args, folder, context)?,
         None => once(args, context)?,
     };
-    context.show(&summary.to_json(), &sentence(&summary))
+    context.show(&summary.to_json(), &(sentence(&summary) + &next(args)))
 }
 
 fn once(args: &TrainArgs, context: &Context) -> Result<Summary> {
@@ -51,7 +51,7 @@ fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summar
 fn observed(request: Request, context: &Context, observer: &mut dyn Observer) -> Result<Summary> {
     let open = || {
         signals::check()?;
-        open_gpu(context)
+        open_gpu_for_long(context)
     };
     let before = log::warnings().len();
     let warnings = || log::warnings().split_off(before);
@@ -78,8 +78,8 @@ impl Observer for Terminal<'_> {
                 if let Some(progress) = &mut self.progress {
                     progress.set(u64::from(step), || {
                         let (loss, label) = report.map_or((f64::NAN, 0.0), |report| (report.loss, report.label_loss));
-                        let label = if label > 0.0 { format!(" label loss {label:.4}") } else { String::new() };
-                        format!("loss {loss:.4}{label} {}", counted(live.gaussian_count(), "Gaussian"))
+                        let label = if label > 0.0 { format!(" + {label:.3}") } else { String::new() };
+                        format!("loss {loss:.3}{label}, {} Gaussians", brief(live.gaussian_count().into()))
                     });
                 }
                 if is_last {
@@ -90,6 +90,12 @@ impl Observer for Terminal<'_> {
         }
         Ok(if signals::is_noted() { Flow::Stop } else { Flow::Continue })
     }
+}
+
+/// Returns the command that shows what was trained.
+fn next(args: &TrainArgs) -> String {
+    let [out, scene] = [&args.output, &args.scene].map(|path| quoted(&path.display().to_string()));
+    format!("View it: labelgs view {out} --scene {scene}\n")
 }
 
 fn sentence(summary: &Summary) -> String {
@@ -103,12 +109,12 @@ fn sentence(summary: &Summary) -> String {
     );
     if let Some(mean) = summary.scores.as_ref().map(|scores| &scores.mean) {
         text += &format!(
-            "; test views: PSNR {:.2} dB, SSIM {:.4}",
+            "; held-out views: PSNR {:.2} dB, SSIM {:.3}",
             mean.psnr.unwrap_or(f64::NAN),
             mean.ssim.unwrap_or(f64::NAN)
         );
         if let Some(iou) = mean.objects.iou_map {
-            text += &format!(", IoU of the label map {iou:.3}");
+            text += &format!(", IoU of labels {iou:.3}");
         }
     }
     text + "\n"
