@@ -424,7 +424,19 @@ fn list_tells_every_label() {
         assert_eq!((&json["schema_version"], &json["gaussians"]), (&1.into(), &6.into()));
         assert_eq!((&json["labels"][2]["label"], &json["labels"][2]["count"]), (&3.into(), &3.into()));
         assert_eq!(json["labels"][2]["centre"], serde_json::json!([4.0, 0.0, 1.0]));
+        assert!(json["labels"][2]["oriented"]["sizes"][0].as_f64() > Some(0.0), "{json}");
     }
+    let output = labelgs(&["list", model, "--csv"]);
+    let table = text(&output.stdout);
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert!(rows.len() == 4 && rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
+    let cell = |title: &str| rows[3][rows[0].iter().position(|found| *found == title).expect("a column")];
+    assert_eq!([cell("label"), cell("gaussians"), cell("centre_x"), cell("centre_z")], ["3", "3", "4", "1"]);
+    let size = |number: u32| cell(&format!("box_size_{number}")).parse::<f64>().expect("a number");
+    let volume: f64 = cell("volume").parse().expect("a number");
+    assert!((size(1) * size(2) * size(3) - volume).abs() < 1e-9 * volume && size(1) >= size(2), "{table}");
+    let both = labelgs(&["list", model, "--csv", "--json"]);
+    assert!(both.status.code() == Some(2) && text(&both.stderr).contains("--csv"), "{}", text(&both.stderr));
 }
 
 #[test]
