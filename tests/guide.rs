@@ -1,6 +1,7 @@
 //! The commands that README.md and the guide show run as they stand, one after the other, in an empty folder. Only the
 //! long trainings are cut short, and the made scene is smaller.
 
+use labelgs::edit::strokes::StrokesFile;
 use labelgs::masks::nested::{self, FoundMask};
 use std::collections::BTreeSet;
 use std::fs;
@@ -73,6 +74,18 @@ fn segment(folder: &Path) {
     }
 }
 
+/// The strokes that a page shows, for the smaller scene.
+fn stroke(page: &Path, folder: &Path) {
+    let text = fs::read_to_string(page).expect("a page");
+    let shown = text.split("\n```").filter_map(|part| part.strip_prefix("json\n"));
+    let mut files = shown.filter_map(|text| serde_json::from_str::<StrokesFile>(text).ok());
+    let mut file = files.next().expect("a file of strokes");
+    for point in file.strokes.iter_mut().flat_map(|stroke| &mut stroke.points) {
+        *point = point.map(|at| at * 0.3);
+    }
+    fs::write(folder.join("strokes.json"), serde_json::to_string(&file).expect("JSON")).expect("a file");
+}
+
 /// The made scene at three tenths of its size, with fewer photos, and pixels that are named there.
 fn shrink(words: &mut Vec<String>) {
     if words[1] == "synth" && !words.iter().any(|word| word == "--size") {
@@ -131,6 +144,9 @@ fn run(pages: &[PathBuf]) {
             if words.iter().any(|word| word == "--network") {
                 segment(folder.path());
                 continue;
+            }
+            if words.iter().any(|word| word == "--strokes") {
+                stroke(page, folder.path());
             }
             if words[0] != "labelgs" {
                 let is_known = words[0] == "cargo" || words.iter().any(|word| Path::new(ROOT).join(word).is_file());

@@ -2,8 +2,11 @@
 
 use crate::support;
 use assert_cmd::Command;
+use labelgs::edit::strokes::{Stroke, StrokesFile};
+use labelgs::files::label_table::LabelTable;
 use labelgs::formats::read_model;
 use labelgs::masks::read_mask;
+use labelgs::scene::LabelMap;
 use serde_json::Value;
 use std::path::Path;
 
@@ -19,6 +22,58 @@ fn labelgs(args: &[&str], status: i32) -> String {
 #[track_caller]
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A stroke across a mask's id, through the pixel that is farthest from its border.
+fn stroke(mask: &LabelMap, id: u16) -> Stroke {
+    let depths = mask.depths(id);
+    let at = (0..depths.len()).max_by_key(|&at| depths[at]).expect("pixels") as u32;
+    let (x, y) = (at % mask.width, at / mask.width);
+    let is_in = |x: &u32| mask.get(*x, y) == Some(id);
+    let [left, right] = [(0..=x).rev().take_while(is_in).last(), (x..).take_while(is_in).last()];
+    let points = [left, right].into_iter().flatten().map(|x| [f64::from(x), f64::from(y)]).collect();
+    let (view, label, name) = ("003".into(), u32::from(id), (id == 2).then(|| "second".to_owned()));
+    Stroke { view, points, radius: 0.0, label, name, on: true }
+}
+
+/// Strokes on each object in one view, compared with the votes of all masks.
+fn strokes_make_objects(folder: &Path) {
+    let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let labels = |name: &str| read_model(folder.join(name)).expect("a model").gaussians.labels.expect("labels");
+    let (plain, scene, file, cut) = (path("plain"), path("scene"), path("strokes.json"), path("cut.ply"));
+    let write = |strokes: Vec<Stroke>| {
+        let text = serde_json::to_string(&StrokesFile::new(strokes)).expect("JSON");
+        std::fs::write(&file, text).expect("a file");
+    };
+    let mask = read_mask(folder.join("scene/masks/003.png")).expect("a mask");
+    let strokes: Vec<Stroke> = (0..=3).map(|id| stroke(&mask, id)).collect();
+    write(strokes.clone());
+    let label = ["label", &plain, "--scene", &scene, "--strokes", &file, "-o", &cut];
+    let said = json(&labelgs(&[&label[..], &["--json", "-q"]].concat(), 0));
+    assert_eq!((&said["strokes"], said["labels"].as_array().map(Vec::len)), (&Value::from(4), Some(3)), "{said}");
+    let (truth, found) = (labels("labelled.ply"), labels("cut.ply"));
+    for id in 1..=3 {
+        let of = |both: bool| {
+            let rows = truth.iter().zip(&found).map(|(a, b)| (*a == id, *b == id));
+            rows.filter(|&(a, b)| if both { a && b } else { a || b }).count()
+        };
+        assert!(2 * of(true) > of(false), "object {id}: {} of {}", of(true), of(false));
+    }
+    let table = LabelTable::read(&folder.join("cut.labels.json")).expect("names");
+    assert_eq!((table.by_name("second"), table.name(1)), (Some(2), None));
+
+    // A stroke that leaves its photo, or is of no view, is told by its number.
+    let wrong = |change: &dyn Fn(&mut Stroke), expected: &str| {
+        let mut strokes = strokes.clone();
+        change(&mut strokes[2]);
+        write(strokes);
+        let said = labelgs(&label, 3);
+        assert!(said.contains("strokes.json") && said.contains("stroke 3") && said.contains(expected), "{said}");
+    };
+    wrong(&|stroke| stroke.points.push([96.0, 3.0]), "point 3 (96, 3) is outside of the photo, which has 96 x 72 px");
+    wrong(&|stroke| stroke.view = "nowhere".into(), "no view is called nowhere");
+    let both = labelgs(&[&label[..], &["--masks", &path("scene/masks")]].concat(), 2);
+    assert!(both.contains("--strokes") && both.contains("--masks"), "{both}");
 }
 
 /// Pixels of each id in a mask.
@@ -56,6 +111,8 @@ fn a_model_without_labels_gets_them_and_mends_masks() {
     let count = |labels: &[u32]| labels.iter().filter(|&&label| label != 0).count();
     let votes = read_model(&model).expect("model").gaussians.labels.expect("labels");
     assert!(count(&of_rule) < count(&votes) && count(&of_rule) > 0);
+
+    strokes_make_objects(folder.path());
 
     // Give each view its own ids, then repair them.
     let (spoilt, mended) = (path("spoilt"), path("mended"));

@@ -2,6 +2,7 @@
 
 mod click;
 mod like;
+mod strokes;
 
 use crate::cli::commands::masks::repair::table;
 use crate::cli::support::nested_masks::{MaskFolders, choose_objects};
@@ -32,7 +33,7 @@ use std::time::Instant;
     .args(["scene", "masks", "per_view", "rule", "mask_border", "min_confidence", "near"])
     .args(["test_every", "max_resolution", "ignore", "poses"]))]
 pub struct LabelArgs {
-    /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Existing labels are replaced.
+    /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Masks replace existing labels.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the cameras of the masks.
@@ -40,7 +41,7 @@ pub struct LabelArgs {
     pub scene: Option<PathBuf>,
     /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
     /// together choose which of the nested masks are objects.
-    #[arg(long, value_name = "DIR", required_unless_present_any = ["places", "like"])]
+    #[arg(long, value_name = "DIR", required_unless_present_any = ["places", "like", "strokes"])]
     pub masks: Option<PathBuf>,
     /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
     /// `masks repair`.
@@ -55,8 +56,12 @@ pub struct LabelArgs {
     pub clicks: click::ClickArgs,
     /// Instead of masks, another model with labels, of which MODEL is a copy that a program has changed: Gaussians may be gone,
     /// merged, sorted or rounded. Each gets the label of the one at its place, else of the nearest there. Needs no device.
-    #[arg(long, value_name = "LABELLED", conflicts_with_all = ["views", "ClickArgs", "FileArgs"])]
+    #[arg(long, value_name = "LABELLED", conflicts_with_all = ["views", "ClickArgs", "FileArgs", "strokes"])]
     pub like: Option<PathBuf>,
+    /// File of lines over photos, on objects and on what belongs to none, instead of masks. Their objects get the labels and names of
+    /// the file, and other labels stay.
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["masks", "places"], help_heading = "Strokes")]
+    pub strokes: Option<PathBuf>,
     /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
     /// which it is the main Gaussian of a pixel.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
@@ -80,7 +85,10 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     if let Some(labelled) = &args.like {
         return like::run(args, labelled, context);
     }
-    let scene = args.scene.as_ref().ok_or_else(|| Error::usage("--scene", "is missing; masks and clicks need it"))?;
+    let scene = args.scene.as_ref().ok_or_else(|| Error::usage("--scene", "is missing; masks, clicks and strokes need it"))?;
+    if let Some(file) = &args.strokes {
+        return strokes::run(args, (scene, file), context);
+    }
     let Some(folder) = &args.masks else {
         return click::run(args, scene, context);
     };
