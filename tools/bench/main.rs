@@ -25,6 +25,7 @@ mod shadergen;
 mod sort;
 mod split;
 mod steps;
+mod strokes;
 mod tile;
 mod trained;
 mod training;
@@ -75,6 +76,8 @@ enum Command {
     Clicks(clicks::Options),
     /// Meshes of the objects of a trained model, against the true surfaces.
     Meshes(meshes::Options),
+    /// Objects from strokes that a rule draws, compared with true masks.
+    Strokes(strokes::Options),
     /// A large model from a trained one, to be timed.
     Split(split::Options),
     /// Predicted against measured memory of training.
@@ -106,6 +109,7 @@ fn run() -> Result<()> {
         Command::Order(options) => order::run(&options),
         Command::Clicks(options) => clicks::run(&options),
         Command::Meshes(options) => meshes::run(&options),
+        Command::Strokes(options) => strokes::run(&options),
         Command::Split(options) => split::run(&options),
         Command::Memory(common) => memory::run(&common),
         Command::Large(options) => large::run(&options),

@@ -85,7 +85,8 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     if let Some(labelled) = &args.like {
         return like::run(args, labelled, context);
     }
-    let scene = args.scene.as_ref().ok_or_else(|| Error::usage("--scene", "is missing; masks, clicks and strokes need it"))?;
+    let scene =
+        args.scene.as_ref().ok_or_else(|| Error::usage("--scene", "is missing; masks, clicks and strokes need it"))?;
     if let Some(file) = &args.strokes {
         return strokes::run(args, (scene, file), context);
     }
