@@ -80,9 +80,7 @@ impl Chosen {
                 let hit = hit(from, (points, *radius), (painter, source))?;
                 let label = if *on { OBJECT } else { UNLABELLED };
                 self.seeds.extend(hit.into_iter().map(|row| Seed { row, label, is_on: true }));
-                let mut cutting = Cutting::new(model)?;
-                cutting.add(&self.seeds);
-                (cutting.cut()?.into_iter().map(|label| label == OBJECT).collect(), Combine::Replace)
+                (self.cut(model)?, Combine::Replace)
             }
             Choose::Labels { labels, how } => {
                 ((0..model.len()).map(|row| labels.contains(&model.label(row))).collect(), *how)
@@ -109,6 +107,18 @@ impl Chosen {
         let found: Vec<bool> = found.into_iter().zip(is_free).map(|(is_in, is_free)| is_in && is_free).collect();
         self.rows = how.join(&self.rows, &found);
         Ok(())
+    }
+
+    /// Returns the object of the strokes. Before one is on something else, that is what they hit.
+    fn cut(&self, model: &Gaussians) -> Result<Vec<bool>> {
+        if self.seeds.iter().all(|seed| seed.label == OBJECT) {
+            let mut rows = vec![false; model.len()];
+            self.seeds.iter().for_each(|seed| rows[seed.row] = true);
+            return Ok(rows);
+        }
+        let mut cutting = Cutting::new(model)?;
+        cutting.add(&self.seeds);
+        Ok(cutting.cut()?.into_iter().map(|label| label == OBJECT).collect())
     }
 
     fn nearby(&mut self, model: &Gaussians) -> Result<&Nearby> {

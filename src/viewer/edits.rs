@@ -25,7 +25,8 @@ pub(super) struct Work<'a> {
     folder: PathBuf,
     /// The model that the changes make, once there are some, and whether it is written.
     output: Option<(PathBuf, bool)>,
-    /// Number of changes of the rows.
+    /// Number of changes, taken back or not, and of those of the rows.
+    version: u64,
     rows_version: u64,
     /// Why the list of changes is not on the disk, if it is not.
     problem: Option<Error>,
@@ -58,6 +59,7 @@ impl<'a> Work<'a> {
             undone: Vec::new(),
             folder,
             output: None,
+            version: 0,
             rows_version: 0,
             problem: None,
         }
@@ -65,7 +67,11 @@ impl<'a> Work<'a> {
 
     /// Starts again with another model.
     pub(super) fn reopened(&self, typed: &Path, model: Gaussians, table: Option<LabelTable>) -> Self {
-        Self { rows_version: self.rows_version + 1, ..Self::new(typed, model, table, self.words) }
+        Self {
+            version: self.version + 1,
+            rows_version: self.rows_version + 1,
+            ..Self::new(typed, model, table, self.words)
+        }
     }
 
     pub(super) fn model(&self) -> &Gaussians {
@@ -84,6 +90,11 @@ impl<'a> Work<'a> {
     /// Returns true if the model differs from the file.
     pub(super) fn is_changed(&self) -> bool {
         !self.done.is_empty()
+    }
+
+    /// Returns what tells this state from all others.
+    pub(super) fn version(&self) -> u64 {
+        self.version
     }
 
     /// Returns what tells models of other Gaussians apart.
@@ -115,6 +126,7 @@ impl<'a> Work<'a> {
             now = now.apply(&done.edit, &mut sights)?;
         }
         self.now = now;
+        self.version += 1;
         self.rows_version += u64::from(last.edit.changes_rows());
         self.undone.push(last.edit);
         self.note();
@@ -136,6 +148,7 @@ impl<'a> Work<'a> {
         let told = self.now.told(&edit);
         let before = std::mem::replace(&mut self.now, after);
         self.first.get_or_insert(before);
+        self.version += 1;
         self.rows_version += u64::from(edit.changes_rows());
         let is_slow = matches!(edit, Edit::Remove { fill: true, .. });
         self.done.push(Done { edit, told, after: is_slow.then(|| self.now.clone()) });

@@ -77,6 +77,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         object: finder.map(Object::new),
         object_label: None,
         shown: Shown::default(),
+        told: None,
         portraits: Portraits::default(),
         scores: Vec::new(),
         views: finished.dataset.train.iter().filter(|view| view.photo.is_some()).collect(),

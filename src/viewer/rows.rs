@@ -1,5 +1,7 @@
 //! Rows of the label panel, and a history of steps of bounded length.
 
+use crate::edit::catalogue::Catalogue;
+use crate::edit::oriented_box::Boxes;
 use crate::edit::select::{LabelSummary, mean_confidence, summarise};
 use crate::files::label_table::LabelTable;
 use crate::scene::Gaussians;
@@ -13,6 +15,12 @@ const ROWS_MAX: usize = 4096;
 /// Returns the rows for the labels of a finished model.
 pub(super) fn of_model(model: &Gaussians, table: Option<&LabelTable>) -> Value {
     let confidence = mean_confidence(model);
+    let mut boxes = Boxes::new(&Catalogue::new(model, None).gaussians);
+    for row in 0..model.len() {
+        let weight = model.opacity(row) * model.label_confidence.as_ref().map_or(1.0, |shares| f64::from(shares[row]));
+        boxes.add(model.label(row), model.world(row), weight, model.quats[row].map(f64::from), model.scales[row]);
+    }
+    let boxes = boxes.finish();
     let row = |summary: &LabelSummary| {
         json!({
             "id": summary.label,
@@ -22,6 +30,7 @@ pub(super) fn of_model(model: &Gaussians, table: Option<&LabelTable>) -> Value {
             "confidence": confidence.get(&summary.label),
             "min": summary.min,
             "max": summary.max,
+            "box": boxes.get(&summary.label),
         })
     };
     let all = if model.labels.is_some() { summarise(model) } else { Vec::new() };

@@ -38,6 +38,8 @@ pub(super) struct Session<'a> {
     /// The label with which the object is drawn until it has one.
     pub(super) object_label: Option<u32>,
     pub(super) shown: Shown,
+    /// State of the model whose labels pages know.
+    pub(super) told: Option<u64>,
     pub(super) portraits: Portraits,
     pub(super) scores: Vec<Score>,
     /// The training views, for what fills a hole.
@@ -202,10 +204,13 @@ impl Session<'_> {
 
     pub(super) fn publish(&mut self) {
         self.publish_object();
-        self.hub.publish("labels", &rows::of_model(self.work.model(), self.work.table()));
+        if self.told != Some(self.work.version()) {
+            self.told = Some(self.work.version());
+            self.hub.publish("labels", &rows::of_model(self.work.model(), self.work.table()));
+            self.portraits.note(self.work.model());
+        }
         self.hub.publish("edits", &self.work.describe());
         self.hub.publish("chosen", &self.chosen.describe());
-        self.portraits.note(self.work.model());
         let Shown { hidden, solo } = &self.shown;
         let background = self.drawing.options.background;
         self.hub

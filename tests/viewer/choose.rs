@@ -93,9 +93,14 @@ fn choices_join_and_become_labels() {
     choose(&mut page, &json!({ "select": "nothing" }));
     let alone = choose(&mut page, &stroke(&json!([pixel]), true));
     let row = page.pick(&json!({ "view": 0 }), pixel)["gaussian"].as_u64();
-    assert!(alone > 0 && row.is_some());
-    let less = choose(&mut page, &stroke(&json!([[2, 2], [60, 2], [60, 46], [2, 46]]), false));
-    assert!(less < alone, "{less} {alone}");
+    assert!((1..=9).contains(&alone) && row.is_some(), "what a point hits: {alone}");
+    let mut rest = (0..3072_u32).map(|at| [at * 37 % 64, at * 29 % 48]);
+    let other = rest.find(|&at| {
+        let gaussian = page.pick(&json!({ "view": 0 }), at)["gaussian"].as_u64();
+        gaussian.is_some() && gaussian != row && at[0].abs_diff(pixel[0]) > 12
+    });
+    let cut = choose(&mut page, &stroke(&json!([other.expect("something else")]), false));
+    assert!(cut > 0 && cut < all, "the object without what is not it: {cut}");
 
     // What is chosen is drawn in a colour of its own, and becomes a label; the list makes the same bytes.
     page.send(&json!({ "kind": "choose", "what": { "select": "nothing" } }));

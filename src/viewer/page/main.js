@@ -60,6 +60,7 @@ function hear(message) {
 /** Draws a line around the selection and the object that was found. */
 function mark() {
   const found = finding.mark === null ? [] : [finding.mark];
+  measuring.setBoxes(edits.chosen.filter((id) => id !== 0).map((id) => labels.row(id)?.box).filter(Boolean));
   stage.setMark([...edits.chosen.filter((id) => id !== 0), ...found]);
   // The object keeps its label while it grows.
   const what = JSON.stringify([finding.mark, finding.state?.count, finding.state?.flags, finding.state?.first]);
@@ -332,7 +333,7 @@ const KEYS = [
   ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops"],
   ["Z", "choose an object by strokes on it; Ctrl+drag or right click: not this"],
   ["R, T, B", "choose Gaussians in a rectangle, in a line, with a brush; Alt+drag turns"], ["N, U, Y", "in a ball, by like colour, in front or behind"],
-  ["G", "choose the Gaussians of the selection"], ["+, -, L", "grow, shrink, lock what is chosen"], ["Enter, Delete", "give them a label, delete them"], ["J", "measure"],
+  ["G", "choose the Gaussians of the selection"], ["+, -, L", "grow, shrink, lock what is chosen"], ["Enter, Delete", "give them a label, delete them"], ["J", "measure; boxes of the selection"],
   ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
   ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M", "rename, merge"], ["Delete, Shift+Delete", "remove; remove and fill"],
   ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S", "export, save the model"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "leave one thing after the other"], ["C", "copy the camera"], ["K", "pause a training, or go on"],

@@ -1,12 +1,12 @@
-// Distances between two points of the surface.
+// Distances between two points of the surface, and sizes of objects.
 
 import { $, ask, el } from "./dom.js";
-import { length, scale, sub, toWorld } from "/algebra.js";
+import { add, length, scale, sub, toWorld } from "/algebra.js";
 
 export class Measuring {
   /** `pick` asks what is at a point of the stage. */
   constructor(stage, rig, pick) {
-    Object.assign(this, { stage, rig, pick, points: [], unit: 1, isScaled: false });
+    Object.assign(this, { stage, rig, pick, points: [], boxes: [], unit: 1, isScaled: false });
   }
 
   choose(isOn) {
@@ -43,12 +43,24 @@ export class Measuring {
     this.unit = metres / distance;
     this.isScaled = true;
     this.render();
+    this.setBoxes(this.boxes);
   }
 
   /** A length in world units as text. */
-  told(value) {
-    const shown = value * this.unit;
-    return this.isScaled ? `${shown.toPrecision(4)} m` : `${shown.toPrecision(4)} units`;
+  told(value) { return `${(value * this.unit).toPrecision(4)} ${this.isScaled ? "m" : "units"}`; }
+
+  /** The size of an object as text. */
+  size({ sizes, volume }) {
+    const number = (value) => Number(value.toPrecision(3));
+    const name = this.isScaled ? "m" : "units";
+    return `${sizes.map((side) => number(side * this.unit)).join(" × ")} ${name}, volume ${number(volume * this.unit ** 3)}`;
+  }
+
+  /** Takes the boxes of the selected objects, which are drawn with the tool. */
+  setBoxes(boxes) {
+    this.boxes = boxes;
+    $("selection-size").textContent = boxes.length === 1 ? this.size(boxes[0]) : "";
+    this.draw();
   }
 
   render() {
@@ -62,11 +74,18 @@ export class Measuring {
     this.draw();
   }
 
-  /** Draws the line over the picture. */
+  /** Draws the line and the boxes over the picture. */
   draw() {
-    if (!this.isOn) return;
-    const seen = this.points.map((point) => this.stage.seen(point)).filter(Boolean);
-    this.stage.line = seen;
+    const lines = this.isOn ? [this.points, ...this.boxes.flatMap(edges)] : [];
+    if (lines.length === 0 && this.stage.lines.length === 0) return;
+    this.stage.lines = lines.map((line) => line.map((point) => this.stage.seen(point)).filter(Boolean));
     this.stage.paint();
   }
+}
+
+/** The twelve edges of a box along the axes of an object. */
+function edges({ centre, axes, sizes }) {
+  const corner = (index) => axes.reduce((at, axis, side) => add(at, scale(axis, (index >> side & 1 ? 0.5 : -0.5) * sizes[side])), centre);
+  const pairs = [0, 1, 2].flatMap((side) => [0, 1, 2, 3, 4, 5, 6, 7].filter((index) => !(index >> side & 1)).map((index) => [index, index | 1 << side]));
+  return pairs.map(([a, b]) => [corner(a), corner(b)]);
 }

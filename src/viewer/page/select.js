@@ -78,7 +78,8 @@ export class Selecting {
     const isTool = this.isOn && this.hand === this;
     $("chosen").hidden = !isTool && count === 0;
     const hint = { strokes: "Draw on the object; Ctrl: on what is not it", box: "Drag a rectangle", lasso: "Draw around them", brush: "Paint over them", ball: "Click on the middle", flood: "Click on a surface", depth: "Click: in front of it; right click: behind" }[this.tool];
-    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} chosen` : `${hint ?? ""}${this.tool === "strokes" ? "" : " · Shift adds, Ctrl takes away"}`;
+    const more = this.tool === "strokes" ? " · Ctrl: draw on what is not it" : "";
+    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} chosen${more}` : `${hint ?? ""}${this.tool === "strokes" ? "" : " · Shift adds, Ctrl takes away"}`;
     $("chosen-tools").hidden = count === 0;
     $("chosen-unlock").hidden = locked === 0;
     $("chosen-unlock").textContent = `Unlock ${locked}`;

@@ -34,8 +34,8 @@ export class Stage {
     this.hovered = null;
     this.map = null;
     this.overlay = null;
-    // Points of a line over the picture, px of the canvas.
-    this.line = [];
+    // Lines over the picture, each as points, px of the canvas.
+    this.lines = [];
     this.isExact = false;
     this.frame = null;
     this.photos = new Map();
@@ -238,17 +238,16 @@ export class Stage {
       put(this.overlay, this.area(0));
       if (this.isPair) put(this.overlay, this.area(1));
     }
-    this.paintLine();
+    this.paintLines();
   }
 
-  paintLine() {
-    const { context, line } = this;
-    if (line.length === 0) return;
-    for (const [width, style] of [[4, "#000a"], [2, "#fff"]]) {
+  paintLines() {
+    const { context, lines } = this;
+    for (const [width, style] of lines.length > 0 ? [[4, "#000a"], [2, "#fff"]] : []) {
       Object.assign(context, { lineWidth: width, strokeStyle: style });
       context.beginPath();
-      line.forEach(([x, y], index) => (index === 0 ? context.moveTo(x, y) : context.lineTo(x, y)));
-      line.forEach(([x, y]) => { context.moveTo(x + 5, y); context.arc(x, y, 5, 0, 7); });
+      for (const line of lines) line.forEach(([x, y], index) => (index === 0 ? context.moveTo(x, y) : context.lineTo(x, y)));
+      lines[0].forEach(([x, y]) => { context.moveTo(x + 5, y); context.arc(x, y, 5, 0, 7); });
       context.stroke();
     }
   }
