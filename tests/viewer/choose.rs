@@ -99,7 +99,10 @@ fn choices_join_and_become_labels() {
         let gaussian = page.pick(&json!({ "view": 0 }), at)["gaussian"].as_u64();
         gaussian.is_some() && gaussian != row && at[0].abs_diff(pixel[0]) > 12
     });
-    let cut = choose(&mut page, &stroke(&json!([other.expect("something else")]), false));
+    page.send(&json!({ "kind": "choose", "what": stroke(&json!([other.expect("something else")]), false) }));
+    page.pick(&json!({ "view": 0 }), pixel);
+    // The same number is not told twice, but to every new page.
+    let cut = server.page().hear("chosen")["count"].as_u64().expect("a count");
     assert!(cut > 0 && cut < all, "the object without what is not it: {cut}");
 
     // What is chosen is drawn in a colour of its own, and becomes a label; the list makes the same bytes.
