@@ -5,21 +5,17 @@ use crate::error::Result;
 use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8};
 use crate::render::pictures::{depth_preview, to_word};
 use crate::render::{Parts, Rendered};
-use crate::scene::colour::to_byte;
+use crate::scene::colour::{HEAT, HEAT_MAX, on_scale, to_byte};
 use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
 
 /// Share of the label's colour in labels over colour.
 const TINT: f32 = 0.55;
-/// Error that has the brightest colour, of 1.
-const ERROR_MAX: f32 = 0.25;
 /// Quality of JPEGs, for moving pictures on slow lines.
 const QUALITY: u8 = 70;
 
 /// Colours of no to full confidence.
 const CONFIDENCE: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
-/// Colours of no to much error.
-const ERROR: [[u8; 3]; 5] = [[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]];
 
 /// What panes need besides the render.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,14 +71,6 @@ fn tinted((colour, &id): (&[f32; 3], &u32)) -> [u8; 3] {
     [0, 1, 2].map(|c| to_byte(colour[c].clamp(0.0, 1.0) * (1.0 - TINT) + label[c] * TINT))
 }
 
-/// Returns the colour of a share from 0 to 1 on a scale.
-fn on_scale(scale: &[[u8; 3]], share: f32) -> [u8; 3] {
-    let at = share.clamp(0.0, 1.0) * (scale.len() - 1) as f32;
-    let low = (at as usize).min(scale.len() - 2);
-    let part = at - low as f32;
-    [0, 1, 2].map(|c| (f32::from(scale[low][c]) * (1.0 - part) + f32::from(scale[low + 1][c]) * part).round() as u8)
-}
-
 fn confidence(row: i32, known: Option<&[f32]>) -> [u8; 3] {
     let row = usize::try_from(row).ok();
     row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| on_scale(&CONFIDENCE, share))
@@ -102,7 +90,7 @@ fn errors(rendered: &Rendered, photo: Option<&Photo>) -> Vec<[u8; 3]> {
             return [0; 3];
         }
         let of = |value: f32, truth: u8| (value.clamp(0.0, 1.0) - f32::from(truth) / 255.0).abs();
-        on_scale(&ERROR, (of(colour[0], r) + of(colour[1], g) + of(colour[2], b)) / 3.0 / ERROR_MAX)
+        on_scale(&HEAT, (of(colour[0], r) + of(colour[1], g) + of(colour[2], b)) / 3.0 / HEAT_MAX)
     };
     rendered.rgb.iter().enumerate().map(pixel).collect()
 }
