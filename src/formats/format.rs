@@ -1,5 +1,6 @@
 //! The interface of model file formats.
 
+use crate::transform::Transform;
 use glam::DVec3;
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::{Gaussians, Result};
@@ -18,6 +19,8 @@ pub struct ReadModel {
     pub dropped: u64,
     /// Notes for the user, a line each.
     pub notes: Vec<String>,
+    /// Where to see the model from at first, if the file says it.
+    pub first_view: Option<FirstView>,
 }
 
 /// How labels are written.
@@ -56,17 +59,31 @@ pub struct WriteOptions {
     pub label_type: LabelType,
     /// Version of SPZ files.
     pub spz_version: SpzVersion,
-    /// Where a page shows the model from at first; without it from above, with y as down.
+    /// Where the model is shown from at first, for formats with a place for it. Without it a page shows the model from above,
+    /// with y as down.
     pub first_view: Option<FirstView>,
 }
 
-/// Where a page looks at a model from at first.
+/// Where a model is seen from at first, and upright.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstView {
     /// Direction of up in the world, of length 1.
     pub up: DVec3,
     /// Position of the eye in the world.
     pub eye: DVec3,
+}
+
+impl FirstView {
+    /// Takes both from numbers of a file; `None` for those that are none.
+    pub(crate) fn checked(up: DVec3, eye: DVec3) -> Option<Self> {
+        let up = up.try_normalize().filter(|_| eye.as_vec3().is_finite());
+        up.map(|up| Self { up, eye })
+    }
+
+    /// Returns the view of the model at another place.
+    pub fn moved(self, by: &Transform) -> Self {
+        Self { up: by.turn * self.up, eye: by.place(self.eye) }
+    }
 }
 
 /// A model on its way into a file.

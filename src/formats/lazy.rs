@@ -1,6 +1,6 @@
 //! A model of which only a part may be in memory.
 
-use super::{ReadModel, Row, StoredModel, open_stored, read_model};
+use super::{FirstView, ReadModel, Row, StoredModel, open_stored, read_model};
 use glam::DVec3;
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::{Gaussians, Result};
@@ -30,6 +30,14 @@ impl LazyModel {
         match self {
             Self::Stored(_) => None,
             Self::Whole(read) => read.names.as_ref(),
+        }
+    }
+
+    /// Where to see the model from at first, if the file says it.
+    pub fn first_view(&self) -> Option<FirstView> {
+        match self {
+            Self::Stored(stored) => stored.first_view,
+            Self::Whole(read) => read.first_view,
         }
     }
 

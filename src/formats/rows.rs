@@ -137,7 +137,7 @@ impl Rows {
         };
         notes.extend(self.sieve.note());
         let (dropped, far) = (self.sieve.dropped(), far_origin(&self.positions));
-        Ok(ReadModel { gaussians: self.gaussians(origin, far), names: None, dropped, notes })
+        Ok(ReadModel { gaussians: self.gaussians(origin, far), dropped, notes, ..ReadModel::default() })
     }
 
     /// Returns the rows, whose positions are relative to `origin`, about a place `far` from there.

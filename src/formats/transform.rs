@@ -71,13 +71,17 @@ impl Transform {
         Some(Self { origin: turn.inverse() * -moved / scale, turn, scale })
     }
 
+    /// Returns where a place goes, world units.
+    pub fn place(&self, place: DVec3) -> DVec3 {
+        self.scale * (self.turn * (place - self.origin))
+    }
+
     /// Returns the transformed model.
     pub fn apply(&self, model: &Gaussians) -> Result<Gaussians> {
         if !(self.scale > 0.0 && self.scale.is_finite() && self.origin.is_finite() && self.turn.is_normalized()) {
             return Err(Error::usage("Transform", format!("{self:?} is no change of place with a scale above 0")));
         }
-        let moved = |row: usize| self.scale * (self.turn * (model.world(row) - self.origin));
-        let places: Vec<DVec3> = (0..model.len()).map(moved).collect();
+        let places: Vec<DVec3> = (0..model.len()).map(|row| self.place(model.world(row))).collect();
         let mut to = model.clone();
         to.origin = far_origin(&places);
         to.means = places.iter().map(|&place| (place - to.origin).as_vec3().to_array()).collect();

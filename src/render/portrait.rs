@@ -5,8 +5,9 @@ use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::scene::colour::to_byte;
+use crate::scene::spread::quantiles;
 use crate::scene::{Camera, Gaussians};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 /// Shares of an object's Gaussians, in each direction, between which it is in the picture: single ones may be anywhere.
 const SPAN: [f64; 2] = [0.02, 0.98];
@@ -26,11 +27,7 @@ pub(crate) fn portrait(
     let sure = extract(model, &[label], MIN_LABEL_CONFIDENCE)?;
     let part = if sure.is_empty() { extract(model, &[label], 0.0)? } else { sure };
     let corners = corners(&part);
-    let camera = cameras
-        .iter()
-        .filter_map(|camera| closer(camera, &corners, side))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or_else(|| beside(&corners, up, side), |(_, camera)| camera);
+    let camera = best(cameras, &corners, side).map_or_else(|| beside(&corners, up, side), |(_, camera)| camera);
     engine.upload_model(&part)?;
     engine.grow_image(side, side)?;
     let rendered = render(engine, &camera, &RenderOptions::new(near.min(nearest(&camera, &corners)), Parts::COLOUR))?;
@@ -41,17 +38,22 @@ pub(crate) fn portrait(
     Ok(rendered.rgb.iter().zip(&rendered.alpha).map(pixel).collect())
 }
 
+/// Returns the camera that shows a model largest and whole, if one has it before it.
+pub(crate) fn best_camera<'a>(model: &Gaussians, cameras: &[&'a Camera]) -> Option<&'a Camera> {
+    best(cameras, &corners(model), 1).map(|(camera, _)| camera)
+}
+
+/// Returns the camera that shows what is between corners largest and whole, and the camera of a square around it.
+fn best<'a>(cameras: &[&'a Camera], corners: &[DVec3; 8], side: u32) -> Option<(&'a Camera, Camera)> {
+    let seen = cameras.iter().filter_map(|&camera| Some((camera, closer(camera, corners, side)?)));
+    let best = seen.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+    best.map(|(camera, (_, close))| (camera, close))
+}
+
 /// The corners of a box around most Gaussians, in the world.
 fn corners(part: &Gaussians) -> [DVec3; 8] {
-    let along = |axis: usize| {
-        let mut values: Vec<f64> = (0..part.len()).map(|row| part.world(row)[axis]).filter(|v| v.is_finite()).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        SPAN.map(|share| {
-            values.get(((values.len().max(1) - 1) as f64 * share).round() as usize).copied().unwrap_or(0.0)
-        })
-    };
-    let sides = [along(0), along(1), along(2)];
-    std::array::from_fn(|corner| DVec3::from_array([0, 1, 2].map(|axis| sides[axis][corner >> axis & 1])))
+    let ends = quantiles((0..part.len()).map(|row| part.world(row)), SPAN);
+    std::array::from_fn(|corner| DVec3::from_array([0, 1, 2].map(|axis| ends[corner >> axis & 1][axis])))
 }
 
 /// Returns how large a camera shows what is between corners, px squared, and the camera of a square around it. `None` for what is
@@ -86,15 +88,10 @@ fn beside(corners: &[DVec3; 8], up: DVec3, side: u32) -> Camera {
     let middle = corners.iter().sum::<DVec3>() / 8.0;
     let radius = middle.distance(corners[7]).max(1e-6);
     let away = (up.any_orthonormal_vector() + 0.35 * up).normalize();
-    let forward = -away;
-    let right = forward.cross(up).normalize();
-    // Rows of the rotation: right, down, forward.
-    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-    let centre = middle + away * radius * MARGIN * FOCAL * 2.0;
     let focal = FOCAL * f64::from(side);
     let half = f64::from(side) / 2.0;
     let camera = Camera::at_origin([focal, focal, half, half], (side, side));
-    Camera { rotation, translation: -(rotation * centre), ..camera }
+    camera.placed(middle + away * radius * MARGIN * FOCAL * 2.0, -away, up)
 }
 
 /// Half the depth of the nearest corner: an object that stands alone is not cut by the near plane of its scene.

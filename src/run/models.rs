@@ -3,11 +3,11 @@
 use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::files::{image, read};
-use crate::formats::{LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
+use crate::formats::{FirstView, LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
 use crate::render::Rendered;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
-use crate::scene::{Camera, Gaussians, Photo};
+use crate::scene::{Camera, Gaussians, Overview, Photo};
 use crate::scenes::camera_json;
 use crate::train::between::Between;
 use std::collections::BTreeSet;
@@ -57,6 +57,23 @@ pub fn open_lazily(path: &Path) -> Result<LazyModel> {
         log_notes(path, &read.notes);
     }
     Ok(model)
+}
+
+/// Returns where to see a model from at first: what its file says, else where the first camera of its run was.
+///
+/// # Errors
+///
+/// A model, or a list of cameras, that cannot be read.
+pub fn first_view(path: &Path) -> Result<Option<FirstView>> {
+    let file = model_file(path)?;
+    // A pipe is read once.
+    let own = if file.is_file() { LazyModel::open(&file)?.first_view() } else { None };
+    if own.is_some() {
+        return Ok(own);
+    }
+    let views = camera_json::views_of_model(path)?;
+    let all = Overview::of(views.iter().map(|view| &view.camera));
+    Ok(all.zip(views.first()).map(|(all, view)| FirstView { up: all.up, eye: view.camera.centre() }))
 }
 
 /// Looks at each row of a model that was opened from `path`, and logs the notes of the reader.

@@ -42,6 +42,16 @@ impl Camera {
         self.rotation.row(2)
     }
 
+    /// Returns the camera at another place of the world, looking along `forward` with `up` above. Where these are parallel,
+    /// another direction is up.
+    pub fn placed(&self, centre: DVec3, forward: DVec3, up: DVec3) -> Self {
+        let forward = forward.normalize();
+        let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        // Rows of the rotation: right, down, forward.
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+        Self { rotation, translation: -(rotation * centre), ..self.clone() }
+    }
+
     /// Returns the centre of the camera in world space.
     pub fn centre(&self) -> DVec3 {
         -(self.rotation.transpose() * self.translation)

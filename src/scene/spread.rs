@@ -37,9 +37,29 @@ impl Spread {
     }
 }
 
+/// Returns the coordinates below which shares of the finite ones lie, for each axis by itself; 0 without any.
+pub fn quantiles<const N: usize>(positions: impl Iterator<Item = DVec3> + Clone, shares: [f64; N]) -> [DVec3; N] {
+    let along = |axis: usize| {
+        let mut values: Vec<f64> = positions.clone().map(|place| place[axis]).filter(|v| v.is_finite()).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let last = values.len().saturating_sub(1) as f64;
+        shares.map(|share| values.get((last * share).round() as usize).copied().unwrap_or(0.0))
+    };
+    let axes = [along(0), along(1), along(2)];
+    std::array::from_fn(|at| DVec3::from_array([0, 1, 2].map(|axis| axes[axis][at])))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_each_axis() {
+        let line = (0..=100).map(|i| DVec3::new(f64::from(i), -f64::from(i), if i == 3 { f64::NAN } else { 7.0 }));
+        let expected = [DVec3::new(10.0, -90.0, 7.0), DVec3::new(50.0, -50.0, 7.0)];
+        assert_eq!(quantiles(line, [0.1, 0.5]), expected);
+        assert_eq!(quantiles(std::iter::empty(), [0.5]), [DVec3::ZERO]);
+    }
 
     #[test]
     fn stray_positions_move_nothing() {

@@ -6,7 +6,7 @@ use crate::edit::{Document, Edit, EditsFile, Sights};
 use crate::error::{Error, Result};
 use crate::files::label_table::LabelTable;
 use crate::files::{read, run_folder};
-use crate::formats::{WriteOptions, export_model};
+use crate::formats::{FirstView, WriteOptions, export_model};
 use crate::scene::Gaussians;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,8 @@ pub(super) struct Work<'a> {
     rows_version: u64,
     /// Why the list of changes is not on the disk, if it is not.
     problem: Option<Error>,
+    /// Where the model is seen from at first, as files of it say.
+    first_view: Option<FirstView>,
 }
 
 /// A change.
@@ -62,6 +64,7 @@ impl<'a> Work<'a> {
             version: 0,
             rows_version: 0,
             problem: None,
+            first_view: None,
         }
     }
 
@@ -72,6 +75,11 @@ impl<'a> Work<'a> {
             rows_version: self.rows_version + 1,
             ..Self::new(typed, model, table, self.words)
         }
+    }
+
+    /// Returns the work on a model that is seen from somewhere at first.
+    pub(super) fn seen_from(self, first_view: Option<FirstView>) -> Self {
+        Self { first_view, ..self }
     }
 
     pub(super) fn model(&self) -> &Gaussians {
@@ -188,7 +196,9 @@ impl<'a> Work<'a> {
     pub(super) fn write(&mut self) -> Result<String> {
         let none = || Error::usage("write", "nothing has changed; the model is in its file");
         let (path, _) = self.output.clone().filter(|_| self.is_changed()).ok_or_else(none)?;
-        export_model(&path, &self.now.model, self.now.table.as_ref(), WriteOptions::default())?;
+        // As the command line writes it, so that a replay has the same bytes.
+        let options = WriteOptions { first_view: self.first_view, ..WriteOptions::default() };
+        export_model(&path, &self.now.model, self.now.table.as_ref(), options)?;
         self.list().write(&list_of(&path))?;
         let text = format!("Saved as {}.", path.display());
         self.output = Some((path, true));

@@ -7,6 +7,8 @@ use crate::edit::rename::keep;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, extract};
 use crate::error::{Error, Result};
 use crate::formats::{FirstView, WriteOptions, export_model, formats};
+use crate::render::portrait::best_camera;
+use crate::scene::Camera;
 use crate::words::unique;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -19,7 +21,7 @@ pub(super) fn export(
     export: &Export,
     work: &Work,
     chosen: &Chosen,
-    first_view: Option<FirstView>,
+    (first_view, cameras): (Option<FirstView>, &[&Camera]),
 ) -> Result<(PathBuf, usize)> {
     let model = work.model();
     let part = if export.chosen {
@@ -38,6 +40,9 @@ pub(super) fn export(
         };
         return Err(Error::usage("labels", problem));
     }
+    // A part is seen from where it is seen best.
+    let best = if part.len() < model.len() { best_camera(&part, cameras) } else { None };
+    let first_view = first_view.map(|view| FirstView { eye: best.map_or(view.eye, Camera::centre), ..view });
     let there: BTreeSet<u32> = (0..part.len()).map(|row| part.label(row)).collect();
     let table = work.table().map(|table| keep(table, |id| there.contains(&id)));
     let path = free_path(work.folder(), &export.name, &export.format)?;

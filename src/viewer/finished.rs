@@ -17,6 +17,8 @@ use crate::formats::{FirstView, formats};
 use crate::gpu::Gpu;
 use crate::label::click::Photos;
 use crate::render::RenderOptions;
+use crate::scene::overview::likely_up;
+use crate::scene::spread::quantiles;
 use crate::scene::{Dataset, Gaussians, Overview};
 use glam::DVec3;
 use serde_json::json;
@@ -43,6 +45,8 @@ pub struct Finished<'a> {
     pub words: &'a dyn Words,
     /// Photos that are asked for an object that a page points at; without them pages cannot point at objects.
     pub photos: Option<Photos>,
+    /// Where the model is seen from at first, if its file or its run says it.
+    pub first_view: Option<FirstView>,
 }
 
 /// Serves a finished model until `goes_on` says no. Changes that are in no file yet are saved then; returns their file. As
@@ -55,17 +59,20 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
     let views = Arc::new(Views::new(finished.dataset));
     let sizes = views.list.iter().map(|posed| (posed.view.camera.width, posed.view.camera.height));
     let (hub, is_cpu) = (&*viewer.hub, gpu.is_cpu());
-    let frame = views.frame().unwrap_or_else(|| frame_of(&finished.model));
+    let frame = views.frame().unwrap_or_else(|| frame_of(&finished.model, finished.first_view));
     let name = gpu.capabilities().name.clone();
     hub.set_views(Arc::clone(&views));
     let mut scene = scene(&views, frame, &finished.path.display().to_string(), (&name, false));
+    // Views are seen from their own places.
+    let from = finished.first_view.filter(|_| views.list.is_empty());
+    scene["from"] = json!(from.map(|view| (view.eye - frame.target).to_array()));
     scene["finds"] = finished.photos.is_some().into();
     scene["fills"] = finished.dataset.train.iter().any(|view| view.photo.is_some()).into();
     scene["formats"] = json!(formats());
     let near = finished.options.near;
     let finder = finished.photos.map(|photos| Finder::new(Arc::clone(&gpu), photos, near, Arc::clone(&viewer.hub)));
     let frame_up = frame.up;
-    let first_view = views.list.first().map(|first| FirstView { up: frame.up, eye: first.view.camera.centre() });
+    let of_views = views.list.first().map(|first| FirstView { up: frame.up, eye: first.view.camera.centre() });
     let engine = Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?;
     let mut session = Session {
         hub,
@@ -73,7 +80,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         background: finished.options.background,
         drawing: Drawing::new(engine, finished.options, &finished.model),
         chosen: Chosen::new(&finished.model),
-        work: Work::new(finished.path, finished.model, finished.table, finished.words),
+        work: Work::new(finished.path, finished.model, finished.table, finished.words).seen_from(finished.first_view),
         object: finder.map(Object::new),
         object_label: None,
         shown: Shown::default(),
@@ -82,7 +89,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         scores: Vec::new(),
         views: finished.dataset.train.iter().filter(|view| view.photo.is_some()).collect(),
         up: frame_up,
-        first_view,
+        first_view: of_views.or(finished.first_view),
         scene,
     };
     hub.set_folder(session.work.folder().join("opened"));
@@ -131,17 +138,10 @@ pub(super) fn scene(
 }
 
 /// Returns where to see a model from that has no views: half of it is in the middle.
-pub(super) fn frame_of(model: &Gaussians) -> Overview {
-    let quantiles = [0, 1, 2].map(|axis| {
-        let mut values: Vec<f32> = model.means.iter().map(|mean| mean[axis]).filter(|v| v.is_finite()).collect();
-        values.sort_by(f32::total_cmp);
-        [0.1, 0.5, 0.9].map(|share| {
-            let at = ((values.len().max(1) - 1) as f64 * share) as usize;
-            values.get(at).map_or(0.0, |&value| f64::from(value))
-        })
-    });
-    let middle = DVec3::from_array(quantiles.map(|[_, middle, _]| middle));
-    let size = quantiles.map(|[low, _, high]| high - low).into_iter().fold(1e-3, f64::max);
-    // Most captures have the axes of COLMAP, y down.
-    Overview { up: DVec3::NEG_Y, target: model.origin + middle, distance: 1.5 * size }
+pub(super) fn frame_of(model: &Gaussians, first_view: Option<FirstView>) -> Overview {
+    let places = (0..model.len()).map(|row| model.world(row));
+    let [low, middle, high] = quantiles(places.clone(), [0.1, 0.5, 0.9]);
+    let size = (high - low).max_element().max(1e-3);
+    let up = first_view.map_or_else(|| likely_up(places), |view| view.up);
+    Overview { up, target: middle, distance: 1.5 * size }
 }

@@ -20,7 +20,7 @@ use crate::eval::removal::sights;
 use crate::files::label_table::LabelTable;
 use crate::formats::FirstView;
 use crate::run::models;
-use crate::scene::{Camera, Gaussians, Overview, View};
+use crate::scene::{Gaussians, Overview, View};
 use crate::words::counted;
 use glam::DVec3;
 use serde_json::{Value, json};
@@ -121,7 +121,8 @@ impl Session<'_> {
             Message::Object { what } => self.find(id, &what)?,
             Message::Write => return self.work.write(),
             Message::Export { what } => {
-                let (path, count) = export(&what, &self.work, &self.chosen, self.first_view)?;
+                let cameras = self.painter.views.cameras();
+                let (path, count) = export(&what, &self.work, &self.chosen, (self.first_view, &cameras))?;
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 let file = self.hub.add_file(path.clone());
                 self.hub.reply(id, &json!({ "kind": "exported", "file": file, "name": name }));
@@ -137,8 +138,10 @@ impl Session<'_> {
         let read = models::open(path)?;
         let saved = self.work.save()?;
         let table = LabelTable::find_for_model(path).map(|table| LabelTable::read(&table)).transpose()?.or(read.names);
-        self.work = self.work.reopened(path, read.gaussians, table);
-        let frame = self.painter.views.frame().unwrap_or_else(|| frame_of(self.work.model()));
+        let first_view = read.first_view;
+        self.work = self.work.reopened(path, read.gaussians, table).seen_from(first_view);
+        let frame = self.painter.views.frame().unwrap_or_else(|| frame_of(self.work.model(), first_view));
+        let from = first_view.filter(|_| self.painter.views.list.is_empty());
         self.up = frame.up;
         let Overview { up, target, distance } = frame;
         for (key, value) in [
@@ -146,6 +149,7 @@ impl Session<'_> {
             ("up", json!(up.to_array())),
             ("target", json!(target.to_array())),
             ("distance", json!(distance)),
+            ("from", json!(from.map(|view| (view.eye - target).to_array()))),
         ] {
             self.scene[key] = value;
         }
@@ -236,7 +240,7 @@ impl Session<'_> {
         if !self.hub.is_watched() {
             return Ok(());
         }
-        let cameras: Vec<&Camera> = self.painter.views.list.iter().map(|posed| &posed.view.camera).collect();
+        let cameras = self.painter.views.cameras();
         let up = self.up;
         let from = (&cameras[..], up, self.drawing.options.near);
         if self.portraits.make_some(&mut self.drawing.engine, self.work.model(), from, self.hub)? {

@@ -5,7 +5,7 @@ use crate::eval::metrics::{label_iou, psnr};
 use crate::files::image::{jpeg_rgb8, png_rgb8};
 use crate::files::resize::{bounded_size, shrink_photo};
 use crate::render::Rendered;
-use crate::scene::{Dataset, Overview, Pixels, View};
+use crate::scene::{Camera, Dataset, Overview, Pixels, View};
 use crate::scenes::camera_json::CameraFile;
 use serde_json::{Value, json};
 
@@ -58,6 +58,10 @@ impl Views {
             })
         };
         self.list.iter().map(row).collect()
+    }
+
+    pub(super) fn cameras(&self) -> Vec<&Camera> {
+        self.list.iter().map(|posed| &posed.view.camera).collect()
     }
 
     /// Returns what the cameras look at; none without views.

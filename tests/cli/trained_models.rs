@@ -2,6 +2,7 @@
 
 use crate::support::device;
 use crate::support::runs::{Place, copy, stderr, succeeded};
+use glam::DVec3;
 use labelgs::formats::{read_model, write_model};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -87,7 +88,8 @@ fn damaged_cameras_of_a_run_matter_to_pages_only() {
     let convert = |name: &str| place.labelgs(&["convert", &out, &place.text(name)]);
     succeeded(&convert("before.html"));
     std::fs::write(place.path("out/cameras.json"), "[{}]").expect("written");
-    succeeded(&convert("model.ply"));
+    let plain = convert("model.ply");
+    assert!(succeeded(&plain).contains("will not say where to see it from"), "{}", stderr(&plain));
     let page = convert("after.html");
     assert_eq!(page.status.code(), Some(3), "{}", stderr(&page));
     assert!(
@@ -97,6 +99,45 @@ fn damaged_cameras_of_a_run_matter_to_pages_only() {
     );
     let text = std::fs::read_to_string(place.path("before.html")).expect("a page");
     assert!(text.contains(r#""view":{"eye":["#), "the page begins at the first photo");
+}
+
+#[test]
+fn a_part_of_a_model_says_where_it_was_seen_from() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "200"]));
+    let out = place.text("out");
+    let made = |words: &[&str], name: &str| {
+        succeeded(&place.labelgs(&[words, &["-o", &place.text(name)]].concat()));
+        read_model(place.path(name)).expect("a model")
+    };
+    let trained = read_model(place.path("out/point_cloud/iteration_200/point_cloud.ply")).expect("a model");
+    assert_eq!(trained.first_view, None, "a training writes what others write");
+    let object = made(&["extract", &out, "--labels", "1"], "object.ply");
+    let view = object.first_view.expect("a view");
+    assert!(view.up.dot(DVec3::Z) > 0.9, "the made scene has z up: {}", view.up);
+    // From a camera of the run, with the object before it.
+    let cameras: Vec<Value> =
+        serde_json::from_slice(&std::fs::read(place.path("out/cameras.json")).expect("a list")).expect("JSON");
+    let own = |camera: &Value| {
+        let of = |value: &Value| DVec3::from_array([0, 1, 2].map(|axis| value[axis].as_f64().expect("a number")));
+        let rows = [0, 1, 2].map(|row| of(&camera["rotation"][row]));
+        (of(&camera["position"]), DVec3::new(rows[0].z, rows[1].z, rows[2].z))
+    };
+    let (eye, ahead) = cameras.iter().map(own).find(|(eye, _)| eye.distance(view.eye) < 1e-9).expect("a camera");
+    let middle = (0..object.gaussians.len()).map(|row| object.gaussians.world(row)).sum::<DVec3>();
+    assert!((middle / object.gaussians.len() as f64 - eye).normalize().dot(ahead) > 0.8);
+
+    // It goes on from file to file, and turns along.
+    let file = place.text("object.ply");
+    assert_eq!(made(&["recolour", &file, "--labels", "1", "--colour", "red"], "red.ply").first_view, Some(view));
+    succeeded(&place.labelgs(&["convert", &file, &place.text("object.spz")]));
+    assert_eq!(read_model(place.path("object.spz")).expect("a model").first_view, Some(view));
+    let turned = made(&["transform", &place.text("object.spz"), "--up", "z", "--scale", "2"], "turned.ply");
+    let turned = turned.first_view.expect("a view");
+    assert!(turned.up.dot(DVec3::NEG_Y) > 0.9, "{}", turned.up);
+    let farther = DVec3::new(view.eye.x, -view.eye.z, view.eye.y) * 2.0;
+    assert!(turned.eye.distance(farther) < 1e-5, "{} {farther}", turned.eye);
 }
 
 #[test]

@@ -3,8 +3,9 @@
 use super::browser::SETTLED;
 use super::chromium::{Browser, Tab};
 use super::protocol::{has, same_by_command};
-use super::server::{Page, Place};
+use super::server::{Page, Place, Server};
 use crate::support::device;
+use glam::DVec3;
 use labelgs::formats::read_model;
 use serde_json::{Value, json};
 
@@ -165,18 +166,21 @@ fn exports_have_names_and_can_be_fetched() {
     let scene = page.hear("scene");
     assert!(scene["formats"].as_array().is_some_and(|all| all.contains(&json!(["PLY", ".ply"]))), "{scene}");
     place.succeeds(&["extract", "model.ply", "--labels", "3", "-o", "tea.ply"]);
-    let read = |name: &str| std::fs::read(place.path(name)).expect("a file");
+    let read = |name: &str| read_model(place.path(name)).expect("a model");
+    let up = DVec3::from_array([0, 1, 2].map(|axis| scene["up"][axis].as_f64().expect("a number")));
     let export = |labels: &[u32], name: &str, format: &str| json!({ "kind": "export", "what": { "labels": labels, "name": name, "format": format } });
     for (number, file) in ["tea box.ply", "tea box 2.ply"].into_iter().enumerate() {
         page.send(&export(&[3], "tea box", ".ply"));
         assert_eq!(page.hear("exported"), json!({ "kind": "exported", "file": number, "name": file }));
-        assert_eq!(read(&format!("model-edits/{file}")), read("tea.ply"));
+        let made = read(&format!("model-edits/{file}"));
+        assert_eq!(made.gaussians, read("tea.ply").gaussians);
+        assert!(made.first_view.is_some_and(|view| view.up.distance(up) < 1e-9), "{:?}", made.first_view);
     }
     for format in scene["formats"].as_array().expect("formats") {
         page.send(&export(&[], "all", format[1].as_str().expect("an ending")));
         page.hear("exported");
     }
-    assert_eq!(read("model-edits/all.ply"), read("model.ply"));
+    assert_eq!(read("model-edits/all.ply").gaussians, read("model.ply").gaussians);
     let fetched = server.get("/export/1", &[("Cookie", &cookie)]);
     assert!(fetched.starts_with("HTTP/1.1 200") && fetched.contains("filename*=UTF-8''%74%65%61"), "{fetched}");
     assert!(server.get("/export/99", &[("Cookie", &cookie)]).starts_with("HTTP/1.1 404"));
@@ -238,6 +242,28 @@ fn a_dropped_model_is_opened() {
     assert!(page.until("problem", |_| true)["text"].to_string().contains("bad.ply"));
     page.edit(&json!({ "edit": "rename", "label": 3, "name": "tin" }));
     page.until("edits", |edits| has(edits, 1, false));
+}
+
+#[test]
+fn an_object_of_its_own_stands_upright_and_is_seen_from_its_front() {
+    if device().is_none() {
+        return;
+    }
+    let place = Place::new();
+    let scene_of = |words: &[&str]| Server::start(place.command(&[&["view"], words].concat())).page().hear("scene");
+    let vector = |value: &Value| DVec3::from_array([0, 1, 2].map(|axis| value[axis].as_f64().expect("a number")));
+    let server = place.view(&[]);
+    let mut page = server.page();
+    let up = vector(&page.hear("scene")["up"]);
+    page.send(&json!({ "kind": "export", "what": { "labels": [3], "name": "tea", "format": ".ply" } }));
+    page.hear("exported");
+    let alone = scene_of(&["model-edits/tea.ply"]);
+    assert!(vector(&alone["up"]).distance(up) < 1e-9, "{alone}");
+    let view = read_model(place.path("model-edits/tea.ply")).expect("a model").first_view.expect("a view");
+    assert!(vector(&alone["from"]).distance(view.eye - vector(&alone["target"])) < 1e-9, "{alone}");
+    // The whole without its views has no first view, and lies on its ground.
+    let bare = scene_of(&["model.ply"]);
+    assert!(bare["from"].is_null() && vector(&bare["up"]).length() > 0.999, "{bare}");
 }
 
 /// The tools by their keys and the mouse.

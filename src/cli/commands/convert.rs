@@ -70,12 +70,12 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
 
 fn per_object(edit: &EditArgs, model: &Gaussians, known: &Catalogue, context: &Context) -> Result<()> {
     let (mut files, mut text) = (Vec::new(), String::new());
-    let options = edit.write.options(&edit.model, &edit.output)?;
     for &label in known.gaussians.keys() {
         let name = known.name(label);
         let path = file_of(&edit.output, label, name);
         let part = model.filtered(|row| model.label(row) == label);
         let names = known.table.as_ref().map(|table| keep(table, |id| id == label));
+        let options = edit.write.options_of_part(&edit.model, &path, &part)?;
         let left_out = export_model(&path, &part, names.as_ref(), options)?;
         let (path, count) = (path.display(), part.len() as u64 - left_out);
         files.push(json!({ "output": path.to_string(), "label": label, "name": name, "gaussians": count }));

@@ -108,7 +108,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
         0 => String::new(),
         _ => format!("; {unsure} of the object left out, with a confidence below {least} (--min-confidence)"),
     };
-    let edited = Edited { note, ..Edited::new(&part, table, of, labels) };
+    let edited = Edited { note, alone: true, ..Edited::new(&part, table, of, labels) };
     edit.finish(context, &edited, json!({ "specks": specks, "unsure": unsure }))
 }
 

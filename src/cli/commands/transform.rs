@@ -34,5 +34,6 @@ pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
     let moved = change.apply(&model)?;
     let turn = [turn.w, turn.x, turn.y, turn.z];
     let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
-    args.edit.finish(context, &Edited::with_labels_of(&moved, known, model.len()), more)
+    let edited = Edited { moved: Some(change), ..Edited::with_labels_of(&moved, known, model.len()) };
+    args.edit.finish(context, &edited, more)
 }

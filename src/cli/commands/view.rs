@@ -7,6 +7,7 @@ use crate::cli::support::{
     Context, SceneArgs, TableArg, near_plane, open_gpu, open_scene, quoted, signals, warn_of_misfit,
 };
 use crate::render::{Parts, RenderOptions};
+use crate::run::models::first_view;
 use crate::scene::Dataset;
 use crate::scenes::camera_json::views_of_model;
 use crate::viewer::{Finished, Token, Viewer, ViewerOptions, Words, show};
@@ -133,8 +134,9 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let address = viewer.address();
     context.show(&json!({ "schema_version": 1, "address": address }), &format!("{address}\n"))?;
     let words = Typed { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
-    let finished =
-        Finished { path: &args.model, model, table: known.table, dataset: &dataset, options, words: &words, photos };
+    let (path, table, dataset) = (&args.model, known.table, &dataset);
+    let first_view = first_view(path)?;
+    let finished = Finished { path, model, table, dataset, options, words: &words, photos, first_view };
     signals::note_only();
     let saved = show(&viewer, finished, gpu, &|| !signals::is_noted())?;
     if let Some(saved) = saved {

@@ -4,6 +4,7 @@ use crate::cli::support::context::Context;
 use crate::cli::support::model_format::WriteArgs;
 use crate::cli::support::parsers::{Picks, model_file, share};
 use crate::cli::support::shell_words::quoted;
+use crate::edit::Transform;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
 use crate::files::label_table::LabelTable;
@@ -68,8 +69,12 @@ impl EditArgs {
 
     /// Writes model and table of an edit and prints a summary. `more` holds further fields of the JSON.
     pub(crate) fn finish(&self, context: &Context, edited: &Edited, more: Value) -> Result<()> {
-        let Edited { model, table, of, added, labels, note } = edited;
-        let options = self.write.options(&self.model, &self.output)?;
+        let Edited { model, table, of, added, labels, note, alone, moved } = edited;
+        let mut options = match alone {
+            true => self.write.options_of_part(&self.model, &self.output, model)?,
+            false => self.write.options(&self.model, &self.output)?,
+        };
+        options.first_view = options.first_view.map(|view| moved.map_or(view, |by| view.moved(&by)));
         let left_out = export_model(&self.output, model, table.as_ref(), options)?;
         let written = model.len() as u64 - left_out;
         let beside = LabelTable::beside(&self.output);
@@ -110,12 +115,16 @@ pub(crate) struct Edited<'a> {
     pub labels: BTreeSet<u32>,
     /// More about the result, for the terminal.
     pub note: String,
+    /// The model is objects without their scene.
+    pub alone: bool,
+    /// Where the model is now.
+    pub moved: Option<Transform>,
 }
 
 impl<'a> Edited<'a> {
     /// The result of an edit that adds no Gaussians to the `of` before.
     pub(crate) fn new(model: &'a Gaussians, table: Option<LabelTable>, of: usize, labels: BTreeSet<u32>) -> Self {
-        Self { model, table, of, added: 0, labels, note: String::new() }
+        Self { model, table, of, added: 0, labels, note: String::new(), alone: false, moved: None }
     }
 
     /// The result of an edit that leaves the labels alone.

@@ -1,8 +1,10 @@
 //! How commands write models.
 
 use crate::Result;
-use crate::formats::{FirstView, LabelType, SpzVersion, WriteOptions, is_page};
-use crate::scene::Overview;
+use crate::formats::{LabelType, SpzVersion, WriteOptions, is_page};
+use crate::render::portrait::best_camera;
+use crate::run::models::first_view;
+use crate::scene::{Camera, Gaussians};
 use crate::scenes::camera_json::views_of_model;
 use clap::Args;
 use std::path::Path;
@@ -21,12 +23,29 @@ pub struct WriteArgs {
 }
 
 impl WriteArgs {
-    /// Returns the choices for the file `output` made of `model`. The cameras of the model's run tell a page where to look
-    /// from at first.
+    /// Returns the choices for the file `output` made of `model`. It is seen from at first where the model is.
     pub(crate) fn options(self, model: &Path, output: &Path) -> Result<WriteOptions> {
-        let views = if is_page(output) { views_of_model(model)? } else { Vec::new() };
-        let all = Overview::of(views.iter().map(|view| &view.camera));
-        let first_view = all.zip(views.first()).map(|(all, view)| FirstView { up: all.up, eye: view.camera.centre() });
+        let first_view = match first_view(model) {
+            // It is what a page is for; other files are as good without it.
+            Err(error) if !is_page(output) => {
+                tracing::warn!("{error}; the file will not say where to see it from");
+                None
+            }
+            found => found?,
+        };
         Ok(WriteOptions { label_type: self.label_type, spz_version: self.spz_version, first_view })
+    }
+
+    /// Returns the choices for a file with `part` of `model` alone. It is seen at first from the camera of the model's run that
+    /// shows it best.
+    pub(crate) fn options_of_part(self, model: &Path, output: &Path, part: &Gaussians) -> Result<WriteOptions> {
+        let mut options = self.options(model, output)?;
+        // Damaged cameras have been told.
+        let views = views_of_model(model).unwrap_or_default();
+        let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
+        if let (Some(view), Some(best)) = (&mut options.first_view, best_camera(part, &cameras)) {
+            view.eye = best.centre();
+        }
+        Ok(options)
     }
 }

@@ -32,6 +32,9 @@ const FEATURE_MAX: f32 = 16_777_215.0;
 const CONFIDENCE: &str = "_LABEL_CONFIDENCE";
 /// Key of the extras of a primitive: true for an antialiased model. The extension has none.
 const ANTIALIASED: &str = "antialiased";
+/// Keys of the extras of a primitive: the way up and the place of the eye at first, in the world and the axes of labelgs.
+const UP: &str = "labelgs_up";
+const EYE: &str = "labelgs_eye";
 const FEATURES: &str = "EXT_mesh_features";
 const METADATA: &str = "EXT_structural_metadata";
 /// Accessor component type of 32-bit floats.

@@ -2,14 +2,15 @@
 
 use super::nodes::{self, Placed};
 use super::{
-    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS,
-    file, harmonic, harmonics,
+    ANTIALIASED, AXES, CONFIDENCE, EYE, FEATURE, FEATURE_MAX, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE,
+    SPLATS, UP, file, harmonic, harmonics,
 };
-use crate::format::ReadModel;
+use crate::format::{FirstView, ReadModel};
 use crate::ply::joined;
 use crate::rows::{Row, Rows};
 use crate::transform::Transform;
 use crate::values::{log_scale, logit};
+use glam::DVec3;
 use labelgs_files::label_table::{LabelEntry, LabelTable};
 use labelgs_files::read as bytes_of;
 use labelgs_scene::MODEL_LABEL_MAX;
@@ -59,6 +60,8 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
         }
         let part = glb.gaussians(primitive)?;
         let is_moved = *place != Transform::default();
+        let view = part.first_view.map(|view| if is_moved { view.moved(place) } else { view });
+        read.first_view = read.first_view.or(view);
         parts.push(if is_moved { place.apply(&part.gaussians)? } else { part.gaussians });
         for entry in part.names.into_iter().flat_map(|table| table.labels) {
             names.entry(entry.id).or_insert(entry);
@@ -156,7 +159,12 @@ impl Glb<'_> {
         }
         let mut read = rows.finish(self.path, None)?;
         read.gaussians.antialiased = primitive["extras"][ANTIALIASED] == true;
-        Ok(ReadModel { names: labels.and_then(|found| found.1), ..read })
+        let extra = |key: &str| {
+            let numbers = primitive["extras"][key].as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>();
+            numbers?.try_into().ok().map(DVec3::from_array)
+        };
+        let first_view = extra(UP).zip(extra(EYE)).and_then(|(up, eye)| FirstView::checked(up, eye));
+        Ok(ReadModel { names: labels.and_then(|found| found.1), first_view, ..read })
     }
 
     /// Returns an attribute as floats, if the primitive has it.

@@ -1,10 +1,10 @@
 //! Writes GLB.
 
 use super::{
-    ANTIALIASED, AXES, CONFIDENCE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, file,
+    ANTIALIASED, AXES, CONFIDENCE, EYE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, UP, file,
     harmonic, harmonics,
 };
-use crate::format::{Export, ModelWriter};
+use crate::format::{Export, FirstView, ModelWriter};
 use crate::values::{losses as losses_of_values, sigmoid, unit};
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::harmonics::value_of;
@@ -76,7 +76,11 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
         "extensions": { SPLATS: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
     });
     if export.model.antialiased {
-        primitive["extras"] = json!({ ANTIALIASED: true });
+        primitive["extras"][ANTIALIASED] = true.into();
+    }
+    if let Some(FirstView { up, eye }) = export.options.first_view {
+        primitive["extras"][UP] = json!(up.to_array());
+        primitive["extras"][EYE] = json!(eye.to_array());
     }
     let mut used = vec![SPLATS];
     let mut root = json!({

@@ -11,7 +11,7 @@ mod write;
 pub(super) use joined::joined;
 pub use joined::write_joined;
 
-use super::format::{ModelFormat, ReadModel};
+use super::format::{FirstView, ModelFormat, ReadModel};
 use crate::ply_table::Table;
 use columns::Columns;
 use decode::Decoder;
@@ -23,6 +23,9 @@ pub use stored::StoredModel;
 
 /// Start of the comment with the world position of the file's (0, 0, 0).
 const ORIGIN: &str = "labelgs world_origin ";
+/// Starts of the comments with the way up, and with the place of the eye at first, in the world.
+const UP: &str = "labelgs up ";
+const EYE: &str = "labelgs eye ";
 /// Start of the comment with how viewers draw the model (Brush, PlayCanvas), and its value for antialiased models.
 const MODE: &str = "SplatRenderMode: ";
 const ANTIALIASED: &str = "mip";
@@ -48,6 +51,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     }
     let columns = Columns::of(path, &table)?;
     let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
+    let first_view = first_view(&table);
     let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, &columns));
     let extra_bytes = table.for_each(&columns.names(), |index, values| {
         if let Some(row) = decoder.row(index, values)? {
@@ -61,7 +65,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     read.dropped += decoder.deleted;
     read.notes.extend(decoder.notes());
     add_notes(&mut read.notes, activated, extra_bytes);
-    Ok(read)
+    Ok(ReadModel { first_view, ..read })
 }
 
 /// Adds what the user should know of the values and the length of a file.
@@ -86,16 +90,30 @@ fn is_antialiased<'a>(mut comments: impl Iterator<Item = &'a str>) -> bool {
 
 /// Returns the origin in the comments of the header.
 fn origin(path: &Path, table: &Table) -> Result<Option<DVec3>> {
-    let Some(words) = table.comments().find_map(|comment| comment.trim().strip_prefix(ORIGIN)) else {
-        return Ok(None);
-    };
-    let numbers: Vec<f64> = words.split_ascii_whitespace().map_while(|word| word.parse().ok()).collect();
-    match *numbers {
-        [x, y, z] if DVec3::new(x, y, z).as_vec3().is_finite() => Ok(Some(DVec3::new(x, y, z))),
+    let Some(words) = comment(table, ORIGIN) else { return Ok(None) };
+    match triple(words) {
+        Some(place) if place.as_vec3().is_finite() => Ok(Some(place)),
         _ => {
             let problem =
                 format!("the comment `{ORIGIN}{words}` does not end with three numbers; correct or remove it");
             Err(Error::data(path, "header", problem))
         }
     }
+}
+
+/// Returns where to see the model from at first, if the comments of the header say it. It is a hint, so a damaged one does not matter.
+fn first_view(table: &Table) -> Option<FirstView> {
+    let of = |start| comment(table, start).and_then(triple);
+    FirstView::checked(of(UP)?, of(EYE)?)
+}
+
+/// Returns the rest of a comment of the header by its start.
+fn comment<'a>(table: &'a Table, start: &str) -> Option<&'a str> {
+    table.comments().find_map(|comment| comment.trim().strip_prefix(start))
+}
+
+/// Returns three numbers, if the words are that.
+fn triple(words: &str) -> Option<DVec3> {
+    let numbers: Option<Vec<f64>> = words.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
+    numbers?.try_into().ok().map(DVec3::from_array)
 }

@@ -2,7 +2,8 @@
 
 use super::columns::Columns;
 use super::decode::Decoder;
-use super::{add_notes, is_antialiased, origin, packed};
+use super::{add_notes, first_view, is_antialiased, origin, packed};
+use crate::format::FirstView;
 use crate::ply_table::Table;
 use crate::rows::{Row, Sieve};
 use glam::DVec3;
@@ -22,6 +23,7 @@ pub struct StoredModel {
     pub(crate) origin: DVec3,
     notes: Vec<String>,
     antialiased: bool,
+    pub(crate) first_view: Option<FirstView>,
 }
 
 impl StoredModel {
@@ -45,9 +47,11 @@ impl StoredModel {
             Some(origin) => origin,
             None => crate::origin::read(path, count, &mut notes)?,
         };
+        let first_view = first_view(&table);
         let has_places = table.stored_rows(&columns.names())?.is_some();
         let (path, sh_degree, has_labels) = (path.to_owned(), columns.sh_degree, columns.have_labels());
-        Ok(has_places.then_some(Self { path, columns, count, sh_degree, has_labels, origin, notes, antialiased }))
+        let read = Self { path, columns, count, sh_degree, has_labels, origin, notes, antialiased, first_view };
+        Ok(has_places.then_some(read))
     }
 
     /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.

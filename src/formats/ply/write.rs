@@ -1,7 +1,7 @@
 //! Writes the standard 3DGS PLY.
 
-use super::{ANTIALIASED, MODE, ORIGIN};
-use crate::format::{Export, LabelType, ModelWriter};
+use super::{ANTIALIASED, EYE, MODE, ORIGIN, UP};
+use crate::format::{Export, FirstView, LabelType, ModelWriter};
 use glam::DVec3;
 use labelgs_scene::{Error, Result, Setting};
 use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, PropertyDef, PropertyType, ScalarType};
@@ -64,9 +64,13 @@ fn header(export: &Export, count: usize) -> Header {
     }
     let mut header = Header::new();
     header.encoding = Encoding::BinaryLittleEndian;
-    let origin = export.origin;
-    if origin != DVec3::ZERO {
-        header.comments.push(format!("{ORIGIN}{:?} {:?} {:?}", origin.x, origin.y, origin.z));
+    let mut say = |what: &str, DVec3 { x, y, z }| header.comments.push(format!("{what}{x:?} {y:?} {z:?}"));
+    if export.origin != DVec3::ZERO {
+        say(ORIGIN, export.origin);
+    }
+    if let Some(FirstView { up, eye }) = export.options.first_view {
+        say(UP, up);
+        say(EYE, eye);
     }
     if export.model.antialiased {
         header.comments.push(format!("{MODE}{ANTIALIASED}"));

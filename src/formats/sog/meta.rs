@@ -72,6 +72,15 @@ pub(super) struct Palette {
 pub(super) struct Extras {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) labelgs: Option<Labels>,
+    #[serde(rename = "labelgs_view", default, skip_serializing_if = "Option::is_none")]
+    pub(super) view: Option<View>,
+}
+
+/// The first view, in the world and the axes of labelgs.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub(super) struct View {
+    pub(super) up: [f64; 3],
+    pub(super) eye: [f64; 3],
 }
 
 #[derive(Debug, Deserialize, Serialize)]

@@ -4,7 +4,7 @@ use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
 use super::pictures::{Picture, picture};
 use super::{CODEBOOK, PALETTE_ROW, ROTATION};
 use crate::archive::Archive;
-use crate::format::ReadModel;
+use crate::format::{FirstView, ReadModel};
 use crate::rows::{Row, Rows};
 use crate::values::{logit_of_byte, with_largest};
 use labelgs_files::read as file;
@@ -35,6 +35,7 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     if meta.version != VERSION {
         return Err(bad(path, FILE, format!("has version {}; {VERSION} is read", meta.version)));
     }
+    let view = meta.extras.as_ref().and_then(|extras| extras.view);
     let own = meta.extras.as_ref().and_then(|extras| extras.labelgs.as_ref());
     let own = own.filter(|own| own.version == EXTRAS_VERSION);
     let pictures = pictures(path, &meta, own, &mut archive)?;
@@ -69,7 +70,8 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let names = names.map(|names| names.checked(path)).transpose()?;
     let mut read = rows.finish(path, None)?;
     read.gaussians.antialiased = meta.antialias || meta.model.as_deref() == Some(ANTIALIASED);
-    Ok(ReadModel { names, ..read })
+    let first_view = view.and_then(|view| FirstView::checked(view.up.into(), view.eye.into()));
+    Ok(ReadModel { names, first_view, ..read })
 }
 
 fn bad(path: &Path, place: &str, problem: String) -> Error {

@@ -1,7 +1,7 @@
 //! Writes SOG.
 
 use super::meta::{
-    ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION,
+    ANTIALIASED, Asset, Coded, EXTRAS_VERSION, Extras, FILE, Files, Labels, Means, Meta, Palette, VERSION, View,
 };
 use super::{CODEBOOK, LABELS, PALETTE_ROW, ROTATION, cluster, pictures};
 use crate::archive;
@@ -139,7 +139,8 @@ fn extras(
     (width, height): (usize, usize),
     add: &mut Add,
 ) -> io::Result<Option<Extras>> {
-    let Some(labels) = export.labels() else { return Ok(None) };
+    let view = export.options.first_view.map(|view| View { up: view.up.to_array(), eye: view.eye.to_array() });
+    let Some(labels) = export.labels() else { return Ok(view.map(|_| Extras { labelgs: None, view })) };
     let shares = export.label_confidence();
     let texel = |&row: &usize| {
         let [low, high, _, _] = labels[row].to_le_bytes();
@@ -147,7 +148,8 @@ fn extras(
     };
     let file = add(LABELS, &rows.iter().map(texel).collect::<Vec<_>>(), width, height)?;
     let names = export.names.cloned();
-    Ok(Some(Extras { labelgs: Some(Labels { version: EXTRAS_VERSION, file, confidence: shares.is_some(), names }) }))
+    let labels = Labels { version: EXTRAS_VERSION, file, confidence: shares.is_some(), names };
+    Ok(Some(Extras { labelgs: Some(labels), view }))
 }
 
 /// The palette of harmonics.

@@ -65,7 +65,7 @@ pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
     let mut read = decode(path, &header, &planes, &records)?;
     notes.append(&mut records.notes);
     notes.append(&mut read.notes);
-    Ok(ReadModel { names: records.names, notes, ..read })
+    Ok(ReadModel { names: records.names, notes, first_view: records.first_view, ..read })
 }
 
 fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -> Result<ReadModel> {

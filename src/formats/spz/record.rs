@@ -1,11 +1,14 @@
-//! The record of labels in an SPZ: version, count, bytes per id, whether confidences follow, the packed ids and
-//! confidences in the order of the Gaussians, then the names as JSON.
+//! The records of labels and of the first view in an SPZ.
+//!
+//! Labels: version, count, bytes per id, whether confidences follow, the packed ids and confidences in the order of the
+//! Gaussians, then the names as JSON. First view: the way up and the place of the eye in the world of labelgs, 64-bit floats.
 
 use super::axes::FileAxes;
-use crate::format::Export;
+use crate::format::{Export, FirstView, LabelType};
 use flate2::Compression;
 use flate2::read::ZlibDecoder;
 use flate2::write::ZlibEncoder;
+use glam::DVec3;
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use std::io::{self, Read, Write};
@@ -13,6 +16,8 @@ use std::path::Path;
 
 /// Type of the record: the vendor `LG` in the upper half.
 const LABELS: u32 = 0x4C47_0001;
+/// Type of the record of the first view.
+const VIEW: u32 = 0x4C47_0002;
 /// Type of the record that names the axes of the file.
 const AXES: u32 = 0xADBE_0003;
 /// Type of the record with limits for the camera of a viewer.
@@ -27,13 +32,33 @@ pub(super) struct Records {
     pub(super) labels: Option<Vec<u32>>,
     pub(super) confidence: Option<Vec<f32>>,
     pub(super) names: Option<LabelTable>,
+    pub(super) first_view: Option<FirstView>,
     pub(super) axes: FileAxes,
     pub(super) notes: Vec<String>,
 }
 
-/// Returns the record of the labels of an export, if it has labels.
+/// Returns the records of an export: of the labels, if it has labels, and of the first view, if it has one.
 pub(super) fn write(export: &Export) -> io::Result<Vec<u8>> {
-    let Some(labels) = export.labels() else { return Ok(Vec::new()) };
+    let mut records = Vec::new();
+    let mut add = |kind: u32, payload: Vec<u8>| {
+        records.extend(kind.to_le_bytes());
+        records.extend((payload.len() as u32).to_le_bytes());
+        records.extend(payload);
+    };
+    if let Some(labels) = export.labels() {
+        add(LABELS, payload(export, labels)?);
+    }
+    // Who wants no labels wants a file without records, which some readers warn of.
+    if let Some(FirstView { up, eye }) =
+        export.options.first_view.filter(|_| export.options.label_type != LabelType::None)
+    {
+        add(VIEW, [up, eye].iter().flat_map(DVec3::to_array).flat_map(f64::to_le_bytes).collect());
+    }
+    Ok(records)
+}
+
+/// Returns the content of the record of labels.
+fn payload(export: &Export, labels: &[u32]) -> io::Result<Vec<u8>> {
     let ids = || export.rows.iter().map(|&row| labels[row]);
     let width: u8 = match ids().max().unwrap_or_default() {
         0..=0xff => 1,
@@ -57,10 +82,7 @@ pub(super) fn write(export: &Export) -> io::Result<Vec<u8>> {
     if let Some(names) = export.names {
         serde_json::to_writer(&mut payload, names)?;
     }
-    let mut record = LABELS.to_le_bytes().to_vec();
-    record.extend((payload.len() as u32).to_le_bytes());
-    record.extend(payload);
-    Ok(record)
+    Ok(payload)
 }
 
 /// Reads the records of a file of `count` Gaussians; unknown ones are named.
@@ -83,12 +105,20 @@ pub(super) fn read(path: &Path, mut bytes: &[u8], count: usize) -> Result<Record
                         .into(),
                 ),
             },
+            VIEW => records.first_view = first_view(payload),
             ORBIT => {}
             _ => records.notes.push(format!("its record {kind:#010x} is unknown and was not read")),
         }
         bytes = rest;
     }
     Ok(records)
+}
+
+/// Returns the first view of a record; none of a damaged one.
+fn first_view(payload: &[u8]) -> Option<FirstView> {
+    let numbers: Vec<f64> = payload.as_chunks().0.iter().map(|&bytes| f64::from_le_bytes(bytes)).collect();
+    let [a, b, c, d, e, f] = numbers.try_into().ok()?;
+    FirstView::checked(DVec3::new(a, b, c), DVec3::new(d, e, f))
 }
 
 fn labels(path: &Path, payload: &[u8], count: usize, to: &mut Records) -> Result<()> {

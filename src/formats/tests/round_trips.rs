@@ -2,8 +2,9 @@
 
 use super::fixtures::*;
 use super::models::*;
+use glam::DVec3;
 use labelgs_files::{LabelEntry, LabelTable};
-use labelgs_formats::{LabelType, WriteOptions, export_model, read_model, write_model};
+use labelgs_formats::{FirstView, LabelType, LazyModel, WriteOptions, export_model, read_model, write_model};
 use labelgs_scene::Gaussians;
 use std::fs;
 
@@ -334,5 +335,50 @@ fn bad_files_are_refused_by_file_place_and_cure() {
         let error = refusal(read_model(scene.write(name, bytes)));
         println!("{}", error.replace(&format!("{}/", scene.path().display()), ""));
         assert!(expected.iter().all(|part| error.contains(part)), "{error}");
+    }
+}
+
+/// Each format tells where a model is seen from at first; a file without that has the bytes that it always had.
+#[test]
+fn a_first_view_comes_back() {
+    let scene = Scene::new();
+    let view = FirstView { up: DVec3::new(0.0, -0.6, 0.8), eye: DVec3::new(448_256.25, -3.5, 1.0 / 3.0) };
+    for (file, options, _) in written() {
+        for labelled in [true, false] {
+            let before = model(50, 1, labelled);
+            let export = |first_view: Option<FirstView>| {
+                let options = WriteOptions { first_view, ..options };
+                export_model(scene.at(file), &before, None, options).expect("written");
+                read_model(scene.at(file)).expect("read")
+            };
+            assert_eq!(export(None).first_view, None, "{file}");
+            let read = export(Some(view));
+            assert_eq!((read.first_view, &read.notes), (Some(view), &Vec::new()), "{file}");
+            assert_eq!(read.gaussians, export(None).gaussians, "{file}");
+        }
+    }
+    // A file of SPZ without labels has no records at all: some readers warn of them.
+    let options = WriteOptions { label_type: LabelType::None, first_view: Some(view), ..WriteOptions::default() };
+    export_model(scene.at("a.spz"), &model(50, 1, true), None, options).expect("written");
+    assert_eq!(read_model(scene.at("a.spz")).expect("read").first_view, None);
+}
+
+/// Comments of a PLY are free: damaged ones are no reason to refuse it.
+#[test]
+fn a_damaged_first_view_of_a_ply_does_not_matter() {
+    let scene = Scene::new();
+    let view = FirstView { up: DVec3::NEG_Y, eye: DVec3::new(1.0, 2.0, 3.0) };
+    let options = WriteOptions { first_view: Some(view), ..WriteOptions::default() };
+    export_model(scene.at("a.ply"), &model(3, 0, false), None, options).expect("written");
+    let bytes = fs::read(scene.at("a.ply")).expect("bytes");
+    let at = |part: &[u8]| bytes.windows(part.len()).position(|window| window == part).expect("a comment");
+    let (up, eye) = (at(b"comment labelgs up 0.0 -1.0 0.0"), at(b"comment labelgs eye 1.0 2.0 3.0"));
+    assert_eq!(LazyModel::open(&scene.at("a.ply")).expect("opened").first_view(), Some(view));
+    // No number, no direction, no number, two numbers.
+    for (place, letter) in [(up + 19, b'x'), (up + 24, b'0'), (eye + 20, b'e'), (eye + 23, b'1')] {
+        let mut bytes = bytes.clone();
+        bytes[place] = letter;
+        let read = read_model(scene.write("b.ply", bytes)).expect("read");
+        assert_eq!((read.first_view, read.gaussians.len()), (None, 3), "{place}");
     }
 }
