@@ -22,6 +22,19 @@ pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Re
     write_inner(path, body).map_err(Error::write(path))
 }
 
+/// Writes `path` as [`write()`] does, by a body that fills a file by its name, such as another program. A pipe or a device is an error.
+pub fn write_by_name(path: impl AsRef<Path>, body: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
+    let path = path.as_ref();
+    let place = || {
+        let target = follow(path)?;
+        if fs::metadata(&target).is_ok_and(|found| !found.is_file()) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no ordinary file"));
+        }
+        replace(&target, |temporary| body(temporary.path()))
+    };
+    place().map_err(Error::write(path))
+}
+
 /// Writes a value as JSON with indentation, atomically.
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
@@ -53,6 +66,11 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
         Ok(found) if !found.is_file() => return fill(&File::options().write(true).open(&target)?, body),
         _ => {}
     }
+    replace(&target, |temporary| fill(temporary.as_file(), body))
+}
+
+/// Puts a file that `fill` has filled in the place of another one.
+fn replace(target: &Path, fill: impl FnOnce(&tempfile::NamedTempFile) -> io::Result<()>) -> io::Result<()> {
     let folder = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -62,11 +80,11 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     clean_once(folder);
     fault::of_file("write")?;
     let temporary = temporary_in(folder)?;
-    fill(temporary.as_file(), body)?;
+    fill(&temporary)?;
     fault::of_file("write")?;
     temporary.as_file().sync_all()?;
     fault::of_file("write")?;
-    temporary.persist(&target).map_err(|failed| failed.error)?;
+    temporary.persist(target).map_err(|failed| failed.error)?;
     fault::of_file("write")?;
     sync_folder(folder)
 }

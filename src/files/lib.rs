@@ -17,6 +17,7 @@ pub mod read;
 pub mod resize;
 pub mod run_folder;
 pub mod scratch;
+pub mod video;
 
 pub use image::read_photo;
 pub use label_table::{LabelEntry, LabelTable};

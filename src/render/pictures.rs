@@ -103,6 +103,24 @@ fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>
     }
 }
 
+/// Returns the colours of a picture in a video; fails for kinds that are no colours. Depths are grey between two bounds, which
+/// the first picture with some sets: else a surface would flicker.
+pub(crate) fn frame(rendered: &Rendered, what: What, depths: &mut Option<[f32; 2]>) -> Result<Vec<[u8; 3]>> {
+    check_size("a video", rendered, what)?;
+    Ok(match what {
+        What::Rgb => rendered.rgb.iter().map(|colour| colour.map(to_byte)).collect(),
+        What::Alpha => rendered.alpha.iter().map(|&alpha| [to_byte(alpha); 3]).collect(),
+        What::Labels => label_colours(&rendered.labels),
+        What::Depth => {
+            let range = depth_range(&rendered.depth);
+            let range = *depths.get_or_insert(range);
+            *depths = depths.filter(|[_, far]| *far > 0.0);
+            depth_grey(&rendered.depth, range).into_iter().map(|grey| [(grey >> 8) as u8; 3]).collect()
+        }
+        What::TopId | What::TopWeight => return Err(Error::Bug("a video of rows of the model".to_owned())),
+    })
+}
+
 /// Writes rows, as floats where these hold them, else as unsigned integers with 4294967295 for none.
 fn write_rows(path: &Path, (width, height): (u32, u32), rows: &[i32]) -> Result<()> {
     if rows.iter().all(|&row| row <= FLOAT_EXACT) {
@@ -156,7 +174,11 @@ fn is_depth(z: f32) -> bool {
 
 /// Converts depth to grey: near is bright, far is dark, holes are black.
 pub(crate) fn depth_preview(depth: &[f32]) -> Vec<u16> {
-    let [near, far] = depth_range(depth);
+    depth_grey(depth, depth_range(depth))
+}
+
+/// The same between two bounds.
+fn depth_grey(depth: &[f32], [near, far]: [f32; 2]) -> Vec<u16> {
     let grey = |z: f32| if far > near { 1.0 - 0.9 * (z - near) / (far - near) } else { 1.0 };
     depth.iter().map(|z| if is_depth(*z) { to_word(grey(*z)) } else { 0 }).collect()
 }

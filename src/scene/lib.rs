@@ -1,7 +1,8 @@
 //! Plain host data of a scene, options and errors; no Vulkan, no files.
 //!
 //! A [`Dataset`] has [`View`]s (a [`Camera`] with [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
-//! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] makes smooth paths through cameras, an [`Overview`] is what they look at.
+//! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] orders cameras, a [`keyframes::CameraPath`] goes
+//! smoothly through some, an [`Overview`] is what they look at.
 //! A [`Zone`] is a box.
 
 pub mod agreement;
@@ -13,6 +14,7 @@ pub mod direction;
 pub mod error;
 pub mod gaussians;
 pub mod harmonics;
+pub mod keyframes;
 pub mod lab;
 pub mod labels;
 pub mod median;

@@ -8,6 +8,7 @@
 
 mod bad_photos;
 pub mod camera_json;
+pub mod camera_path;
 pub mod capture;
 pub mod colmap;
 pub mod depth;

@@ -9,6 +9,7 @@ mod kills; // killed exports leave whole files
 mod labels; // labels of a model from masks, and masks from labels
 mod long_training; // bit-identical results over 1,000 steps
 mod masks; // import, check and spoil masks from the command line
+mod motion; // cameras along a path and around an object, the sheet of labels
 mod objects; // an object on a turntable, trained alone
 mod resume; // killed, stopped and damaged runs resume to the same bits
 mod segmenter; // from photos to an object, with a segmenter in Python

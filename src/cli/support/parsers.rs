@@ -158,6 +158,11 @@ pub(crate) fn loss(text: &str) -> Result<f64, String> {
     number(text, |value: f64| value.is_finite() && value >= 0.0, "a loss of PSNR; expected 0 or more, in dB")
 }
 
+/// Parses a time, s, more than 0 and at most an hour.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    number(text, |value: f64| value > 0.0 && value <= 3600.0, "a time; expected more than 0 and at most 3600, in s")
+}
+
 /// Parses a factor, more than 0.
 pub(crate) fn factor(text: &str) -> Result<f64, String> {
     number(text, |value: f64| value.is_finite() && value > 0.0, "a factor; expected more than 0")

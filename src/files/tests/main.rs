@@ -9,4 +9,5 @@
 #[allow(dead_code, reason = "most of it is for scenes")]
 mod fixtures;
 mod label_table; // round trips, and invalid tables refused
-mod writes; // atomic writes, their litter, pictures
+mod videos;
+mod writes; // atomic writes, their litter, pictures // frames that go to an encoder

@@ -70,6 +70,11 @@ impl Index {
         self.means.is_empty()
     }
 
+    /// Places of the Gaussians in the world.
+    pub(crate) fn places(&self) -> impl Iterator<Item = DVec3> + Clone {
+        self.means.iter().map(|mean| self.origin + mean.as_dvec3())
+    }
+
     /// Labels of the Gaussians.
     pub(crate) fn labels(&self) -> Option<&[u32]> {
         self.labels.as_deref()

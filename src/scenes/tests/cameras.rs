@@ -1,10 +1,11 @@
-//! A camera from a JSON file, and the list of all cameras.
+//! A camera from a JSON file, a path of one, and the list of all cameras.
 
 use super::fixtures::{Scene, refusal};
 use glam::{DMat3, DVec3};
 use labelgs_scene::Camera;
-use labelgs_scenes::camera_json;
+use labelgs_scenes::{camera_json, camera_path::read_path};
 use std::fs;
+use std::path::Path;
 
 #[test]
 fn cameras_are_read_and_listed() {
@@ -39,4 +40,33 @@ fn cameras_are_read_and_listed() {
     assert_eq!(list[0]["rotation"][0], serde_json::json!([0.0, -1.0, 0.0]));
     assert_eq!(list[0]["position"], serde_json::json!([2.0, -1.0, -3.0]));
     assert_eq!(list[0]["cx"], 3.0);
+}
+
+#[test]
+fn paths_pass_their_keyframes() {
+    let scene = Scene::new();
+    let camera = |x: f64| {
+        format!(
+            r#"{{"w2c": [[1,0,0,{x}],[0,1,0,0],[0,0,1,0],[0,0,0,1]], "fx": 10, "fy": 10, "cx": 3, "cy": 2, "W": 6, "H": 4}}"#
+        )
+    };
+    let key = |time: f64, x: f64| format!(r#"{{"time": {time}, "camera": {}}}"#, camera(x));
+    let text = |keys: &[String]| format!(r#"{{"schema_version": 1, "fps": 4, "keyframes": [{}]}}"#, keys.join(", "));
+    let good = text(&[key(2.0, 0.0), key(2.5, 4.0), key(3.0, 5.0)]);
+    let found = read_path(Path::new(&scene.write("path.json", &good))).expect("a path");
+    let single = |x: f64| camera_json::read_camera(scene.write("cam.json", camera(x))).expect("a camera");
+    assert_eq!((found.per_second, found.cameras.len()), (4.0, 5));
+    assert_eq!([0, 2, 4].map(|at| found.cameras[at].clone()), [0.0, 4.0, 5.0].map(single));
+    assert!(found.cameras.windows(2).all(|pair| pair[0].translation.x < pair[1].translation.x));
+
+    let refused = |text: String, parts: &[&str]| {
+        let error = refusal(read_path(Path::new(&scene.write("bad.json", text))));
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+    };
+    refused(good.replace("2.5", "2"), &["keyframes: number 1 is at 2 s, after 2 s"]);
+    refused(good.replace("\"fps\": 4", "\"fps\": 0"), &["fps: 1 s of 0 frames per second"]);
+    refused(good.replace("[[1,0,0,5]", "[[9,0,0,5]"), &["keyframe 2: w2c: is not a camera-from-world pose"]);
+    refused(good.replace("\"schema_version\": 1", "\"schema_version\": 2"), &["version 2"]);
+    refused(text(&[]), &["keyframes: there is none"]);
+    refused("[]".to_owned(), &["expected {\"schema_version\": 1, \"fps\""]);
 }
