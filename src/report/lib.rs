@@ -6,6 +6,7 @@ pub mod figure;
 pub mod page;
 pub mod panels;
 pub mod series;
+pub mod sheet;
 pub mod text;
 
 pub use axis::Scale;

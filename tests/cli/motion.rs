@@ -138,3 +138,30 @@ fn a_turntable_goes_around_an_object_that_stays_in_the_picture() {
     let refused = render(&["--turntable", &id, "--only", &id]);
     assert!(stderr(&refused).contains("give it none beside --only or --without"), "{}", stderr(&refused));
 }
+
+#[test]
+fn a_sheet_shows_each_label() {
+    let Some(_turn) = device() else { return };
+    let place = Place::new();
+    succeeded(&place.trained("out", &["--iterations", "200"]));
+    let (out, object) = (place.text("out"), place.text("object.ply"));
+    for (model, more) in [(&out, &["--scene", &place.text("scene")][..]), (&out, &[]), (&object, &[])] {
+        succeeded(&place.labelgs(&["extract", &out, "--labels", "1-3", "-o", &object]));
+        let [page, picture] = ["sheet.html", "sheet.png"].map(|name| place.text(name));
+        let list = |sheet: &str| place.labelgs(&[&["list", model, "--json", "--sheet", sheet], more].concat());
+        let listed: Value = serde_json::from_slice(&list(&page).stdout).expect("JSON");
+        let labels: Vec<&Value> =
+            listed["labels"].as_array().expect("labels").iter().filter(|row| row["label"] != 0).collect();
+        let text = std::fs::read_to_string(&page).expect("a page");
+        assert_eq!(text.matches("data:image/png;base64,").count(), labels.len());
+        for row in &labels {
+            assert!(text.contains(&format!("<strong>{}</strong>", row["label"])), "{row}");
+        }
+        succeeded(&list(&picture));
+        let picture = read_photo(&picture, [0.0; 3]).expect("a picture");
+        let neutral = picture.rgb().iter().filter(|colour| **colour == [150; 3]).count();
+        assert!(neutral * 100 < picture.rgb().len() * 95, "{neutral} of {}", picture.rgb().len());
+    }
+    let refused = place.labelgs(&["list", &out, "--sheet", "sheet.pdf"]);
+    assert!(stderr(&refused).contains("ends in .html"), "{}", stderr(&refused));
+}

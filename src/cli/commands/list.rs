@@ -2,7 +2,7 @@
 
 use crate::cli::support::model_edit::look;
 use crate::cli::support::tables::{Column, Table, column, screen_width};
-use crate::cli::support::{Context, Seen, TableArg, stdout};
+use crate::cli::support::{Context, Seen, SheetArgs, TableArg, stdout};
 use crate::edit::select::LabelSummary;
 use crate::edit::{Boxes, OrientedBox};
 use crate::run::models;
@@ -27,6 +27,8 @@ pub struct ListArgs {
     /// the object with its sizes and volume.
     #[arg(long, help_heading = "Output")]
     pub csv: bool,
+    #[command(flatten)]
+    pub sheet: SheetArgs,
 }
 
 /// A label with its name and size.
@@ -45,6 +47,7 @@ pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
         return Err(Error::usage("--csv", "is another form of the same list than --json; leave one of them out"));
     }
     let Seen { model, tally, known } = look(&args.model, &args.table)?;
+    args.sheet.write(&args.model, &tally.summaries(), &known, context)?;
     let (view, mut boxes) = (model.view(), Boxes::new(&known.gaussians));
     models::scan(&args.model, view, |_, row| {
         let place = view.origin() + DVec3::from_array(row.position);

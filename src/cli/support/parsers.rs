@@ -62,6 +62,14 @@ pub(crate) fn page_file() -> impl TypedValueParser<Value = PathBuf> {
     file_of("html", "a page of HTML")
 }
 
+/// Parses the path of a sheet of labels to write.
+pub(crate) fn sheet_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match path.extension() {
+        Some(ending) if ending.eq_ignore_ascii_case("html") || ending.eq_ignore_ascii_case("png") => Ok(path),
+        _ => Err("expected a name that ends in .html, a page with names and numbers, or in .png, a picture"),
+    })
+}
+
 /// Parses a path whose extension, if it has one, is that of what is written.
 fn file_of(ending: &'static str, what: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match path.extension() {
