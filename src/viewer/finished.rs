@@ -20,7 +20,6 @@ use crate::render::RenderOptions;
 use crate::scene::overview::likely_up;
 use crate::scene::spread::quantiles;
 use crate::scene::{Dataset, Gaussians, Overview};
-use glam::DVec3;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
