@@ -159,7 +159,7 @@ fn host_memory_may_run_out() {
     succeeded(&place.labelgs(&extract(&right).each_ref().map(String::as_str)));
     let (mut done, mut refused) = (0, 0);
     // Less does not load a program without optimisation.
-    for megabytes in (68..164).step_by(8) {
+    for megabytes in (76..172).step_by(8) {
         let output = within(&place, megabytes, &extract(&part));
         let written = std::fs::read(&part).ok();
         match output.status.code() {
