@@ -24,12 +24,14 @@ pub(super) struct Chosen {
     nearby: Option<Nearby>,
     /// What strokes have hit since the last choice of another kind.
     seeds: Vec<Seed>,
+    /// Their cut, with the model that it is of.
+    cutting: Option<Cutting<Box<Gaussians>>>,
 }
 
 impl Chosen {
     pub(super) fn new(model: &Gaussians) -> Self {
         let none = vec![false; model.len()];
-        Self { rows: none.clone(), locked: none, nearby: None, seeds: Vec::new() }
+        Self { rows: none.clone(), locked: none, nearby: None, seeds: Vec::new(), cutting: None }
     }
 
     /// Returns for each row whether it is chosen.
@@ -51,6 +53,7 @@ impl Chosen {
     ) -> Result<()> {
         if !matches!(what, Choose::Stroke { .. }) {
             self.seeds.clear();
+            self.cutting = None;
         }
         let is_free: Vec<bool> = is_drawn.iter().zip(&self.locked).map(|(&drawn, &locked)| drawn && !locked).collect();
         let (found, how) = match what {
@@ -79,8 +82,8 @@ impl Chosen {
             Choose::Stroke { from, points, radius, on } => {
                 let hit = hit(from, (points, *radius), (painter, source))?;
                 let label = if *on { OBJECT } else { UNLABELLED };
-                self.seeds.extend(hit.into_iter().map(|row| Seed { row, label, is_on: true }));
-                (self.cut(model)?, Combine::Replace)
+                let seeds: Vec<Seed> = hit.into_iter().map(|row| Seed { row, label, is_on: true }).collect();
+                (self.cut(model, &seeds)?, Combine::Replace)
             }
             Choose::Labels { labels, how } => {
                 ((0..model.len()).map(|row| labels.contains(&model.label(row))).collect(), *how)
@@ -110,15 +113,22 @@ impl Chosen {
     }
 
     /// Returns the object of the strokes. Before one is on something else, that is what they hit.
-    fn cut(&self, model: &Gaussians) -> Result<Vec<bool>> {
-        if self.seeds.iter().all(|seed| seed.label == OBJECT) {
-            let mut rows = vec![false; model.len()];
+    fn cut(&mut self, model: &Gaussians, seeds: &[Seed]) -> Result<Vec<bool>> {
+        self.seeds.extend(seeds);
+        let is_one_sided = self.seeds.iter().all(|seed| seed.label == OBJECT);
+        let mut cutting = match self.cutting.take() {
+            Some(cutting) => cutting,
+            None => Cutting::new(Box::new(model.clone()))?,
+        };
+        cutting.add(seeds);
+        let mut rows = vec![false; model.len()];
+        if is_one_sided {
             self.seeds.iter().for_each(|seed| rows[seed.row] = true);
-            return Ok(rows);
+        } else {
+            rows = cutting.cut()?.into_iter().map(|label| label == OBJECT).collect();
         }
-        let mut cutting = Cutting::new(model)?;
-        cutting.add(&self.seeds);
-        Ok(cutting.cut()?.into_iter().map(|label| label == OBJECT).collect())
+        self.cutting = Some(cutting);
+        Ok(rows)
     }
 
     fn nearby(&mut self, model: &Gaussians) -> Result<&Nearby> {

@@ -301,6 +301,21 @@ pub fn tools_choose_gaussians(browser: &mut Browser, tab: &Tab, place: &Place) {
         browser.key(tab, "Escape", "Escape", 0);
         browser.until(tab, "labelgs.selecting.state.count === 0");
     }
+    for (code, key, tool) in [("KeyU", "u", "flood"), ("KeyY", "y", "depth"), ("KeyZ", "z", "strokes")] {
+        browser.key(tab, code, key, 0);
+        browser.until(tab, &format!("labelgs.selecting.tool === '{tool}'"));
+        if tool == "depth" {
+            // As a right click does.
+            let (x, y) = at;
+            browser.js(tab, &format!("(() => {{ const b = labelgs.stage.box.getBoundingClientRect(); labelgs.selecting.click([{x} - b.x, {y} - b.y], false, null); }})()"));
+        } else {
+            browser.click(tab, at, 0);
+        }
+        browser.until(tab, "labelgs.selecting.state.count > 0");
+        assert_eq!(browser.js(tab, "labelgs.rig.view"), 0, "{tool} does not turn the camera");
+        browser.key(tab, "Escape", "Escape", 0);
+        browser.until(tab, "labelgs.selecting.state.count === 0");
+    }
     // A name and Enter make a label; the keyboard gives it up again.
     browser.key(tab, "KeyR", "r", 0);
     browser.drag(tab, (middle.0 - 90.0, middle.1 - 60.0), (middle.0 + 90.0, middle.1 + 80.0));
@@ -330,6 +345,15 @@ pub fn tools_choose_gaussians(browser: &mut Browser, tab: &Tab, place: &Place) {
         "labelgs.measuring.distance > 0 && document.querySelector('#measure').textContent.includes('units')",
     );
     browser.key(tab, "KeyJ", "j", 0);
+    // A way of the camera.
+    browser.click_on(tab, "#camera-menu summary");
+    browser.click_on(tab, "#path-add");
+    browser.js(tab, "labelgs.rig.orbit(0.4, 0, false), labelgs.stage.change(true)");
+    browser.click_on(tab, "#path-add");
+    browser.until(tab, "labelgs.path.frames.length === 2 && !document.querySelector('#path-play').disabled");
+    browser.click_on(tab, "#path-play");
+    browser.until(tab, "labelgs.path.playing === null");
+    browser.js(tab, "labelgs.path.take(0), labelgs.path.take(0), document.querySelector('#camera-menu').open = false");
     // A file by its name.
     browser.key(tab, "KeyE", "e", 2);
     browser.until(tab, "document.querySelector('#export').open");

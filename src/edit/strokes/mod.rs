@@ -19,6 +19,7 @@ use costs::Costs;
 use graph::{Graph, rows_near};
 use labelgs_scene::{Gaussians, Result, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
 
 /// Most Gaussians in which objects are found, those nearest to the strokes on objects. All others belong to none.
 pub const NODES_MAX: usize = 200_000;
@@ -54,21 +55,21 @@ impl Mark {
 }
 
 /// Objects that are cut from a model by strokes. What does not depend on them is kept for the next strokes.
-pub struct Cutting<'a> {
-    model: &'a Gaussians,
+pub struct Cutting<M> {
+    model: M,
     nearby: Nearby,
     marks: BTreeMap<usize, Mark>,
     graph: Option<Graph>,
 }
 
-impl<'a> Cutting<'a> {
+impl<M: Deref<Target = Gaussians>> Cutting<M> {
     /// Starts without strokes.
     ///
     /// # Errors
     ///
     /// As [`Nearby::new`].
-    pub fn new(model: &'a Gaussians) -> Result<Self> {
-        Ok(Self { model, nearby: Nearby::new(model)?, marks: BTreeMap::new(), graph: None })
+    pub fn new(model: M) -> Result<Self> {
+        Ok(Self { nearby: Nearby::new(&model)?, model, marks: BTreeMap::new(), graph: None })
     }
 
     /// Adds what strokes hit. Later strokes correct earlier ones. Rows that the model has not are left out.
@@ -115,10 +116,10 @@ impl<'a> Cutting<'a> {
         }
         let graph = match self.graph.take() {
             Some(graph) => graph,
-            None => Graph::new(self.model, &self.nearby, self.rows()?),
+            None => Graph::new(&self.model, &self.nearby, self.rows()?),
         };
         let labels: Vec<u32> = std::iter::once(UNLABELLED).chain(objects).collect();
-        let nodes = Costs::new(self.model, &self.marks, &graph, &labels).expand();
+        let nodes = Costs::new(&self.model, &self.marks, &graph, &labels).expand();
         graph.rows.iter().zip(nodes).for_each(|(&row, label)| found[row] = labels[label as usize]);
         self.graph = Some(graph);
         Ok(found)
@@ -128,7 +129,7 @@ impl<'a> Cutting<'a> {
     fn rows(&self) -> Result<Vec<usize>> {
         let is_object = |mark: &Mark| matches!(mark, Mark::On(label) if *label != UNLABELLED);
         let hit: Vec<usize> = self.marks.iter().filter(|(_, mark)| is_object(mark)).map(|(&row, _)| row).collect();
-        let near = rows_near(self.model, &hit, NODES_MAX)?;
+        let near = rows_near(&self.model, &hit, NODES_MAX)?;
         let all: BTreeSet<usize> = near.into_iter().chain(self.marks.keys().copied()).collect();
         Ok(all.into_iter().collect())
     }
