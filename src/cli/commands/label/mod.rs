@@ -128,10 +128,20 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     }
     drop(progress);
     let seconds = start.elapsed().as_secs_f64();
+    finish(args, (&model, names.as_ref()), (views.len(), seconds), context)
+}
+
+/// Writes the labelled model, and tells its labels.
+fn finish(
+    args: &LabelArgs,
+    (model, names): (&Gaussians, Option<&LabelTable>),
+    (views, seconds): (usize, f64),
+    context: &Context,
+) -> Result<()> {
     let options = args.write.options(&args.model, &args.output)?;
-    export_model(&args.output, &model, names.as_ref(), options)?;
-    let rows = summarise(&model);
-    let (output, views, gaussians) = (args.output.display().to_string(), views.len(), model.len());
+    export_model(&args.output, model, names, options)?;
+    let rows = summarise(model);
+    let (output, gaussians) = (args.output.display().to_string(), model.len());
     let objects = || rows.iter().filter(|row| row.label != 0);
     let text = format!(
         "{output}: {} of {} belong to {}, by {} in {seconds:.1} s\n",
