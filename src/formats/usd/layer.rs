@@ -38,6 +38,8 @@ pub(super) struct Part<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Layer<'a> {
     pub(super) parts: Vec<Part<'a>>,
+    /// Our own dictionary, if it has one.
+    pub(super) own: BTreeMap<&'a str, Span>,
     pub(super) notes: BTreeSet<String>,
 }
 
@@ -67,6 +69,9 @@ pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
     let mut is_z_up = false;
     for (key, value) in metadata(scanner)? {
         is_z_up |= key == "upAxis" && scanner.part(value).contains('Z');
+        if key == "customLayerData" {
+            layer.own = own(scanner, value)?;
+        }
         layer.note_arc(key);
     }
     let root = if is_z_up { DMat4::from_rotation_x(-FRAC_PI_2) } else { DMat4::IDENTITY };
@@ -143,11 +148,7 @@ impl<'a> Layer<'a> {
             match key {
                 "active" => frame.is_active = is_true(scanner.part(value)),
                 "displayName" => frame.title = Some(value),
-                "customData" => {
-                    if let Some(&(_, own)) = dictionary(scanner, value)?.iter().rfind(|(key, _)| *key == OWN) {
-                        frame.own = dictionary(scanner, own)?.into_iter().collect();
-                    }
-                }
+                "customData" => frame.own = own(scanner, value)?,
                 _ => self.note_arc(key),
             }
         }
@@ -232,6 +233,14 @@ fn metadata<'a>(scanner: &mut Scanner<'a>) -> Result<Vec<(&'a str, Span)>> {
         all.push((key, scanner.value()?));
     }
     Ok(all)
+}
+
+/// The keys and values of our own dictionary in one; none without.
+fn own<'a>(scanner: &Scanner<'a>, value: Span) -> Result<BTreeMap<&'a str, Span>> {
+    match dictionary(scanner, value)?.iter().rfind(|(key, _)| *key == OWN) {
+        Some(&(_, own)) => Ok(dictionary(scanner, own)?.into_iter().collect()),
+        None => Ok(BTreeMap::new()),
+    }
 }
 
 /// The keys and values of a dictionary.

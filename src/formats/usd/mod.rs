@@ -55,3 +55,6 @@ const OWN: &str = "labelgs";
 const OWN_LABEL: &str = "label";
 const OWN_DEGREE: &str = "degree";
 const OWN_ANTIALIASED: &str = "antialiased";
+/// Its keys in `customLayerData`: where the model is seen from at first, in its own axes.
+const OWN_UP: &str = "up";
+const OWN_EYE: &str = "eye";

@@ -3,11 +3,11 @@
 use super::layer::{self, Part, is_true};
 use super::text::{Scanner, Span};
 use super::{
-    AXES, CONFIDENCE, DEGREE, HARMONICS, OPACITIES, ORIENTATIONS, OWN_ANTIALIASED, OWN_DEGREE, OWN_LABEL, POSITIONS,
-    SCALES, SPLATS,
+    AXES, CONFIDENCE, DEGREE, HARMONICS, OPACITIES, ORIENTATIONS, OWN_ANTIALIASED, OWN_DEGREE, OWN_EYE, OWN_LABEL,
+    OWN_UP, POSITIONS, SCALES, SPLATS,
 };
 use crate::archive::Archive;
-use crate::format::ReadModel;
+use crate::format::{FirstView, ReadModel};
 use crate::ply::joined;
 use crate::rows::{Row, Rows};
 use crate::transform::Transform;
@@ -73,6 +73,8 @@ fn model(path: &Path, entry: Option<&str>, text: &str) -> Result<ReadModel> {
             names.entry(label).or_insert(title);
         }
     }
+    let triple = |key: &str| reader.triple(*layer.own.get(key)?);
+    read.first_view = triple(OWN_UP).zip(triple(OWN_EYE)).and_then(|(up, eye)| FirstView::checked(up, eye));
     read.notes.extend(layer.notes);
     read.notes.dedup();
     let mut taken = BTreeSet::new();
@@ -92,6 +94,13 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Returns three numbers in round brackets; `None` for something else.
+    fn triple(&self, value: Span) -> Option<DVec3> {
+        let inside = self.scanner.part(value).strip_prefix('(')?.strip_suffix(')')?;
+        let numbers: Vec<f64> = inside.split(',').map(|word| word.trim().parse().ok()).collect::<Option<_>>()?;
+        Some(DVec3::from_array(numbers.try_into().ok()?))
+    }
+
     /// Returns the label of each prim: the one that labelgs wrote, or the next free one for each thing that prims of other
     /// programs show.
     fn labels(&self, parts: &[Part]) -> Result<Vec<Option<u32>>> {

@@ -1,11 +1,11 @@
 //! Writes USD.
 
 use super::{
-    AXES, CONFIDENCE, DEGREE, HARMONICS, MAGIC, OPACITIES, ORIENTATIONS, OWN, OWN_ANTIALIASED, OWN_DEGREE, OWN_LABEL,
-    POSITIONS, SCALES, SEMANTICS, SPLATS, TAXONOMY,
+    AXES, CONFIDENCE, DEGREE, HARMONICS, MAGIC, OPACITIES, ORIENTATIONS, OWN, OWN_ANTIALIASED, OWN_DEGREE, OWN_EYE,
+    OWN_LABEL, OWN_UP, POSITIONS, SCALES, SEMANTICS, SPLATS, TAXONOMY,
 };
 use crate::archive;
-use crate::format::{Export, ModelWriter};
+use crate::format::{Export, FirstView, ModelWriter};
 use crate::values::{losses as losses_of_values, sigmoid, unit};
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::harmonics::coefficients;
@@ -56,9 +56,17 @@ fn write_package(export: &Export, out: &mut dyn Write) -> io::Result<()> {
 
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let creator = concat!("labelgs ", env!("CARGO_PKG_VERSION"));
+    let triple = |DVec3 { x, y, z }: DVec3| format!("({x:?}, {y:?}, {z:?})");
+    let view = export.options.first_view.map_or(String::new(), |FirstView { up, eye }| {
+        format!(
+            "        dictionary {OWN} = {{\n            double3 {OWN_UP} = {}\n            double3 {OWN_EYE} = {}\n        }}\n",
+            triple(up),
+            triple(eye)
+        )
+    });
     write!(
         out,
-        "{MAGIC}\n(\n    customLayerData = {{\n        string creator = \"{creator}\"\n    }}\n    \
+        "{MAGIC}\n(\n    customLayerData = {{\n        string creator = \"{creator}\"\n{view}    }}\n    \
          defaultPrim = \"model\"\n    metersPerUnit = 1\n    upAxis = \"Y\"\n)\n\n\
          def Xform \"model\" (\n    kind = \"component\"\n)\n{{\n"
     )?;
