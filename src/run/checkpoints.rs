@@ -222,8 +222,11 @@ impl Run<'_> {
     /// Begins a checkpoint, and writes what a report of the run until then needs.
     fn begin_checkpoint(&mut self) -> Result<()> {
         self.history.drain(&mut self.trainer)?;
+        self.hold_folder()?;
         let begun = self.checkpoints.begin(&mut self.trainer, &mut self.history);
         self.or_warned(begun)?;
+        // The copy of the state takes a while.
+        self.hold_folder()?;
         let written = self.write_info();
         self.tolerate(written).map(|_| ())
     }
