@@ -1,6 +1,6 @@
 // What can be done to the selection, and the commands that do the same.
 
-import { $, copy, el, toast } from "./dom.js";
+import { $, copy, el } from "./dom.js";
 
 export class Edits {
   /** `isChosen` says whether Gaussians are chosen by hand. */
@@ -88,8 +88,16 @@ export class Edits {
 
   remove(fill) {
     if (this.isFixed || this.chosen.length === 0 || (fill && !this.fills)) return;
-    if (fill) toast("Looking at what is around …");
+    if (fill) this.setFilling(true);
     this.send({ edit: "remove", labels: this.chosen, fill });
+  }
+
+  /** Says that a hole is being filled, which takes a while. */
+  setFilling(isFilling) {
+    this.isFilling = isFilling;
+    $("act-fill").textContent = isFilling ? "Filling …" : "Remove, fill";
+    document.body.classList.toggle("busy", isFilling);
+    this.refresh();
   }
 
   recolour() {
@@ -115,6 +123,7 @@ export class Edits {
   setState(state) {
     this.state = state;
     const { changes, file } = state;
+    this.setFilling(false);
     $("edits").hidden = changes.length === 0;
     $("edit-count").textContent = changes.length;
     $("edit-list").replaceChildren(...changes.map((change) => el("li", { textContent: change })));
@@ -130,7 +139,7 @@ export class Edits {
     allow("act-merge", this.chosen.filter((id) => id !== 0).length > 1);
     allow("act-split", count === 1 && !this.chosen.includes(0));
     for (const id of ["act-remove", "act-recolour", "act-alone", "act-choose"]) allow(id, count > 0);
-    allow("act-fill", count > 0);
+    allow("act-fill", count > 0 && !this.isFilling);
     $("act-fill").hidden = !this.fills;
     $("act-frame").disabled = this.labels.box(this.chosen) === null;
     $("recolour").hidden = this.isFixed;

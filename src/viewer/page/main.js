@@ -50,7 +50,7 @@ function hear(message) {
     case "picked": return picked(message);
     case "over": return over(message);
     case "lost": stage.lost(message.seq); return toast(message.text, true);
-    case "problem": return toast(message.text, true);
+    case "problem": edits.setFilling(false); return toast(message.text, true);
     case "said": return toast(message.text);
     case "notice": return toast(message.text);
     default: return undefined;
