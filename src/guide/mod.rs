@@ -38,6 +38,7 @@ macro_rules! pages {
         /// [page devices]: devices
         /// [`masks::import()`]: crate::masks::import
         /// [`masks::inspect()`]: crate::masks::inspect
+        /// [`formats::write_meshes`]: crate::formats::write_meshes
         /// [`formats::read_model`]: crate::formats::read_model
         /// [`formats::export_model`]: crate::formats::export_model
         ///

@@ -20,7 +20,7 @@ impl PipelineFolder {
         Self { folder: folder.into() }
     }
 
-    /// Uses the [`user_cache`].
+    /// Uses the folder of the user's caches.
     pub fn of_user() -> Option<Self> {
         user_cache().map(Self::new)
     }

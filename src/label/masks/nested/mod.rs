@@ -1,8 +1,8 @@
 //! Objects from nested masks: a segmenter of single photos finds parts, things and several things as one, in each photo
 //! others. What is an object, all views decide together.
 //!
-//! Masks of different views that own the same Gaussians are a [group](group); [`choose`] keeps those that enough views confirm,
-//! leaves out [patterns](pattern) of sheets, and takes of nested ones those that explain the views best.
+//! Masks of different views that own the same Gaussians are a group; `choose` keeps those that enough views confirm,
+//! leaves out patterns of sheets, and takes of nested ones those that explain the views best.
 
 mod choose;
 mod group;
