@@ -26,6 +26,7 @@ use labelgs_scene::harmonics::sh0_of;
 use labelgs_scene::{Camera, Error, Gaussians, LabelMap, Result, Setting};
 use pattern::Pattern;
 use plane::{Plane, planes};
+use rayon::prelude::*;
 use shadow::{Disc, Shadows};
 use sheet::Sheet;
 use std::collections::BTreeMap;
@@ -238,17 +239,21 @@ impl Place {
 
     /// Returns the points that views show around the object, by label.
     fn ring(&self, removed: &[u32], sights: &[Sight]) -> BTreeMap<u32, Vec<DVec3>> {
-        let mut found: BTreeMap<u32, Vec<DVec3>> = BTreeMap::new();
-        for sight in sights {
-            for (index, (&depth, &id)) in sight.depth.iter().zip(&sight.labels.ids).enumerate() {
+        let seen = |sight: &Sight| -> Vec<(u32, DVec3)> {
+            let pixels = sight.depth.iter().zip(&sight.labels.ids).enumerate();
+            let point = |(index, (&depth, &id)): (usize, (&f32, &u16))| {
                 if depth <= 0.0 || removed.contains(&u32::from(id)) {
-                    continue;
+                    return None;
                 }
                 let world = sight.at(index, f64::from(depth));
-                if self.is_near(world, self.ring) && self.distance(world) <= self.ring {
-                    found.entry(u32::from(id)).or_default().push(world);
-                }
-            }
+                let is_in = self.is_near(world, self.ring) && self.distance(world) <= self.ring;
+                is_in.then_some((u32::from(id), world))
+            };
+            pixels.filter_map(point).collect()
+        };
+        let mut found: BTreeMap<u32, Vec<DVec3>> = BTreeMap::new();
+        for (label, world) in sights.par_iter().map(seen).collect::<Vec<_>>().concat() {
+            found.entry(label).or_default().push(world);
         }
         for points in found.values_mut() {
             let step = points.len().div_ceil(POINTS_MAX).max(1);
