@@ -2,6 +2,7 @@
 //! Gaussians, and with its column of labels it has lost what they belong to.
 
 use super::clean::gaps;
+use crate::nearest::tree;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use labelgs_scene::harmonics::value_of;
@@ -112,8 +113,7 @@ impl<'a> Sources<'a> {
         if points.is_empty() {
             return Err(Error::usage(Setting("like"), "the model has no Gaussian with finite values"));
         }
-        let tree = ImmutableKdTree::new_from_slice(&points)
-            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let tree = tree(&points)?;
         // What is within the thinnest one at a place is at that place, however dense its neighbours are.
         let thinnest = |&row: &usize| f64::from(model.scales[row].into_iter().fold(f32::INFINITY, f32::min)).exp();
         let own = rows.iter().map(|rows| rows.iter().map(thinnest).fold(0.0, f64::max));

@@ -30,12 +30,17 @@ pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix
     let target = colour.map(|value| sh0_of(f64::from(value)));
     for (row, label) in labels_of(model).into_iter().enumerate() {
         if labels.contains(&label) {
-            let old = model.sh0[row];
-            out.sh0[row] = [0, 1, 2].map(|c| old[c] * (1.0 - mix) + target[c] * mix);
-            out.rest_mut(row).iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
+            mix_in(&mut out, row, target, mix);
         }
     }
     out
+}
+
+/// Mixes a coefficient of degree 0 (r, g, b) into a Gaussian.
+pub fn mix_in(model: &mut Gaussians, row: usize, target: [f32; 3], mix: f32) {
+    let old = model.sh0[row];
+    model.sh0[row] = [0, 1, 2].map(|c| old[c] * (1.0 - mix) + target[c] * mix);
+    model.rest_mut(row).iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
 }
 
 /// Replaces labels by new ids, all at once. Labels that are not in the map stay.

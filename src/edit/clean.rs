@@ -1,8 +1,9 @@
 //! Drops Gaussians that only disturb: faint, huge, lonely or far ones.
 
+use crate::nearest::tree;
 use glam::DVec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use labelgs_scene::{Error, Gaussians, Result};
+use kiddo::SquaredEuclidean;
+use labelgs_scene::{Gaussians, Result};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZero;
@@ -69,8 +70,7 @@ pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> 
 pub(super) fn gaps(places: &[[f64; 3]]) -> Result<Vec<f64>> {
     // One more, because each finds itself.
     let Some(asked) = NonZero::new((NEIGHBOUR + 1).min(places.len())) else { return Ok(Vec::new()) };
-    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(places)
-        .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+    let tree = tree(places)?;
     let gap = |place: &[f64; 3]| {
         let found = tree.query(place).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
         found.iter().map(|item| item.distance).fold(0.0, f64::max).sqrt()

@@ -3,11 +3,12 @@
 //! Two Gaussians are connected if their ellipsoids of `REACH` standard deviations, grown by half of a gap, intersect.
 //! The test uses the contact function of Perram and Wertheim (1985).
 
+use crate::nearest::tree;
 use glam::{DMat3, DVec3};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::SquaredEuclidean;
 use labelgs_scene::gaussians::axes_of;
 use labelgs_scene::stage::Stage;
-use labelgs_scene::{Error, Gaussians, Result};
+use labelgs_scene::{Gaussians, Result};
 use std::collections::BTreeMap;
 
 /// Half axes of an ellipsoid in standard deviations: at its surface an eighth of the opacity is left.
@@ -59,8 +60,7 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
     let mut groups = Sets::new(bodies.len());
     let centres: Vec<[f64; 3]> = bodies.iter().map(|body| body.centre.to_array()).collect();
     if !centres.is_empty() {
-        let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&centres)
-            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let tree = tree(&centres)?;
         for (index, body) in bodies.iter().enumerate() {
             // Each pair is tested from its larger body, so that a small one has few tests.
             let reach = (2.0 * body.radius).powi(2);

@@ -16,6 +16,7 @@ pub mod components;
 pub mod edits;
 pub mod fill;
 pub mod merge;
+pub mod nearest;
 pub mod oriented_box;
 pub mod prompt;
 pub mod rename;

@@ -202,12 +202,10 @@ impl Painter {
             };
             return Ok(Spot::Photo(name.clone(), pixels.iter().map(share).collect()));
         }
-        let (width, height) = bounded_size(full.size(), Some(SURFACE_PX));
-        let small = full.resized(width, height);
-        let rendered = source.render(&small, Parts::DEPTH)?;
+        let (small, scale, rendered) = self.seen(from, Parts::DEPTH, Some(SURFACE_PX), source)?;
+        let (width, height) = small.size();
         let point = |[x, y]: &[u32; 2]| {
-            let along = |at: u32, from: u32, to: u32| (f64::from(at) + 0.5) * f64::from(to) / f64::from(from);
-            let place = DVec2::new(along(*x, full.width, width), along(*y, full.height, height));
+            let place = DVec2::new((f64::from(*x) + 0.5) * scale[0], (f64::from(*y) + 0.5) * scale[1]);
             let at = (place.y as u32).min(height - 1) * width + (place.x as u32).min(width - 1);
             rendered.depth_at(at as usize).map(|depth| small.unproject(place, f64::from(depth)))
         };

@@ -113,8 +113,8 @@ impl Document {
 
     fn split(&self, label: u32) -> Result<Self> {
         let taken = self.table.iter().flat_map(|table| &table.labels).map(|entry| entry.id).collect();
-        let grouping = Grouping { gap: 0.0, min_share: SPECK_SHARE };
-        let found = split_components(&self.model, &BTreeSet::from([label]), &taken, grouping, Specks::Keep)?;
+        let labels = BTreeSet::from([label]);
+        let found = split_components(&self.model, &labels, &taken, Grouping::default(), Specks::Keep)?;
         if found.ids.values().all(|ids| ids.len() < 2) {
             return Err(Error::usage("labels", "the label has one part only; choose a part of it instead"));
         }
@@ -168,6 +168,3 @@ impl Document {
         Ok(Self { model, table })
     }
 }
-
-/// Least share of a label's Gaussians in a part of its own.
-const SPECK_SHARE: f64 = 0.05;

@@ -20,6 +20,7 @@ mod sheet;
 pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
+use crate::nearest::tree;
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use labelgs_scene::harmonics::sh0_of;
@@ -207,8 +208,7 @@ impl Place {
         pixels.sort_unstable_by(f64::total_cmp);
         let Some(&cell) = pixels.get(pixels.len() / 2) else { return Ok(None) };
         let places: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
-        let tree = ImmutableKdTree::new_from_slice(&places)
-            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let tree = tree(&places)?;
         let mut place = Self { tree: Arc::new(tree), discs: Vec::new(), low, high, cell, ring: 0.0 };
         place.ring = (RING.0 * place.size()).max(RING.1 * cell);
         place.discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, place.ring)).collect();

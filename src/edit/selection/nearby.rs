@@ -1,10 +1,11 @@
 //! Choices by what is near to a Gaussian, and alike.
 
+use crate::nearest::tree;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use labelgs_scene::gaussians::axes_of;
 use labelgs_scene::harmonics::value_of;
-use labelgs_scene::{Error, Gaussians, Result};
+use labelgs_scene::{Gaussians, Result};
 use rayon::prelude::*;
 use std::num::NonZeroUsize;
 
@@ -38,8 +39,7 @@ impl Nearby {
             mean.map(|value| if is_finite { f64::from(value) } else { 1e30 })
         };
         let places: Vec<[f64; 3]> = model.means.iter().map(place).collect();
-        let tree = ImmutableKdTree::new_from_slice(&places)
-            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let tree = tree(&places)?;
         Ok(Self { tree, places })
     }
 

@@ -5,10 +5,11 @@
 
 mod blob;
 
+use crate::nearest::tree;
 use blob::{Blob, axes, covariance};
 use glam::DVec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use labelgs_scene::{Error, Gaussians, Result};
+use kiddo::SquaredEuclidean;
+use labelgs_scene::{Gaussians, Result};
 use rayon::prelude::*;
 use std::num::NonZero;
 
@@ -92,8 +93,7 @@ impl<'a> Simplifier<'a> {
         let places: Vec<[f64; 3]> = self.blobs.iter().map(|blob| blob.mean.to_array()).collect();
         // One more, because each finds itself.
         let Some(asked) = NonZero::new((NEIGHBOURS + 1).min(places.len())) else { return Ok(Vec::new()) };
-        let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(&places)
-            .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+        let tree = tree(&places)?;
         let of = |index: usize| {
             let found = tree.query(&places[index]).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
             let others: Vec<usize> = found.iter().map(|item| item.item as usize).collect();

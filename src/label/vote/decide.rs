@@ -1,6 +1,7 @@
 //! Decides label and confidence of every Gaussian from the votes.
 
 use super::ballot::{Ballot, Sweep, Voter, sweep, weight};
+use crate::edit::nearest::tree;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::render::label_map;
@@ -99,8 +100,7 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
         return Ok(None);
     }
     let places: Vec<[f64; 3]> = rows.iter().map(|&row| means[row].map(f64::from)).collect();
-    let tree = ImmutableKdTree::new_from_slice(&places)
-        .map_err(|error| Error::Bug(format!("the k-d tree of the Gaussians failed: {error:?}")))?;
+    let tree = tree(&places)?;
     Ok(Some((tree, rows)))
 }
 
