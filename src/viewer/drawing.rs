@@ -1,6 +1,7 @@
 //! The engine with the drawn part of a finished model.
 
 use super::painter::Source;
+use crate::edit::change::mix_in;
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -79,9 +80,7 @@ impl Drawing {
         let mut part = model.picked(&rows);
         let (colour, share) = (CHOSEN.0.map(sh0_of), CHOSEN.1);
         for (drawn, _) in rows.iter().enumerate().filter(|(_, row)| is_chosen[**row]) {
-            let old = part.sh0[drawn];
-            part.sh0[drawn] = [0, 1, 2].map(|c| old[c] * (1.0 - share) + colour[c] * share);
-            part.rest_mut(drawn).iter_mut().flatten().for_each(|value| *value *= 1.0 - share);
+            mix_in(&mut part, drawn, colour, share);
         }
         self.engine.upload_model(&part)?;
         self.confidence = part.label_confidence;

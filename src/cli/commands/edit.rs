@@ -1,14 +1,13 @@
 //! `labelgs edit`.
 
 use crate::Result;
+use crate::cli::commands::extract_remove::scene_sights;
 use crate::cli::support::parsers::near;
-use crate::cli::support::{Context, EditArgs, Edited, SceneArgs, near_plane, open_gpu, open_scene};
+use crate::cli::support::{Context, EditArgs, Edited, SceneArgs, near_plane};
 use crate::edit::fill::Sight;
 use crate::edit::{Document, EditsFile};
-use crate::engine::Engine;
 use crate::error::{Error, Setting};
-use crate::eval::removal::sights;
-use crate::scene::{Gaussians, View};
+use crate::scene::Gaussians;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -49,12 +48,6 @@ pub(crate) fn run(args: &ReplayArgs, context: &Context) -> Result<()> {
 fn sights_of(args: &ReplayArgs, model: &Gaussians, context: &Context) -> Result<Vec<Sight>> {
     let none = || Error::usage(Setting("scene"), "is missing: the list has a removal that is filled");
     let scene: &Path = args.scene.as_deref().ok_or_else(none)?;
-    let dataset = open_scene(scene, &args.reading.of_run(&args.edit.model)?, None, [0.0; 3], false)?;
-    let views: Vec<&View> = dataset.train.iter().collect();
-    if views.is_empty() {
-        return Err(Error::data(scene, "", "has no training view to fill from"));
-    }
-    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
-    sights(&mut engine, &views, near_plane(&args.edit.model, args.near)?)
+    let reading = args.reading.of_run(&args.edit.model)?;
+    scene_sights((scene, &reading), (model, near_plane(&args.edit.model, args.near)?), context)
 }

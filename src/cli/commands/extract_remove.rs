@@ -4,12 +4,12 @@ use crate::cli::commands::occlusion::from_model;
 use crate::cli::support::model_edit::look;
 use crate::cli::support::parsers::{distance, share};
 use crate::cli::support::{
-    ChooseArgs, Context, EditArgs, Edited, MinConfidenceArg, Progress, Seen, near_plane, open_gpu, open_model,
-    open_scene, warn_of_misfit,
+    ChooseArgs, Context, EditArgs, Edited, MinConfidenceArg, Progress, SceneArgs, Seen, near_plane, open_gpu,
+    open_model, open_scene, warn_of_misfit,
 };
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
-use crate::edit::fill::{Filled, Light, fill};
+use crate::edit::fill::{Filled, Light, Sight, fill};
 use crate::edit::rename::keep;
 use crate::edit::select::remove;
 use crate::engine::Engine;
@@ -152,21 +152,34 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
 /// Removes labels and closes their place by what the training views of a scene show.
 fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
     let RemoveArgs { edit, choice, keep_shadow, .. } = args;
-    let dataset = open_scene(scene, &choice.reading(&edit.model)?, None, [0.0; 3], false)?;
-    let views: Vec<&View> = dataset.train.iter().collect();
-    if views.is_empty() {
-        return Err(Error::data(scene, "", "has no training view to fill from; with --fill a scene needs some"));
-    }
     // A choice of nothing or of everything is refused before any picture.
     remove(model, labels)?;
     let near = near_plane(&edit.model, choice.prompts.near)?;
-    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
-    let sights = sights(&mut engine, &views, near)?;
+    let sights = scene_sights((scene, &choice.reading(&edit.model)?), (model, near), context)?;
     let light = if *keep_shadow { None } else { Light::of(model, &sights)? };
     if let Some(Light { towards, shade }) = light {
         let share = shade.element_sum() / 3.0;
         tracing::info!("light from {towards:.2}; shadows have {share:.2} of the colours beside them");
     }
     fill(model, labels, &sights, light.as_ref())
+}
+
+/// Draws a model from the training views of a scene, for what fills a hole.
+pub(super) fn scene_sights(
+    (scene, reading): (&Path, &SceneArgs),
+    (model, near): (&Gaussians, f32),
+    context: &Context,
+) -> Result<Vec<Sight>> {
+    let dataset = open_scene(scene, reading, None, [0.0; 3], false)?;
+    let views: Vec<&View> = dataset.train.iter().collect();
+    if views.is_empty() {
+        return Err(Error::data(
+            scene,
+            "",
+            "has no training view to fill from; a hole needs some that show its surroundings",
+        ));
+    }
+    let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
+    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
+    sights(&mut engine, &views, near)
 }
