@@ -64,6 +64,8 @@ enum Command {
     Steps(Common),
     /// Quality against processor time of this program, and of another one.
     Training(training::Options),
+    /// Scores of real captures, as papers report them, beside those of other trainers.
+    Real(training::real::Options),
     /// Rates and costs of the device, and how near each stage of a step comes to the limit that follows.
     Limits(Common),
     /// The blends of made splats: the chain of a lone tile, and a picture of even tiles.
@@ -103,6 +105,7 @@ fn run() -> Result<()> {
         Command::Kernels(args) => kernels::run(&args),
         Command::Steps(common) => steps::run(&common),
         Command::Training(options) => training::run(&options),
+        Command::Real(options) => training::real::run(&options),
         Command::Limits(common) => limits::run(&common),
         Command::Tile(common) => tile::run(&common),
         Command::Sort(common) => sort::run(&common),

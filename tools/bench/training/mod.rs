@@ -4,6 +4,7 @@
 //! All train the same scenes from the same seeds in processes of their own, one after another. The scores are those of
 //! this program. Each length of a run is a training of its own, because schedules are fractions of the run.
 
+pub mod real;
 mod rows;
 mod table;
 
@@ -83,7 +84,7 @@ pub fn run(options: &Options) -> Result<()> {
             for kind in &kinds {
                 for &steps in &kind.lengths {
                     let (name, flags) = (kind.name.as_str(), kind.flags.as_slice());
-                    let row = rows.row(&Plan { name, program: &kind.program, flags, scene, seed, steps }, &own)?;
+                    let row = rows.row(&Plan { name, program: &kind.program, flags, scene, seed, steps, lpips: None }, &own)?;
                     println!("{}", line(&row));
                     found.push(row);
                 }

@@ -63,6 +63,18 @@ pub struct Row {
     pub iou_map: Option<f64>,
     /// Mean IoU of objects alone.
     pub iou_object: Option<f64>,
+    /// Mean IoU of the boundaries of the label map.
+    #[serde(default)]
+    pub boundary_iou: Option<f64>,
+    /// Mean LPIPS of the held-out views, where weights were given.
+    #[serde(default)]
+    pub lpips: Option<f64>,
+    /// Duration of the training by a clock, s.
+    #[serde(default)]
+    pub seconds: f64,
+    /// Device, as the run names it.
+    #[serde(default)]
+    pub device: String,
 }
 
 /// What to train.
@@ -80,6 +92,8 @@ pub struct Plan<'a> {
     pub seed: u64,
     /// Steps.
     pub steps: u32,
+    /// Weights of LPIPS, for scores that have it.
+    pub lpips: Option<&'a Path>,
 }
 
 /// Rows of a file, in which each new row is stored at once.
@@ -108,6 +122,7 @@ impl Rows {
         let is_it = |row: &&Row| {
             (row.build, row.seed, row.steps) == (build, plan.seed, plan.steps)
                 && (&row.scene, row.flags.as_slice()) == (&plan.scene.name, plan.flags)
+                && (plan.lpips.is_none() || row.lpips.is_some())
         };
         if let Some(row) = self.rows.iter().find(is_it) {
             return Ok(Row { program: plan.name.to_owned(), ..row.clone() });
@@ -155,6 +170,10 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
     let cpu = children()? - before;
     let mut args = vec!["eval", &out, "--scene", &scene, "--quiet", "--json"];
     args.extend(masks.iter().flat_map(|masks| ["--masks", masks.as_str()]));
+    let lpips = plan.lpips.map(text);
+    args.extend(lpips.iter().flat_map(|weights| ["--lpips", weights.as_str()]));
+    let record = folder.path().join("run").join("run.json");
+    let record = parse(&fs::read_to_string(&record).map_err(Error::read(&record))?)?;
     let scores = parse(&program(judge, &args)?)?;
     let mean = |key: &str| scores["mean"][key].as_f64();
     let needed = |found: Option<f64>, key: &str| found.ok_or_else(|| Error::Check(format!("eval gives no {key}")));
@@ -178,6 +197,10 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
         ssim: needed(mean("ssim"), "ssim")?,
         iou_map: mean("iou_map"),
         iou_object: mean("iou_object"),
+        boundary_iou: mean("boundary_iou"),
+        lpips: mean("lpips"),
+        seconds: summary["seconds"].as_f64().unwrap_or(0.0),
+        device: record["parts"][0]["device"].as_str().unwrap_or_default().to_owned(),
     })
 }
 

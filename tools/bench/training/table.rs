@@ -3,11 +3,11 @@
 use super::rows::Row;
 
 /// All seeds of a scene, a kind and a length.
-struct Group<'a> {
-    scene: &'a str,
+pub(super) struct Group<'a> {
+    pub scene: &'a str,
     kind: &'a str,
-    steps: u32,
-    rows: Vec<&'a Row>,
+    pub steps: u32,
+    pub rows: Vec<&'a Row>,
 }
 
 impl Group<'_> {
@@ -21,7 +21,7 @@ impl Group<'_> {
     }
 
     /// Mean, least and most.
-    fn cell(&self, digits: usize, of: impl Fn(&Row) -> Option<f64>) -> String {
+    pub fn cell(&self, digits: usize, of: impl Fn(&Row) -> Option<f64>) -> String {
         let values = self.values(of);
         if values.is_empty() {
             return "-".to_owned();
@@ -37,7 +37,7 @@ impl Group<'_> {
 }
 
 /// Groups in the order of their first rows.
-fn groups(rows: &[Row]) -> Vec<Group<'_>> {
+pub(super) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
     let mut found: Vec<Group> = Vec::new();
     for row in rows {
         let key = (row.scene.as_str(), row.program.as_str(), row.steps);
