@@ -1,6 +1,8 @@
 //! The commands that README.md and the guide show run as they stand, one after the other, in an empty folder. Only the
 //! long trainings are cut short, and the made scene is smaller.
 
+use clap::Parser;
+use labelgs::cli::command::Cli;
 use labelgs::edit::strokes::StrokesFile;
 use labelgs::masks::nested::{self, FoundMask};
 use std::collections::BTreeSet;
@@ -179,6 +181,19 @@ fn run(pages: &[PathBuf]) {
 #[test]
 fn every_command_of_readme_and_guide_runs() {
     run(&[vec![Path::new(ROOT).join("README.md")], pages()].concat());
+}
+
+/// Commands in the tables of README, which need files that nobody has here, are commands of the program.
+#[test]
+fn commands_of_tables_are_understood() {
+    let text = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("README.md");
+    let rows = text.lines().filter(|line| line.starts_with("| "));
+    let commands: Vec<&str> = rows.flat_map(|row| row.split('`').skip(1).step_by(2)).collect();
+    assert!(commands.len() >= 8, "{commands:?}");
+    for command in commands {
+        let understood = Cli::try_parse_from(command.split_whitespace());
+        assert!(understood.is_ok(), "{command}: {}", understood.err().expect("an error"));
+    }
 }
 
 #[test]
