@@ -30,12 +30,13 @@ fn main() {
 /// `[photo]: data:image/png;base64,...`.
 fn pictures(folder: &Path) -> String {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = files.filter(|path| path.extension().is_some_and(|ending| ending == "png")).collect();
+    let mut files: Vec<PathBuf> = files.collect();
     files.sort();
     files.iter().fold("\n".to_owned(), |mut text, file| {
         let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        let kind = if file.extension().is_some_and(|extension| extension == "png") { "png" } else { "jpeg" };
         let bytes = std::fs::read(file).expect("a picture of the guide");
-        let _ = writeln!(text, "[{name}]: data:image/png;base64,{}", BASE64_STANDARD.encode(bytes));
+        let _ = writeln!(text, "[{name}]: data:image/{kind};base64,{}", BASE64_STANDARD.encode(bytes));
         text
     })
 }
