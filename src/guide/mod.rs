@@ -6,11 +6,11 @@
 //! | [start] | How do photos become a labelled model, step by step? |
 //! | [data] | Which scenes, photos, cameras and depth maps are read? |
 //! | [masks] | Where do masks come from, and how are they checked and repaired? |
-//! | [labels] | How are objects chosen, taken out, renamed and drawn? |
+//! | [objects] | How do I find, extract, remove and edit objects? |
 //! | [city] | How is a scene trained that no one card holds? |
 //! | [viewer] | How is a model, or a training, seen and changed in a browser? |
 //! | [formats] | Which formats of models are read and written, and what does each keep? |
-//! | [benchmarks] | How is a model scored, on its own views and by published benchmarks? |
+//! | [scores] | How good is my model? |
 //! | [method] | What does the training do, and where does it differ from the papers? |
 //! | [outputs] | Which files are written, what do statuses mean, what is the same in every run? |
 //! | [devices] | Which devices work, how much memory is needed, how fast is it? |
@@ -32,7 +32,7 @@ macro_rules! pages {
         #[cfg_attr(doc, doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md")))]
         /// [page data]: data
         /// [page masks]: masks
-        /// [page labels]: labels
+        /// [page objects]: objects
         /// [page outputs]: outputs
         /// [page formats]: formats
         /// [page devices]: devices
@@ -52,11 +52,11 @@ pages! {
     start: "From photos to a labelled model, step by step.";
     data: "Scenes, photos, cameras and depth maps that are read.";
     masks: "Masks: their form, trackers, checks and repair.";
-    labels: "Objects chosen, taken out, renamed and drawn.";
+    objects: "Objects found, extracted, removed, edited and drawn.";
     city: "Scenes beyond one card: blocks, many cards, clusters.";
     viewer: "A model or a training in a browser.";
     formats: "Formats of models: what each keeps, labels in other programs, axes.";
-    benchmarks: "Scores: held-out views and published benchmarks.";
+    scores: "Scores: held-out views and published benchmarks.";
     method: "The method, and its differences from LabelGS and 3DGS.";
     outputs: "Files, exit statuses and determinism.";
     devices: "Devices, memory and speed.";
