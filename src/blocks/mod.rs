@@ -3,7 +3,7 @@
 //! [`plan`] divides a coarse model of the whole scene by the memory of a card, and chooses the photos of each block;
 //! [`split`] writes a folder for each. [`run::train`](crate::run::train) trains one of them at a time, anywhere, with
 //! [`run::Request::block`](crate::run::Request::block), and [`merge`] joins the models. Nothing of it needs another
-//! block to be there: files in, files out. [`guide::city`](crate::guide) shows it step by step.
+//! block to be there: files in, files out. [`guide::large_scenes`](crate::guide) shows it step by step.
 //!
 //! A block has a core, which the merged model takes from it, and a zone around the core, in which it grows Gaussians.
 //! The cores are half-open boxes that cover space without overlap. What its photos show beside the zone is there too, as

@@ -1,23 +1,29 @@
-//! The manual: from photos to labelled objects, a page for each part of the way.
+//! The guide: from photos to labelled objects, one page for each question.
 //!
-//! | page | answers |
+//! | page | your question |
 //! | --- | --- |
-//! | [install] | How is it installed, and which version is it? |
-//! | [start] | How do photos become a labelled model, step by step? |
-//! | [data] | Which scenes, photos, cameras and depth maps are read? |
-//! | [masks] | Where do masks come from, and how are they checked and repaired? |
+//! | [install] | How do I install labelgs? |
+//! | [start] | How do I get from photos to labelled objects? |
+//! | [no_poses] | I have photos or a video, but no poses: what now? |
+//! | [no_masks] | I have no masks: what now? |
+//! | [masks] | I have masks: how do I use them? |
+//! | [data] | Which scenes, photos and cameras can I use? |
 //! | [objects] | How do I find, extract, remove and edit objects? |
-//! | [city] | How is a scene trained that no one card holds? |
-//! | [viewer] | How is a model, or a training, seen and changed in a browser? |
-//! | [formats] | Which formats of models are read and written, and what does each keep? |
+//! | [viewer] | How do I look at a model and edit it in a browser? |
+//! | [other_models] | I have a model of another trainer: how does it get labels? |
+//! | [formats] | Which model formats can I read and write? |
+//! | [other_programs] | How do I open a model in Blender, Unity, Unreal, Isaac Sim or a web page? |
+//! | [large_scenes] | How do I train a scene that is too large for one GPU? |
+//! | [cluster] | How do I run one job on a cluster or in a container? |
 //! | [scores] | How good is my model? |
-//! | [method] | What does the training do, and where does it differ from the papers? |
-//! | [outputs] | Which files are written, what do statuses mean, what is the same in every run? |
-//! | [devices] | Which devices work, how much memory is needed, how fast is it? |
+//! | [outputs] | Which files does labelgs write, and what do exit statuses mean? |
+//! | [devices] | Does it run on my GPU, and how much memory does it need? |
 //! | [troubleshooting] | What does this symptom mean? |
-//! | [inside] | How is the code laid out, and what happens in a step? |
+//! | [method] | What happens in training, and how does it differ from the papers? |
+//! | [inside] | How is the code organised? |
 //!
-//! Commands in boxes run one after the other, page after page, in an empty folder; a test runs them all, with fewer steps.
+//! Commands in `sh` boxes run as they stand, one after the other, page after page, in one empty folder. A test runs
+//! them all, with fewer training steps.
 
 #[allow(unused_imports, reason = "the pages link to them")]
 use crate::{Error, edit, engine, eval, files, gpu, label, render, run, scene, scenes, synth};
@@ -30,12 +36,25 @@ macro_rules! pages {
         ///
         // Only the documentation carries the pictures, not every build of the library.
         #[cfg_attr(doc, doc = include_str!(concat!(env!("OUT_DIR"), "/pictures.md")))]
-        /// [page data]: data
+        /// [page install]: install
+        /// [page start]: start
+        /// [page no_poses]: no_poses
+        /// [page no_masks]: no_masks
         /// [page masks]: masks
+        /// [page data]: data
         /// [page objects]: objects
-        /// [page outputs]: outputs
+        /// [page viewer]: viewer
+        /// [page other_models]: other_models
         /// [page formats]: formats
+        /// [page other_programs]: other_programs
+        /// [page large_scenes]: large_scenes
+        /// [page cluster]: cluster
+        /// [page scores]: scores
+        /// [page outputs]: outputs
         /// [page devices]: devices
+        /// [page troubleshooting]: troubleshooting
+        /// [page method]: method
+        /// [page inside]: inside
         /// [`masks::import()`]: crate::masks::import
         /// [`masks::inspect()`]: crate::masks::inspect
         /// [`formats::write_meshes`]: crate::formats::write_meshes
@@ -48,18 +67,23 @@ macro_rules! pages {
 }
 
 pages! {
-    install: "Packages, cargo, what is needed at run time, and which version it is.";
-    start: "From photos to a labelled model, step by step.";
-    data: "Scenes, photos, cameras and depth maps that are read.";
-    masks: "Masks: their form, trackers, checks and repair.";
+    install: "Packages, archives, cargo, and which version you have.";
+    start: "From photos to labelled objects in four steps.";
+    no_poses: "Camera poses for photos and videos, by COLMAP.";
+    no_masks: "Objects from photos alone, from a click or from strokes.";
+    masks: "Masks that you have: import, check, repair, trackers, turntables.";
+    data: "Scenes, photos, cameras, depth maps and ground truth that labelgs reads.";
     objects: "Objects found, extracted, removed, edited and drawn.";
-    city: "Scenes beyond one card: blocks, many cards, clusters.";
     viewer: "A model or a training in a browser.";
-    formats: "Formats of models: what each keeps, labels in other programs, axes.";
+    other_models: "Labels for models of other trainers, and problems of other methods.";
+    formats: "Model formats, and what each keeps or loses.";
+    other_programs: "Models in Blender, Unity, Unreal, Isaac Sim and on web pages.";
+    large_scenes: "Scenes larger than one GPU: blocks, several GPUs, clusters.";
+    cluster: "One training under Slurm, Docker or Apptainer, and on several GPUs.";
     scores: "Scores: held-out views and published benchmarks.";
-    method: "The method, and its differences from LabelGS and 3DGS.";
     outputs: "Files, exit statuses and determinism.";
     devices: "Devices, memory and speed.";
     troubleshooting: "Symptoms and what to do.";
-    inside: "The code: the way of the data, floors, words, the life of a step.";
+    method: "The method, and its differences from LabelGS and 3DGS.";
+    inside: "The code: data flow, layers, words, the life of a step.";
 }
