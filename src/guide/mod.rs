@@ -28,8 +28,8 @@
 #[allow(unused_imports, reason = "the pages link to them")]
 use crate::{Error, edit, engine, eval, files, gpu, label, render, run, scene, scenes, synth};
 
-/// A module for each page, with the text of its file. Definitions of links come first and win over those at the end of a
-/// file, which serve readers of the file itself.
+/// A module for each page, with the text of its file. Definitions of links come first and win over those at the end
+/// of a file, which serve readers of the file itself.
 macro_rules! pages {
     ($($name:ident: $summary:literal;)*) => {$(
         #[doc = $summary]
