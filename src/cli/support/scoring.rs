@@ -23,7 +23,7 @@ pub struct ScoreArgs {
     /// Gaussians of an object that is rendered alone.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
-    /// Weights of LPIPS v0.1 with VGG16, safetensors (guide, page benchmarks): adds LPIPS. It takes seconds to minutes for a
+    /// Weights of LPIPS v0.1 with VGG16, safetensors (guide, page scores): adds LPIPS. It takes seconds to minutes for a
     /// picture.
     #[arg(long, value_name = "WEIGHTS", help_heading = "Scores")]
     pub lpips: Option<PathBuf>,
