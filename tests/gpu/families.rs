@@ -1,4 +1,5 @@
-//! What devices of each family get: the table of the guide, from the limits that their drivers and vendors tell.
+//! What devices of each family get: the table of `tools/bench/devices.md`, from the limits that drivers and vendors
+//! report.
 
 use crate::support::device::device;
 use labelgs::gpu::{Capabilities, DeviceKind};
@@ -81,12 +82,12 @@ impl Family {
 }
 
 #[test]
-fn the_guide_tells_what_each_family_gets() {
+fn the_table_of_families_is_that_of_the_program() {
     let Some(turn) = device() else { return };
     let rows: Vec<String> = FAMILIES.iter().map(|family| family.row(turn.capabilities())).collect();
-    let guide = include_str!("../../src/guide/devices.md");
+    let page = include_str!("../../tools/bench/devices.md");
     for row in &rows {
-        assert!(guide.contains(row.as_str()), "the table of families in src/guide/devices.md:\n{}", rows.join("\n"));
+        assert!(page.contains(row.as_str()), "the table of families in tools/bench/devices.md:\n{}", rows.join("\n"));
     }
     // No device needs more than the least.
     let [.., least] = FAMILIES;
