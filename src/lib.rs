@@ -39,7 +39,7 @@
 //! | train, watch, pause, resume | [`run::train`], [`run::Observer`] |
 //! | change the training itself | [`train`] |
 //! | read scenes, masks, models; write models | [`scenes::open`], [`masks`], [`formats`] |
-//! | draw pictures, depth, label maps | [`engine::Engine::of_model`], [`render::render`] |
+//! | draw pictures, depth, label maps | [`engine::Engine::for_model`], [`render::render`] |
 //! | choose, take out, change objects | [`edit`] |
 //! | label a finished model, repair masks | [`label`] |
 //! | train a scene that no card holds | [`blocks`] |

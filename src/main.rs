@@ -5,14 +5,14 @@ use std::io::Write;
 
 /// Bytes (64 TiB) above which a request comes from a number in a damaged file, not from a lack of memory: no computer
 /// has as much. It fails like any other, and the reader of the file reports it.
-const ALLOCATION_PLAUSIBLE_MAX: usize = 1 << 46;
+const PLAUSIBLE_ALLOCATION_MAX: usize = 1 << 46;
 
 /// The system's allocator. If memory runs out, the process ends with status 5 and a message, as for device memory; by
 /// default Rust aborts.
 struct Host;
 
 #[global_allocator]
-static HOST: Host = Host;
+static ALLOCATOR: Host = Host;
 
 // SAFETY: every call goes to the system's allocator.
 unsafe impl GlobalAlloc for Host {
@@ -39,7 +39,7 @@ unsafe impl GlobalAlloc for Host {
 
 /// Returns what the allocator returned; ends the process if that is none of a plausible number of bytes.
 fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && bytes < ALLOCATION_PLAUSIBLE_MAX {
+    if memory.is_null() && bytes < PLAUSIBLE_ALLOCATION_MAX {
         // Standard error is unbuffered, so this allocates no memory.
         let _ = writeln!(
             std::io::stderr(),
@@ -53,8 +53,8 @@ fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
 
 /// The commit that this program was built from, as `tools/setup` exports it. Only this file reads the variable, so that a
 /// commit compiles neither library nor shaders anew.
-const COMMIT: Option<&str> = option_env!("LABELGS_COMMIT");
+const BUILD_COMMIT: Option<&str> = option_env!("LABELGS_COMMIT");
 
 fn main() -> std::process::ExitCode {
-    labelgs::cli::main(std::env::args_os(), COMMIT).into()
+    labelgs::cli::main(std::env::args_os(), BUILD_COMMIT).into()
 }

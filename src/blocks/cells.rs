@@ -5,9 +5,9 @@ use crate::records::block_file::Bounds;
 use glam::DVec3;
 
 /// Share of a core's side by which the zone is larger, each way.
-const MARGIN: f64 = 0.1;
+const ZONE_MARGIN_SHARE: f64 = 0.1;
 /// Share of the Gaussians at each end that do not count for the sides of a core.
-const OUTLIERS: f64 = 0.01;
+const OUTLIER_SHARE: f64 = 0.01;
 
 /// A core with the Gaussians in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ impl Cell {
         let side = |axis: usize| {
             let mut values: Vec<f64> = places.iter().map(|(_, at)| at[axis]).collect();
             values.sort_by(f64::total_cmp);
-            let cut = (OUTLIERS * values.len() as f64) as usize;
+            let cut = (OUTLIER_SHARE * values.len() as f64) as usize;
             let ends = |at: usize| values.get(at).copied().unwrap_or(0.0);
             let most = [ends(cut), ends(values.len().saturating_sub(cut + 1))];
             [core.low[axis].unwrap_or(most[0]), core.high[axis].unwrap_or(most[1])]
@@ -44,7 +44,7 @@ impl Cell {
     pub(super) fn zone(&self) -> Bounds {
         let mut zone = self.core;
         for axis in 0..2 {
-            let margin = MARGIN * (self.inside[1][axis] - self.inside[0][axis]);
+            let margin = ZONE_MARGIN_SHARE * (self.inside[1][axis] - self.inside[0][axis]);
             zone.low[axis] = zone.low[axis].map(|side| side - margin);
             zone.high[axis] = zone.high[axis].map(|side| side + margin);
         }

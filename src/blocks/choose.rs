@@ -1,7 +1,7 @@
 //! The photos of each block: one render of the coarse model for each photo.
 
 use super::cells::Cell;
-use super::coarse::Coarse;
+use super::coarse::CoarseModel;
 use super::frame::Frame;
 use crate::engine::Engine;
 use crate::error::Result;
@@ -11,18 +11,18 @@ use crate::train::strategy::weights::weights;
 use glam::{DVec2, DVec3};
 
 /// Share of a photo's weight that the core has, for the photo to be taken.
-const CORE_SHARE: f64 = 0.02;
+const CORE_WEIGHT_SHARE_MIN: f64 = 0.02;
 /// Share that the zone has, if the camera stands in it.
-const ZONE_SHARE: f64 = 0.01;
+const ZONE_WEIGHT_SHARE_MIN: f64 = 0.01;
 /// Share of the picture in which the core's box is seen, from the ground to the top: what floats in its air would be seen
 /// there.
-const AIR_SHARE: f64 = 0.25;
+const BOX_IMAGE_SHARE_MIN: f64 = 0.25;
 /// Rays of a picture along its longer side that are followed for that.
-const RAYS: u32 = 24;
+const RAYS_PER_LONG_SIDE: u32 = 24;
 
 /// The photos of a block and what they show.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Chosen {
+pub(super) struct BlockPhotos {
     /// Indices of training views with the share of the core, in the order of the views.
     pub train: Vec<(usize, f64)>,
     /// Indices of held-out views.
@@ -42,10 +42,15 @@ struct Block<'a> {
 }
 
 /// Chooses the photos of some cells.
-pub(super) fn choose(engine: &mut Engine, coarse: &Coarse, frame: &Frame, cells: &[Cell]) -> Result<Vec<Chosen>> {
+pub(super) fn choose(
+    engine: &mut Engine,
+    coarse: &CoarseModel,
+    frame: &Frame,
+    cells: &[Cell],
+) -> Result<Vec<BlockPhotos>> {
     let blocks: Vec<Block> = cells.iter().map(|cell| Block::new(cell, frame, coarse)).collect();
     let count = coarse.model.len();
-    let mut chosen = vec![Chosen { is_seen: vec![false; count], ..Chosen::default() }; cells.len()];
+    let mut chosen = vec![BlockPhotos { is_seen: vec![false; count], ..BlockPhotos::default() }; cells.len()];
     let (train, test) = (&coarse.dataset.train, &coarse.dataset.test);
     for (index, view) in train.iter().chain(test).enumerate() {
         let found = weights(engine, std::iter::once((&view.camera, coarse.near)))?;
@@ -63,7 +68,7 @@ pub(super) fn choose(engine: &mut Engine, coarse: &Coarse, frame: &Frame, cells:
 }
 
 impl<'a> Block<'a> {
-    fn new(cell: &'a Cell, frame: &Frame, coarse: &Coarse) -> Self {
+    fn new(cell: &'a Cell, frame: &Frame, coarse: &CoarseModel) -> Self {
         let zone = frame.zone(&cell.zone());
         let sides = |end: usize| cell.inside[end].to_array().map(Some);
         let inside = frame.zone(&Bounds { low: sides(0), high: sides(1) });
@@ -83,9 +88,9 @@ impl<'a> Block<'a> {
         let core = sum(&mut self.cell.rows.iter().map(|&row| weights[row])) / all;
         let zone = core + sum(&mut self.margin.iter().map(|&row| weights[row])) / all;
         let stands_in = self.zone.contains(view.camera.centre());
-        let is_taken = core >= CORE_SHARE
-            || (stands_in && zone >= ZONE_SHARE)
-            || seen_share(&view.camera, &self.inside) >= AIR_SHARE;
+        let is_taken = core >= CORE_WEIGHT_SHARE_MIN
+            || (stands_in && zone >= ZONE_WEIGHT_SHARE_MIN)
+            || seen_share(&view.camera, &self.inside) >= BOX_IMAGE_SHARE_MIN;
         is_taken.then_some(core)
     }
 }
@@ -93,7 +98,7 @@ impl<'a> Block<'a> {
 /// Returns the share of a picture whose rays pass through a box.
 fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
     let longest = camera.width.max(camera.height);
-    let count = |side: u32| (side * RAYS).div_ceil(longest).max(1);
+    let count = |side: u32| (side * RAYS_PER_LONG_SIDE).div_ceil(longest).max(1);
     let (columns, rows) = (count(camera.width), count(camera.height));
     let from = zone.place(camera.centre());
     let hits = (0..rows * columns).filter(|at| {

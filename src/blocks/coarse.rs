@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A scene with its coarse model.
-pub(super) struct Coarse {
+pub(super) struct CoarseModel {
     pub dataset: Dataset,
     pub model: Gaussians,
     /// Rows of the model that are near, ascending.
@@ -31,15 +31,16 @@ pub(super) struct Coarse {
     pub pace: Option<f64>,
 }
 
-impl Coarse {
+impl CoarseModel {
     /// Reads the cameras of a scene and its coarse model: the folder of a finished run.
     pub(super) fn open(scene: &Path, model: &Path, options: LoadOptions) -> Result<Self> {
         let path = latest_model(model)?;
-        let Some(settings) = Settings::of_model(&path)? else {
+        let Some(settings) = Settings::for_model(&path)? else {
             let problem = "has no config.toml; the coarse model is a folder that a training wrote";
             return Err(Error::data(model, "", problem));
         };
-        let metrics: Value = read::json(&model.join(summary::FILE), "expected the folder of a finished training")?;
+        let metrics: Value =
+            read::json(&model.join(summary::METRICS_FILE), "expected the folder of a finished training")?;
         let (seconds, steps) = (metrics["seconds"].as_f64(), metrics["steps"].as_f64().unwrap_or(0.0));
         let options = LoadOptions {
             max_resolution: (settings.read.max_resolution > 0).then_some(settings.read.max_resolution),

@@ -1,17 +1,17 @@
 //! Blocks on paper: how many, how large and how long, of a scene that is not there yet.
 
-use super::need::{Card, Common, Need};
+use super::need::{BlockNeed, CommonNeed, TargetGpu};
 use super::plan::BLOCKS_MAX;
 use crate::error::{Error, Result, Setting};
 
 /// Gaussians in the zone of a block, in those of its core: a margin of a tenth on all four sides.
-const ZONE: f64 = 1.44;
+const ZONE_PER_CORE_GAUSSIANS: f64 = 1.44;
 /// Views of all blocks together, in those of the scene: the photos at a border are in the blocks on both sides.
-const SHARED_VIEWS: f64 = 2.0;
+const BLOCK_VIEWS_PER_SCENE_VIEW: f64 = 2.0;
 
 /// A scene on paper.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sketch {
+pub struct PlannedScene {
     /// Memory of a card, bytes.
     pub card: u64,
     /// Gaussians of the whole scene.
@@ -42,7 +42,7 @@ pub struct Estimate {
     /// Views of a block.
     pub views: u64,
     /// What a block needs.
-    pub need: Need,
+    pub need: BlockNeed,
 }
 
 /// Divides a scene on paper into the fewest equal blocks that fit the card. Half of the coarse Gaussians outside of a block
@@ -51,11 +51,11 @@ pub struct Estimate {
 /// # Errors
 ///
 /// A card too small for any number of blocks.
-pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
-    let card = Card::new(sketch.card);
+pub fn estimate(sketch: &PlannedScene) -> Result<Estimate> {
+    let card = TargetGpu::new(sketch.card);
     let pixels = u64::from(sketch.image.0) * u64::from(sketch.image.1);
     let measured = sketch.pace.map_or(sketch.gaussians, |(_, gaussians)| gaussians);
-    let common = Common {
+    let common = CommonNeed {
         image: sketch.image,
         max_label: sketch.max_label,
         pace: sketch.pace.map(|(seconds, _)| seconds),
@@ -63,11 +63,11 @@ pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
     };
     for blocks in 1..=BLOCKS_MAX {
         let share = 1.0 / blocks as f64;
-        let zone = if blocks == 1 { 1.0 } else { (ZONE * share).min(1.0) };
+        let zone = if blocks == 1 { 1.0 } else { (ZONE_PER_CORE_GAUSSIANS * share).min(1.0) };
         let gaussians = (sketch.gaussians as f64 * zone).round() as u64;
         let outside = (0.5 * (1.0 - zone)).min(3.0 * share);
         let frozen = (sketch.coarse as f64 * outside).round() as u64;
-        let shared = if blocks == 1 { 1.0 } else { SHARED_VIEWS };
+        let shared = if blocks == 1 { 1.0 } else { BLOCK_VIEWS_PER_SCENE_VIEW };
         let views = ((sketch.views as f64 * shared * share).ceil() as u64).min(sketch.views);
         let need = common.need(&card, (gaussians, frozen), views as usize, sketch.steps)?;
         if card.fits(&need) {
@@ -84,7 +84,7 @@ pub fn estimate(sketch: &Sketch) -> Result<Estimate> {
 mod tests {
     use super::*;
 
-    const CITY: Sketch = Sketch {
+    const CITY: PlannedScene = PlannedScene {
         card: 24 << 30,
         gaussians: 100_000_000,
         coarse: 10_000_000,
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_larger_card_takes_fewer_blocks() {
-        let of = |card: u64| estimate(&Sketch { card: card << 30, ..CITY }).expect("blocks");
+        let of = |card: u64| estimate(&PlannedScene { card: card << 30, ..CITY }).expect("blocks");
         let [small, usual, large] = [12, 24, 80].map(of);
         assert!(small.blocks > usual.blocks && usual.blocks > large.blocks, "{small:?} {usual:?} {large:?}");
         for found in [small, usual, large] {
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn a_small_scene_is_one_block_and_a_tiny_card_none() {
-        let one = estimate(&Sketch { gaussians: 1_000_000, ..CITY }).expect("a block");
+        let one = estimate(&PlannedScene { gaussians: 1_000_000, ..CITY }).expect("a block");
         assert_eq!((one.blocks, one.frozen, one.views), (1, 0, 5000));
-        assert!(estimate(&Sketch { card: 1 << 20, ..CITY }).is_err());
+        assert!(estimate(&PlannedScene { card: 1 << 20, ..CITY }).is_err());
     }
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// Radius around the cameras beyond which nothing is trained in blocks, scene extents: less than that of the first far
 /// Gaussians, which stand for the sky.
-const FAR: f64 = 2.0;
+const FAR_RADIUS_EXTENTS: f64 = 2.0;
 
 /// Axes of the ground, and the sphere of what is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,14 +21,14 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Finds the frame of some cameras. `up` is that of the world, if it is known.
-    pub(super) fn of(cameras: &[&Camera], extent: f64, up: Option<DVec3>) -> Self {
+    pub(super) fn from_cameras(cameras: &[&Camera], extent: f64, up: Option<DVec3>) -> Self {
         let seen = Overview::of(cameras.iter().copied()).map(|overview| overview.up);
         let up = up.or(seen).and_then(DVec3::try_normalize).unwrap_or(DVec3::Z);
         // An up near an axis of the world keeps the other axes of the world.
         let aside = [DVec3::X, DVec3::Y].into_iter().find(|axis| axis.dot(up).abs() < 0.75).unwrap_or(DVec3::X);
         let first = (aside - up * aside.dot(up)).normalize();
         let centre = cameras.iter().map(|camera| camera.centre()).sum::<DVec3>() / cameras.len().max(1) as f64;
-        Self { axes: [first, up.cross(first), up], centre, far: FAR * extent }
+        Self { axes: [first, up.cross(first), up], centre, far: FAR_RADIUS_EXTENTS * extent }
     }
 
     /// Returns a world point along the axes.

@@ -1,6 +1,6 @@
 //! One id for an object whose masks were made for each block on its own.
 
-use super::trained::Trained;
+use super::trained::TrainedBlock;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::files::label_table::{LabelEntry, LabelTable, unique_name};
@@ -35,13 +35,13 @@ type Node = (usize, u32);
 
 /// Pixels that two ids of two blocks share.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Shared {
+struct SharedPixels {
     nodes: [Node; 2],
     pixels: u64,
 }
 
 /// The ids of the merged model.
-pub(super) struct Joined {
+pub(super) struct JoinedIds {
     /// The new id of each id, by block.
     pub of: Vec<BTreeMap<u32, u32>>,
     /// Names of the new ids.
@@ -50,23 +50,23 @@ pub(super) struct Joined {
 
 /// Finds which ids of blocks are one object, in the photos that two blocks share: where the nearest Gaussian is in both
 /// zones, the masks of both show it.
-pub(super) fn join(blocks: &Path, trained: &[&Trained], how: &BlockMasks) -> Result<Joined> {
+pub(super) fn join(blocks: &Path, trained: &[&TrainedBlock], how: &BlockMasks) -> Result<JoinedIds> {
     let gpu = (how.open)()?;
     let mut found = Vec::new();
     for first in 0..trained.len() {
-        found.extend(of_block(&gpu, blocks, first, trained, how)?);
+        found.extend(join_block(&gpu, blocks, first, trained, how)?);
     }
     let ids = ids_of(trained)?;
     Ok(numbered(&ids, &unions(found), trained))
 }
 
 /// Returns the names of the photos of two blocks.
-fn common(a: &Trained, b: &Trained) -> BTreeSet<String> {
+fn common(a: &TrainedBlock, b: &TrainedBlock) -> BTreeSet<String> {
     let own: BTreeSet<&String> = a.block.views.iter().collect();
     b.block.views.iter().filter(|name| own.contains(name)).cloned().collect()
 }
 
-fn views(trained: &Trained, only: BTreeSet<String>, how: &BlockMasks) -> Result<Vec<View>> {
+fn views(trained: &TrainedBlock, only: BTreeSet<String>, how: &BlockMasks) -> Result<Vec<View>> {
     let options = LoadOptions {
         only: Some(Arc::new(only)),
         photos: false,
@@ -77,13 +77,13 @@ fn views(trained: &Trained, only: BTreeSet<String>, how: &BlockMasks) -> Result<
 }
 
 /// Compares a block with the later ones that share photos with it.
-fn of_block(
+fn join_block(
     gpu: &Arc<Gpu>,
     blocks: &Path,
     first: usize,
-    trained: &[&Trained],
+    trained: &[&TrainedBlock],
     how: &BlockMasks,
-) -> Result<Vec<Shared>> {
+) -> Result<Vec<SharedPixels>> {
     let shared = (first + 1..trained.len()).map(|other| (other, common(trained[first], trained[other])));
     let shared: Vec<(usize, BTreeSet<String>)> = shared.filter(|(_, names)| !names.is_empty()).collect();
     if shared.is_empty() {
@@ -91,7 +91,7 @@ fn of_block(
     }
     let block = &trained[first].block;
     let model = models::open(&BlockFile::init(&blocks.join(&block.id)))?.gaussians;
-    let mut engine = Engine::of_model(Arc::clone(gpu), &model, [(1, 1)])?;
+    let mut engine = Engine::for_model(Arc::clone(gpu), &model, [(1, 1)])?;
     let zone = |of: &BlockFile| -> Zone { of.zone.zone(of.axes) };
     let mut found = Vec::new();
     for (other, names) in shared {
@@ -103,7 +103,7 @@ fn of_block(
         for (own, theirs) in own.iter().zip(&theirs) {
             let (Some(a), Some(b)) = (own.mask()?, theirs.mask()?) else { continue };
             engine.grow_image(own.camera.width, own.camera.height)?;
-            let drawn = render(&mut engine, &own.camera, &RenderOptions::of_main(block.near as f32))?;
+            let drawn = render(&mut engine, &own.camera, &RenderOptions::for_main(block.near as f32))?;
             count(&mut counts, &drawn.top_id, &is_common, [&a, &b]);
         }
         found.extend(best(&counts, [first, other]));
@@ -121,7 +121,7 @@ fn count(counts: &mut BTreeMap<[u32; 2], u64>, tops: &[i32], is_common: &[bool],
 }
 
 /// Returns the pairs of ids of which each is the other's best and that share enough; 0 is no id.
-fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<Shared> {
+fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<SharedPixels> {
     let mut totals = [BTreeMap::<u32, u64>::new(), BTreeMap::new()];
     let mut best = [BTreeMap::<u32, (u64, u32)>::new(), BTreeMap::new()];
     for (ids, &pixels) in counts {
@@ -138,17 +138,18 @@ fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<Shared> {
         let less = totals[0][&a].min(totals[1][&b]);
         let enough = pixels >= PIXELS_MIN && pixels as f64 >= SHARE_MIN * less as f64;
         let mutual = best[0][&a].1 == b && best[1][&b].1 == a;
-        (a != 0 && b != 0 && enough && mutual).then_some(Shared { nodes: [(blocks[0], a), (blocks[1], b)], pixels })
+        (a != 0 && b != 0 && enough && mutual)
+            .then_some(SharedPixels { nodes: [(blocks[0], a), (blocks[1], b)], pixels })
     };
     counts.iter().filter_map(is_one).collect()
 }
 
 /// Joins pairs, those that share most first, but never two ids of one block: a wrong pair would make a chain of objects.
 /// Returns the first id of the group of each id that is in one.
-fn unions(mut found: Vec<Shared>) -> BTreeMap<Node, Node> {
+fn unions(mut found: Vec<SharedPixels>) -> BTreeMap<Node, Node> {
     found.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.nodes.cmp(&b.nodes)));
     let mut groups: Vec<BTreeSet<Node>> = Vec::new();
-    for Shared { nodes, .. } in found {
+    for SharedPixels { nodes, .. } in found {
         let at = nodes.map(|node| groups.iter().position(|group| group.contains(&node)));
         let joint: BTreeSet<Node> =
             at.into_iter().flatten().flat_map(|at| groups[at].iter().copied()).chain(nodes).collect();
@@ -170,8 +171,8 @@ fn unions(mut found: Vec<Shared>) -> BTreeMap<Node, Node> {
 }
 
 /// Returns the ids of the Gaussians that the merged model takes from each block.
-fn ids_of(trained: &[&Trained]) -> Result<Vec<BTreeSet<u32>>> {
-    let of = |trained: &&Trained| {
+fn ids_of(trained: &[&TrainedBlock]) -> Result<Vec<BTreeSet<u32>>> {
+    let of = |trained: &&TrainedBlock| {
         let labels = trained.core()?.labels.unwrap_or_default();
         Ok(labels.into_iter().filter(|&label| label != UNLABELLED).collect())
     };
@@ -179,7 +180,7 @@ fn ids_of(trained: &[&Trained]) -> Result<Vec<BTreeSet<u32>>> {
 }
 
 /// Numbers the groups by their first block and id, from 1.
-fn numbered(ids: &[BTreeSet<u32>], groups: &BTreeMap<Node, Node>, trained: &[&Trained]) -> Joined {
+fn numbered(ids: &[BTreeSet<u32>], groups: &BTreeMap<Node, Node>, trained: &[&TrainedBlock]) -> JoinedIds {
     let mut numbers: BTreeMap<Node, u32> = BTreeMap::new();
     let (mut entries, mut taken) = (Vec::new(), BTreeSet::new());
     let mut of = Vec::new();
@@ -200,15 +201,15 @@ fn numbered(ids: &[BTreeSet<u32>], groups: &BTreeMap<Node, Node>, trained: &[&Tr
         }
         of.push(map);
     }
-    Joined { of, names: LabelTable::new(entries) }
+    JoinedIds { of, names: LabelTable::new(entries) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn pair(nodes: [Node; 2], pixels: u64) -> Shared {
-        Shared { nodes, pixels }
+    fn pair(nodes: [Node; 2], pixels: u64) -> SharedPixels {
+        SharedPixels { nodes, pixels }
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Joins the models of the blocks into one.
 
 use super::join::{BlockMasks, join};
-use super::trained::{Trained, compare, core};
+use super::trained::{TrainedBlock, compare, core};
 use crate::error::{Error, Result};
 use crate::files::atomic;
 use crate::files::label_table::{self, LabelTable};
 use crate::files::run_folder::{self, Lock};
 use crate::formats::write_joined;
-use crate::records::block_file::{self, BlockFile, BlocksFile, REST};
+use crate::records::block_file::{self, BlockFile, BlocksFile, REST_MODEL_FILE};
 use crate::run::models::{self, Models, model_path};
 use crate::scene::Gaussians;
 use serde_json::json;
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Name of the file with the result, which is written last.
-const FILE: &str = "merge.json";
+const MERGE_FILE: &str = "merge.json";
 
 /// How blocks are merged.
 #[derive(Clone, Copy, Default)]
@@ -28,7 +28,7 @@ pub struct MergeOptions<'a> {
 
 /// The result of a merge.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Merged {
+pub struct MergeResult {
     /// The model.
     pub model: PathBuf,
     /// Gaussians of each block in the model, by name.
@@ -41,7 +41,7 @@ pub struct Merged {
     pub devices: Vec<String>,
 }
 
-impl Merged {
+impl MergeResult {
     /// Returns the number of Gaussians in the model.
     pub fn gaussians(&self) -> u64 {
         self.coarse + self.blocks.iter().map(|(_, count)| count).sum::<u64>()
@@ -49,9 +49,9 @@ impl Merged {
 }
 
 /// Rows of the merged model from one file.
-enum Part {
+enum MergePart {
     /// The core of a training.
-    Trained(Box<Trained>),
+    Trained(Box<TrainedBlock>),
     /// The core of the first model of a block, or all of what is coarse everywhere.
     Coarse(Option<Box<BlockFile>>, PathBuf),
 }
@@ -63,29 +63,29 @@ enum Part {
 ///
 /// Blocks without a finished training, with one of another split, of other settings, another version of labelgs or other
 /// names of labels: one error lists all.
-pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -> Result<Merged> {
+pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -> Result<MergeResult> {
     let (file, crc) = BlocksFile::read(blocks)?;
     let mut problems = Vec::new();
-    let mut merged = Merged::default();
+    let mut merged = MergeResult::default();
     let mut parts = Vec::new();
     for row in file.blocks.iter().filter(|row| row.trained) {
         let folder = blocks.join(&row.id);
         let block = BlockFile::read(&folder)?;
         if block.blocks != crc {
-            problems.push(format!("{}: is of another split than {}", folder.display(), block_file::BLOCKS));
+            problems.push(format!("{}: is of another split than {}", folder.display(), block_file::BLOCKS_FILE));
             continue;
         }
-        match Trained::open(&block, &models.join(&row.id)) {
-            Ok(trained) => parts.push(Part::Trained(Box::new(trained))),
+        match TrainedBlock::open(&block, &models.join(&row.id)) {
+            Ok(trained) => parts.push(MergePart::Trained(Box::new(trained))),
             Err(problem) if problem.is_missing && options.allow_missing => {
                 tracing::warn!("{}; its core stays coarse", problem.text);
                 merged.missing.push(row.id.clone());
-                parts.push(Part::Coarse(Some(Box::new(block)), BlockFile::init(&folder)));
+                parts.push(MergePart::Coarse(Some(Box::new(block)), BlockFile::init(&folder)));
             }
             Err(problem) => problems.push(problem.text),
         }
     }
-    let trained: Vec<&Trained> = parts.iter().filter_map(Part::trained).collect();
+    let trained: Vec<&TrainedBlock> = parts.iter().filter_map(MergePart::trained).collect();
     problems.extend(compare(&trained));
     let names = if options.masks.is_some() { None } else { names(blocks, &trained, &mut problems)? };
     refuse(models, &problems)?;
@@ -93,8 +93,8 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
     let joined = options.masks.map(|masks| join(blocks, &trained, &masks)).transpose()?;
     let has_ids = joined.is_some();
     let (ids, names) = joined.map_or((Vec::new(), names), |joined| (joined.of, Some(joined.names)));
-    parts.iter_mut().filter_map(Part::trained_mut).zip(ids).for_each(|(trained, ids)| trained.ids = Some(ids));
-    parts.push(Part::Coarse(None, blocks.join(REST)));
+    parts.iter_mut().filter_map(MergePart::trained_mut).zip(ids).for_each(|(trained, ids)| trained.ids = Some(ids));
+    parts.push(MergePart::Coarse(None, blocks.join(REST_MODEL_FILE)));
     write(&file, &parts, (names.as_ref(), has_ids), out, merged)
 }
 
@@ -108,7 +108,7 @@ fn refuse(models: &Path, problems: &[String]) -> Result<()> {
     Err(Error::data(models, "", problem))
 }
 
-fn devices(trained: &[&Trained]) -> Vec<String> {
+fn devices(trained: &[&TrainedBlock]) -> Vec<String> {
     let mut devices: Vec<String> = trained.iter().map(|trained| trained.device.clone()).collect();
     devices.sort();
     devices.dedup();
@@ -116,7 +116,7 @@ fn devices(trained: &[&Trained]) -> Vec<String> {
 }
 
 /// Returns the union of the tables of names; a name with two ids or an id with two names is a problem.
-fn names(blocks: &Path, trained: &[&Trained], problems: &mut Vec<String>) -> Result<Option<LabelTable>> {
+fn names(blocks: &Path, trained: &[&TrainedBlock], problems: &mut Vec<String>) -> Result<Option<LabelTable>> {
     let coarse = LabelTable::of_folder(blocks)?;
     let mut of_id = BTreeMap::new();
     let mut of_name: BTreeMap<String, u32> = BTreeMap::new();
@@ -140,12 +140,12 @@ fn names(blocks: &Path, trained: &[&Trained], problems: &mut Vec<String>) -> Res
     Ok((!of_id.is_empty()).then(|| LabelTable::new(of_id.into_values().collect())))
 }
 
-impl Part {
-    fn trained(&self) -> Option<&Trained> {
+impl MergePart {
+    fn trained(&self) -> Option<&TrainedBlock> {
         if let Self::Trained(trained) = self { Some(trained) } else { None }
     }
 
-    fn trained_mut(&mut self) -> Option<&mut Trained> {
+    fn trained_mut(&mut self) -> Option<&mut TrainedBlock> {
         if let Self::Trained(trained) = self { Some(trained) } else { None }
     }
 
@@ -165,26 +165,26 @@ impl Part {
 
 fn write(
     file: &BlocksFile,
-    parts: &[Part],
+    parts: &[MergePart],
     (names, has_ids): (Option<&LabelTable>, bool),
     out: &Path,
-    mut merged: Merged,
-) -> Result<Merged> {
+    mut merged: MergeResult,
+) -> Result<MergeResult> {
     std::fs::create_dir_all(out).map_err(Error::write(out))?;
     let _lock = Lock::take(out)?;
-    let result = out.join(FILE);
+    let result = out.join(MERGE_FILE);
     if result.is_file() {
         std::fs::remove_file(&result).map_err(Error::write(&result))?;
     }
-    let steps = parts.iter().filter_map(Part::trained).map(|trained| trained.steps).max().unwrap_or(0);
+    let steps = parts.iter().filter_map(MergePart::trained).map(|trained| trained.steps).max().unwrap_or(0);
     // The header has the number of rows, so that all parts are read twice.
     let mut like = None;
     for part in parts {
         let rows = part.read(has_ids)?;
         let count = rows.len() as u64;
         match part {
-            Part::Trained(trained) => merged.blocks.push((trained.block.id.clone(), count)),
-            Part::Coarse(..) => merged.coarse += count,
+            MergePart::Trained(trained) => merged.blocks.push((trained.block.id.clone(), count)),
+            MergePart::Coarse(..) => merged.coarse += count,
         }
         like = Some(joint(like, &rows));
     }
@@ -215,18 +215,18 @@ fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
 }
 
 /// Writes settings, names and blocks beside the model, so that other commands find them.
-fn write_records(file: &BlocksFile, parts: &[Part], names: Option<&LabelTable>, out: &Path) -> Result<()> {
-    if let Some(first) = parts.iter().find_map(Part::trained) {
+fn write_records(file: &BlocksFile, parts: &[MergePart], names: Option<&LabelTable>, out: &Path) -> Result<()> {
+    if let Some(first) = parts.iter().find_map(MergePart::trained) {
         let from = first.folder.join(run_folder::CONFIG);
         let text = crate::files::read::text(&from)?;
         atomic::write(out.join(run_folder::CONFIG), |to| to.write_all(text.as_bytes()))?;
     }
     LabelTable::put(names, &out.join(label_table::FILE))?;
     let text = file.text()?;
-    atomic::write(out.join(block_file::BLOCKS), |to| to.write_all(&text))
+    atomic::write(out.join(block_file::BLOCKS_FILE), |to| to.write_all(&text))
 }
 
-impl Merged {
+impl MergeResult {
     /// Returns the content of `merge.json`.
     pub fn to_json(&self) -> serde_json::Value {
         json!({

@@ -23,10 +23,10 @@ mod split;
 mod trained;
 
 pub use crate::records::block_file::{BlockRow, Bounds};
-pub use estimate::{Estimate, Sketch, estimate};
+pub use estimate::{Estimate, PlannedScene, estimate};
 pub use join::BlockMasks;
-pub use merge::{MergeOptions, Merged, merge};
-pub use need::Need;
+pub use merge::{MergeOptions, MergeResult, merge};
+pub use need::BlockNeed;
 pub use plan::{Plan, PlanOptions, plan};
 pub use seams::Seams;
 pub use split::split;

@@ -6,17 +6,17 @@ use crate::gpu::limits::PlanLimits;
 use crate::pass::KernelShape;
 
 /// Share of a card's memory that the plan may take: pairs of splats and tiles grow beyond the plan where views are full.
-const SHARE: f64 = 0.8;
+const PLANNED_MEMORY_SHARE_MAX: f64 = 0.8;
 /// Steps of a block with up to this many views; more views have more steps in proportion.
 const VIEWS_PER_RUN: f64 = 300.0;
 /// Memory of the program itself and of the driver, bytes: 236 MiB measured with a small block on lavapipe.
-const PROGRAM: u64 = 256 << 20;
+const PROGRAM_BYTES: u64 = 256 << 20;
 /// Objects of a step with object layers.
-const LAYERS: u32 = 10;
+const LAYERS_PER_STEP: u32 = 10;
 
 /// The card that trains the blocks.
 #[derive(Clone, Debug)]
-pub(super) struct Card {
+pub(super) struct TargetGpu {
     shape: KernelShape,
     limits: PlanLimits,
     /// Memory, bytes.
@@ -25,7 +25,7 @@ pub(super) struct Card {
 
 /// What all blocks have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Common {
+pub(super) struct CommonNeed {
     /// Largest photo, px.
     pub image: (u32, u32),
     /// Largest label; `None` for a scene without.
@@ -38,7 +38,7 @@ pub(super) struct Common {
 
 /// What a block needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Need {
+pub struct BlockNeed {
     /// Memory of the device, bytes.
     pub device: u64,
     /// Memory of the host, bytes.
@@ -49,25 +49,34 @@ pub struct Need {
     pub minutes: Option<f64>,
 }
 
-impl Card {
+impl TargetGpu {
     /// Takes a typical card.
     pub(super) fn new(memory: u64) -> Self {
         let (shape, limits) = card(memory);
         Self { shape, limits, memory }
     }
 
-    pub(super) fn fits(&self, need: &Need) -> bool {
-        need.device as f64 <= SHARE * self.memory as f64
+    pub(super) fn fits(&self, need: &BlockNeed) -> bool {
+        need.device as f64 <= PLANNED_MEMORY_SHARE_MAX * self.memory as f64
     }
 }
 
-impl Common {
+impl CommonNeed {
     /// Predicts the need of a block with this many Gaussians at the end of growth, frozen ones and views, and `steps` for
     /// a run of few views.
-    pub(super) fn need(&self, card: &Card, (gaussians, frozen): (u64, u64), views: usize, steps: u32) -> Result<Need> {
+    pub(super) fn need(
+        &self,
+        card: &TargetGpu,
+        (gaussians, frozen): (u64, u64),
+        views: usize,
+        steps: u32,
+    ) -> Result<BlockNeed> {
         let all = gaussians + frozen;
-        let labels =
-            self.max_label.map(|max_label| LabelSize { max_label, layers: LAYERS, vote_columns: max_label + 1 });
+        let labels = self.max_label.map(|max_label| LabelSize {
+            max_label,
+            layers: LAYERS_PER_STEP,
+            vote_columns: max_label + 1,
+        });
         let frozen = u32::try_from(frozen).unwrap_or(u32::MAX);
         let size = EngineSize::new(all, self.image).for_training().with_labels(labels).with_frozen(frozen);
         let device = match predict_for(&card.shape, &card.limits, &size) {
@@ -80,7 +89,7 @@ impl Common {
         let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
         let minutes = self.pace.map(|seconds| f64::from(steps) * (seconds * larger.max(1.0)) / 60.0);
         // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
-        let host = PROGRAM + (views as u64 * pixels * 6).min(crate::scenes::PHOTO_MEMORY) + 800 * gaussians;
-        Ok(Need { device, host, steps, minutes })
+        let host = PROGRAM_BYTES + (views as u64 * pixels * 6).min(crate::scenes::PHOTO_MEMORY) + 800 * gaussians;
+        Ok(BlockNeed { device, host, steps, minutes })
     }
 }

@@ -1,10 +1,10 @@
 //! Decides on the blocks of a scene: as few as the card allows.
 
 use super::cells::Cell;
-use super::choose::{Chosen, choose};
-use super::coarse::Coarse;
+use super::choose::{BlockPhotos, choose};
+use super::coarse::CoarseModel;
 use super::frame::Frame;
-use super::need::{Card, Common, Need};
+use super::need::{BlockNeed, CommonNeed, TargetGpu};
 use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
@@ -19,11 +19,11 @@ use std::sync::Arc;
 const VIEWS_MIN: usize = 32;
 const VIEWS_MIN_SHARE: f64 = 0.25;
 /// Gaussians of the whole scene by default, in those of the coarse model.
-const FINER: u64 = 4;
+const GAUSSIANS_PER_COARSE: u64 = 4;
 /// Share of the coarse Gaussians outside of a zone that its photos are first expected to show.
-const CONTEXT: f64 = 0.25;
+const CONTEXT_SHARE: f64 = 0.25;
 /// Most rounds of the division; each renders every photo once.
-const ROUNDS: usize = 6;
+const DIVISION_ROUNDS_MAX: usize = 6;
 /// Most blocks: their names have three digits.
 pub(super) const BLOCKS_MAX: usize = 1000;
 
@@ -77,7 +77,7 @@ pub(super) struct PlannedBlock {
     /// Indices of its training views and held-out views.
     pub train: Vec<usize>,
     pub test: Vec<usize>,
-    pub need: Need,
+    pub need: BlockNeed,
 }
 
 /// The blocks of a scene.
@@ -85,7 +85,7 @@ pub struct Plan {
     /// Gaussians of the coarse model that no block has in its core: far ones.
     pub far: u64,
     pub(super) blocks: Vec<PlannedBlock>,
-    pub(super) coarse: Coarse,
+    pub(super) coarse: CoarseModel,
     pub(super) frame: Frame,
     pub(super) extent: f64,
 }
@@ -101,16 +101,16 @@ pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -
     if options.blocks == 0 || options.blocks > BLOCKS_MAX {
         return Err(Error::usage(Setting("blocks"), format!("is {}, needs 1 to {BLOCKS_MAX}", options.blocks)));
     }
-    let mut coarse = Coarse::open(scene, model, options.load.clone())?;
+    let mut coarse = CoarseModel::open(scene, model, options.load.clone())?;
     let cameras: Vec<_> = coarse.dataset.train.iter().map(|view| &view.camera).collect();
     let extent = coarse.dataset.extent();
-    let frame = Frame::of(&cameras, extent, options.up);
+    let frame = Frame::from_cameras(&cameras, extent, options.up);
     let places = coarse.settle(&frame);
     if places.is_empty() {
         let problem = format!("has no Gaussian within {:.3} of the cameras, in world units", frame.far);
         return Err(Error::data(model, "", problem));
     }
-    let card = Card::new(options.card);
+    let card = TargetGpu::new(options.card);
     let planner = Planner { common: common(&coarse, options)?, card, options, coarse: &coarse, frame: &frame };
     let mut engine = engine(open()?, &coarse)?;
     let blocks = planner.blocks(&mut engine, &places)?;
@@ -122,15 +122,15 @@ fn sizes(dataset: &Dataset) -> Vec<(u32, u32)> {
     dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height)).collect()
 }
 
-fn engine(gpu: Arc<Gpu>, coarse: &Coarse) -> Result<Engine> {
+fn engine(gpu: Arc<Gpu>, coarse: &CoarseModel) -> Result<Engine> {
     let sizes = sizes(&coarse.dataset).into_iter();
-    let size = EngineSize::of_model(&coarse.model, sizes).with_labels(None).for_training();
+    let size = EngineSize::for_model(&coarse.model, sizes).with_labels(None).for_training();
     let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
     engine.upload_model(&coarse.model)?;
     Ok(engine)
 }
 
-fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
+fn common(coarse: &CoarseModel, options: &PlanOptions) -> Result<CommonNeed> {
     let own = sizes(&coarse.dataset);
     let area = own.iter().map(|&(width, height)| u64::from(width) * u64::from(height)).max().unwrap_or(1);
     let trained = if options.max_resolution == coarse.settings.read.max_resolution {
@@ -140,7 +140,7 @@ fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
         let load = LoadOptions { max_resolution, photos: false, masks: None, ..options.load.clone() };
         sizes(&crate::scenes::open(&coarse.dataset.root, &load)?)
     };
-    Ok(Common {
+    Ok(CommonNeed {
         image: trained.iter().fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1))),
         max_label: coarse.max_label(),
         pace: coarse.pace,
@@ -149,10 +149,10 @@ fn common(coarse: &Coarse, options: &PlanOptions) -> Result<Common> {
 }
 
 struct Planner<'a> {
-    common: Common,
-    card: Card,
+    common: CommonNeed,
+    card: TargetGpu,
     options: &'a PlanOptions,
-    coarse: &'a Coarse,
+    coarse: &'a CoarseModel,
     frame: &'a Frame,
 }
 
@@ -165,7 +165,7 @@ impl Planner<'_> {
             guessed.splice(at..=at, [self.guessed(low)?, self.guessed(high)?]);
         }
         let mut cells: Vec<Cell> = guessed.into_iter().map(|(cell, _)| cell).collect();
-        for _ in 0..ROUNDS {
+        for _ in 0..DIVISION_ROUNDS_MAX {
             let chosen = choose(engine, self.coarse, self.frame, &cells)?;
             let blocks: Vec<PlannedBlock> =
                 cells.iter().zip(chosen).map(|(cell, chosen)| self.block(cell, chosen)).collect::<Result<_>>()?;
@@ -192,7 +192,7 @@ impl Planner<'_> {
     fn guessed(&self, cell: Cell) -> Result<(Cell, bool)> {
         let zone = self.zone_rows(&cell).len();
         let outside = self.coarse.model.len() - zone;
-        let need = self.need(zone, (CONTEXT * outside as f64) as u64, self.coarse.dataset.train.len())?;
+        let need = self.need(zone, (CONTEXT_SHARE * outside as f64) as u64, self.coarse.dataset.train.len())?;
         Ok((cell, !self.card.fits(&need)))
     }
 
@@ -221,16 +221,17 @@ impl Planner<'_> {
     /// Returns the number of Gaussians at the end of growth for this many coarse ones.
     fn grown(&self, start: usize) -> u64 {
         let all = self.coarse.model.len() as f64;
-        let total = if self.options.gaussians > 0 { self.options.gaussians as f64 } else { FINER as f64 * all };
+        let total =
+            if self.options.gaussians > 0 { self.options.gaussians as f64 } else { GAUSSIANS_PER_COARSE as f64 * all };
         ((total * start as f64 / all).round() as u64).max(start as u64)
     }
 
-    fn need(&self, start: usize, frozen: u64, views: usize) -> Result<Need> {
+    fn need(&self, start: usize, frozen: u64, views: usize) -> Result<BlockNeed> {
         let steps = if self.options.steps > 0 { self.options.steps } else { self.coarse.settings.train.iterations };
         self.common.need(&self.card, (self.grown(start), frozen), views, steps)
     }
 
-    fn block(&self, cell: &Cell, mut chosen: Chosen) -> Result<PlannedBlock> {
+    fn block(&self, cell: &Cell, mut chosen: BlockPhotos) -> Result<PlannedBlock> {
         chosen.train.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         chosen.train.truncate(self.options.max_views);
         let mut train: Vec<usize> = chosen.train.iter().map(|(index, _)| *index).collect();

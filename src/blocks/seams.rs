@@ -1,14 +1,14 @@
 //! The places of a merged model: its blocks, and the seams between them.
 
 use crate::error::Result;
-use crate::eval::Places;
-use crate::records::block_file::{BLOCKS, BlocksFile};
+use crate::eval::PlaceGroups;
+use crate::records::block_file::{BLOCKS_FILE, BlocksFile};
 use crate::scene::Zone;
 use glam::DVec3;
 use std::path::Path;
 
 /// Groups besides the blocks: what is coarse everywhere, or empty; where zones of blocks overlap; and all else.
-const OTHERS: [&str; 3] = ["far", "seams", "off the seams"];
+const EXTRA_GROUP_NAMES: [&str; 3] = ["far", "seams", "off the seams"];
 
 /// The blocks of a merged model, as groups of places.
 pub struct Seams {
@@ -23,8 +23,8 @@ impl Seams {
     /// # Errors
     ///
     /// A file of blocks that cannot be read.
-    pub fn of_model(folder: &Path) -> Result<Option<Self>> {
-        if !folder.join(BLOCKS).is_file() {
+    pub fn for_model(folder: &Path) -> Result<Option<Self>> {
+        if !folder.join(BLOCKS_FILE).is_file() {
             return Ok(None);
         }
         let (file, _) = BlocksFile::read(folder)?;
@@ -34,12 +34,12 @@ impl Seams {
     }
 }
 
-impl Places for Seams {
+impl PlaceGroups for Seams {
     fn names(&self) -> Vec<String> {
-        self.file.blocks.iter().map(|block| block.id.clone()).chain(OTHERS.map(str::to_owned)).collect()
+        self.file.blocks.iter().map(|block| block.id.clone()).chain(EXTRA_GROUP_NAMES.map(str::to_owned)).collect()
     }
 
-    fn of(&self, world: DVec3) -> Vec<usize> {
+    fn groups_at(&self, world: DVec3) -> Vec<usize> {
         let first = self.cores.len();
         if self.file.is_far(world) {
             return vec![first];

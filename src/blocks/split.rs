@@ -5,13 +5,17 @@ use crate::error::Result;
 use crate::files::atomic;
 use crate::files::label_table::LabelTable;
 use crate::formats::write_model;
-use crate::records::block_file::{BLOCKS, BlockFile, BlockRow, BlocksFile, REST, SCHEMA_VERSION, poses_crc};
+use crate::records::block_file::{
+    BLOCKS_FILE, BlockFile, BlockRow, BlocksFile, REST_MODEL_FILE, SCHEMA_VERSION, poses_crc,
+};
 use crate::scene::View;
 use std::path::Path;
 
-/// Factors of the learning rates of positions and of scales: a block goes on from the coarse model (CityGaussian).
-const RATE_FACTORS: [f64; 2] = [0.4, 0.8];
-const MIB: u64 = 1 << 20;
+/// Factor of the position learning rates: a block continues from the coarse model (CityGaussian).
+const POSITION_RATE_FACTOR: f64 = 0.4;
+/// Factor of the scale learning rate, for the same reason.
+const SCALE_RATE_FACTOR: f64 = 0.8;
+const BYTES_PER_MIB: u64 = 1 << 20;
 
 /// Writes a folder for each block into the new folder `out`, then what no block trains, and the list of all last.
 ///
@@ -46,9 +50,9 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
         write_model(BlockFile::init(&folder), &plan.coarse.model.picked(&rows))?;
         plan.file(index, block, crc).write(&folder)?;
     }
-    write_model(out.join(REST), &rest)?;
+    write_model(out.join(REST_MODEL_FILE), &rest)?;
     LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::files::label_table::FILE))?;
-    atomic::write(out.join(BLOCKS), |to| to.write_all(&text))
+    atomic::write(out.join(BLOCKS_FILE), |to| to.write_all(&text))
 }
 
 fn name(index: usize) -> String {
@@ -65,8 +69,8 @@ fn row((index, block): (usize, &PlannedBlock)) -> BlockRow {
         start: block.zone_rows.len() as u64,
         gaussians: block.gaussians,
         frozen: block.frozen_rows.len() as u64,
-        device_mib: block.need.device.div_ceil(MIB),
-        host_mib: block.need.host.div_ceil(MIB),
+        device_mib: block.need.device.div_ceil(BYTES_PER_MIB),
+        host_mib: block.need.host.div_ceil(BYTES_PER_MIB),
         steps: block.need.steps,
         minutes: block.need.minutes,
     }
@@ -111,7 +115,7 @@ impl Plan {
             steps: block.need.steps,
             gaussians: block.gaussians,
             frozen: block.frozen_rows.len() as u32,
-            rate_factors: RATE_FACTORS,
+            rate_factors: [POSITION_RATE_FACTOR, SCALE_RATE_FACTOR],
         }
     }
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Settings that a block decides, or that change no Gaussian.
-const OWN: [&str; 9] = [
+const SETTINGS_THAT_MAY_DIFFER: [&str; 9] = [
     "seed",
     "iterations",
     "budget",
@@ -26,7 +26,7 @@ const OWN: [&str; 9] = [
 ];
 
 /// A training that can be merged.
-pub(super) struct Trained {
+pub(super) struct TrainedBlock {
     pub block: BlockFile,
     pub folder: PathBuf,
     pub model: PathBuf,
@@ -46,7 +46,7 @@ pub(super) struct Problem {
     pub is_missing: bool,
 }
 
-impl Trained {
+impl TrainedBlock {
     /// Reads the Gaussians of its core, with the new ids.
     pub(super) fn core(&self) -> crate::Result<Gaussians> {
         let mut model = core(&self.block, &self.model)?;
@@ -61,14 +61,14 @@ impl Trained {
         let problem = |text: String, is_missing| Problem { text: format!("{}: {text}", folder.display()), is_missing };
         let missing = |what: &str| problem(format!("{what}; train block {} into it", block.id), true);
         let odd = |error: crate::Error| problem(error.to_string(), false);
-        if !folder.join(block_file::BLOCK).is_file() {
+        if !folder.join(block_file::BLOCK_FILE).is_file() {
             return Err(missing("no training of a block is there"));
         }
         if BlockFile::read(folder).map_err(odd)? != *block {
             let text = "was trained for another block or split; train it anew in an empty folder";
             return Err(problem(text.to_owned(), false));
         }
-        let (metrics, config) = (folder.join(summary::FILE), folder.join(run_folder::CONFIG));
+        let (metrics, config) = (folder.join(summary::METRICS_FILE), folder.join(run_folder::CONFIG));
         if !metrics.is_file() || !config.is_file() {
             return Err(missing("the training is not finished"));
         }
@@ -83,7 +83,7 @@ impl Trained {
         if !model.is_file() {
             return Err(missing(&format!("its model of step {steps} is gone")));
         }
-        let run: Info = read::json(&folder.join(info::FILE), expected).map_err(odd)?;
+        let run: Info = read::json(&folder.join(info::RUN_FILE), expected).map_err(odd)?;
         let last = run.parts.last().cloned().unwrap_or_default();
         Ok(Self {
             block: block.clone(),
@@ -109,7 +109,7 @@ pub(super) fn core(block: &BlockFile, path: &Path) -> crate::Result<Gaussians> {
 }
 
 /// Returns in what trainings differ from the first that must be equal.
-pub(super) fn compare(trained: &[&Trained]) -> Vec<String> {
+pub(super) fn compare(trained: &[&TrainedBlock]) -> Vec<String> {
     let Some((first, others)) = trained.split_first() else { return Vec::new() };
     let mut problems = Vec::new();
     let wanted = first.settings.texts();
@@ -122,7 +122,7 @@ pub(super) fn compare(trained: &[&Trained]) -> Vec<String> {
         if first.labelgs != other.labelgs {
             note("labelgs", &first.labelgs, &other.labelgs);
         }
-        for key in Settings::keys().filter(|key| !OWN.contains(&key.name)) {
+        for key in Settings::keys().filter(|key| !SETTINGS_THAT_MAY_DIFFER.contains(&key.name)) {
             let value = |of: &BTreeMap<String, String>| of.get(key.name).map_or("not set", String::as_str).to_owned();
             let (then, now) = (value(&wanted), value(&own));
             if then != now {

@@ -43,11 +43,11 @@ impl Frame {
             if pixel[3] == u8::MAX && alpha >= ALPHA_MIN { depth / alpha } else { f32::NAN }
         };
         let depth = photo.rgba.iter().zip(depth).zip(alpha).map(known).collect();
-        Self::of(camera, &rgb, depth)
+        Self::from_colours(camera, &rgb, depth)
     }
 
     /// Makes the frame of these colours.
-    pub(super) fn of(camera: Camera, rgb: &[[f32; 3]], depth: Vec<f32>) -> Self {
+    pub(super) fn from_colours(camera: Camera, rgb: &[[f32; 3]], depth: Vec<f32>) -> Self {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let slope = |before: usize, after: usize| std::array::from_fn(|k| 0.5 * (rgb[after][k] - rgb[before][k]));
         let at = |index: usize| {
@@ -80,7 +80,7 @@ impl Frame {
         // The mean with a NaN is one.
         let depth = |index| four(index).map(|from| self.depth[from]).iter().sum::<f32>() / 4.0;
         let (rgb, depth): (Vec<_>, _) = (pixels().map(rgb).collect(), pixels().map(depth).collect());
-        Self::of(camera, &rgb, depth)
+        Self::from_colours(camera, &rgb, depth)
     }
 
     /// Returns the colours and their derivatives by x and y, 1 / px, at a place, px; `None` at the border and beyond.
@@ -134,7 +134,7 @@ mod tests {
         // A slope in one channel, which has the same derivatives everywhere but at the border.
         let rgb: Vec<[f32; 3]> =
             (0..20_u8).map(|k| [0.1 * f32::from(k % 5) + 0.02 * f32::from(k / 5), 0.5, 0.5]).collect();
-        let frame = Frame::of(camera, &rgb, vec![1.0; 20]);
+        let frame = Frame::from_colours(camera, &rgb, vec![1.0; 20]);
         let [value, by_x, by_y] = frame.colours(2.3, 1.9).expect("inside");
         for (found, expected) in [(value[0], 0.1 * 1.8 + 0.02 * 1.4), (by_x[0], 0.1), (by_y[0], 0.02), (by_x[1], 0.0)] {
             assert!((found - expected).abs() < 1e-6, "{found}, not {expected}");

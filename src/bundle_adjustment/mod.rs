@@ -21,7 +21,7 @@ pub(crate) use system::solve;
 use crate::scene::Camera;
 use crate::stage::Stage;
 use patch::Patch;
-use system::{Counts, Sums, System};
+use system::{Counts, FrameEquations, System};
 
 /// Largest number of photos: the equations of more need gigabytes.
 pub(crate) const PHOTOS_MAX: usize = 1000;
@@ -71,15 +71,15 @@ fn take_pose(to: &mut Camera, from: &Camera) {
 
 /// Adjusts the cameras of frames of one size. Returns which of them are known.
 fn solved(frames: &mut [Frame]) -> Vec<bool> {
-    let mut patches: Vec<Vec<Patch>> = frames.iter().map(patch::of_frame).collect();
+    let mut patches: Vec<Vec<Patch>> = frames.iter().map(patch::frame_patches).collect();
     let partners = pair::partners(frames, &patches);
     let mut is_known = vec![false; frames.len()];
     let (mut before, mut last) = (Counts::default(), Counts::default());
     for round in 0..ROUNDS_MAX {
-        let sums: Vec<Sums> = system::sums(frames, &patches, &partners);
-        let system = System::of(&sums, &partners, frames.len());
-        let is_told: Vec<bool> = system.counts.iter().map(|counts| counts.alike >= MATCHES_MIN).collect();
-        let is_found = |counts: &Counts| counts.alike as f64 >= PHOTO_MATCHES_MIN * counts.looked as f64;
+        let sums: Vec<FrameEquations> = system::sums(frames, &patches, &partners);
+        let system = System::from_frame_equations(&sums, &partners, frames.len());
+        let is_told: Vec<bool> = system.counts.iter().map(|counts| counts.matching >= MATCHES_MIN).collect();
+        let is_found = |counts: &Counts| counts.matching as f64 >= PHOTO_MATCHES_MIN * counts.compared as f64;
         is_known = system.counts.iter().zip(&is_told).map(|(counts, is_told)| *is_told && is_found(counts)).collect();
         let all = system.counts.iter().fold(Counts::default(), |sum, of| sum + *of);
         before = if round == 0 { all } else { before };
@@ -94,23 +94,23 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
         let (side, count) = (frames[0].side(), patches.iter().map(Vec::len).sum::<usize>());
         tracing::debug!(
             "poses, {side} px, round {round}: {count} patches, {} of {} comparisons alike, turns of {:.4} degrees",
-            all.alike / 2,
-            all.looked / 2,
+            all.matching / 2,
+            all.compared / 2,
             turn.to_degrees()
         );
         if turn < TURN_MIN {
             break;
         }
     }
-    if is_sound(last, before.looked) { is_known } else { vec![false; frames.len()] }
+    if is_sound(last, before.compared) { is_known } else { vec![false; frames.len()] }
 }
 
 /// Returns true if all comparisons, and their number `before` the first step, tell poses.
 fn is_sound(all: Counts, before: usize) -> bool {
-    let (looked, alike) = (all.looked as f64, all.alike as f64);
-    let is_sound = alike >= ALL_MATCHES_MIN * looked && looked >= COMPARABLE_MIN * before as f64;
+    let (compared, matching) = (all.compared as f64, all.matching as f64);
+    let is_sound = matching >= ALL_MATCHES_MIN * compared && compared >= COMPARABLE_MIN * before as f64;
     if !is_sound {
-        let numbers = format!("{} of {} comparisons of photos agree", all.alike / 2, all.looked / 2);
+        let numbers = format!("{} of {} comparisons of photos agree", all.matching / 2, all.compared / 2);
         tracing::info!("poses: {numbers}, {} were possible before; too few", before / 2);
     }
     is_sound
@@ -152,7 +152,7 @@ mod tests {
             rgb.push([wave(0.0), wave(1.5), wave(3.0)]);
             depths.push((z * depth) as f32);
         }
-        Frame::of(given.clone(), &rgb, depths)
+        Frame::from_colours(given.clone(), &rgb, depths)
     }
 
     /// Errors of the turns between neighbours, degrees: those of all together are open.
@@ -212,7 +212,7 @@ mod tests {
             let frame = photo(&camera(k), &camera(k), 1.0);
             let rgb: Vec<[f32; 3]> =
                 frame.colours.iter().enumerate().map(|(at, [rgb, ..])| rgb.map(|of| of + 0.3 * own(at))).collect();
-            Frame::of(frame.camera, &rgb, frame.depth)
+            Frame::from_colours(frame.camera, &rgb, frame.depth)
         };
         assert!(adjusted((0..6).map(frame).collect()).iter().all(Option::is_none));
     }

@@ -1,14 +1,14 @@
 //! Comparison of a patch with another photo.
 
 use super::Frame;
-use super::patch::{MIDDLE, PIXELS, Patch, without_mean};
+use super::patch::{PATCH_CENTRE, PATCH_PIXELS, Patch, without_mean};
 use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// Numbers of a pose: a turn and a move in camera space.
-pub(super) const POSE: usize = 6;
+pub(super) const POSE_PARAMETERS: usize = 6;
 /// Numbers that a comparison depends on: the pose of the other photo, that of the patch's own, the logarithm of its depth.
-pub(super) const NUMBERS: usize = 2 * POSE + 1;
+pub(super) const COMPARISON_PARAMETERS: usize = 2 * POSE_PARAMETERS + 1;
 /// Most photos with which the patches of one are compared.
 const PARTNERS_MAX: usize = 12;
 /// Least cosine of the angle between the axes of two of them: 60 degrees.
@@ -23,10 +23,10 @@ const DEPTH_DIFFERENCE_MAX: f64 = 0.03;
 /// out in the first rounds.
 const CORRELATION_MIN: f64 = 0.5;
 /// Difference of colours from which a patch counts less.
-const NOISE: f64 = 0.02;
+const COLOUR_NOISE: f64 = 0.02;
 
 /// Returns a camera after a step of its pose: a place y in camera space comes to y + w x y + s, for a small turn w and move s.
-pub(super) fn moved(camera: &Camera, step: &[f64; POSE]) -> Camera {
+pub(super) fn moved(camera: &Camera, step: &[f64; POSE_PARAMETERS]) -> Camera {
     let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::from_slice(&step[..3])));
     let translation = turn * camera.translation + DVec3::from_slice(&step[3..]);
     Camera { rotation: turn * camera.rotation, translation, ..camera.clone() }
@@ -37,13 +37,13 @@ pub(super) fn moved(camera: &Camera, step: &[f64; POSE]) -> Camera {
 pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usize>> {
     let of = |host: usize| {
         let every = patches[host].len().div_ceil(SAMPLE_PATCHES).max(1);
-        let sample: Vec<DVec3> = patches[host].iter().step_by(every).map(|patch| patch.places[MIDDLE]).collect();
+        let sample: Vec<DVec3> = patches[host].iter().step_by(every).map(|patch| patch.places[PATCH_CENTRE]).collect();
         let axis = frames[host].camera.axis();
         let mut found: Vec<(usize, usize)> = Vec::new();
         for (other, frame) in frames.iter().enumerate() {
             if other != host && axis.dot(frame.camera.axis()) > AXES_COSINE_MIN {
-                let way = Way::new(&frames[host].camera, &frame.camera);
-                let shown = sample.iter().filter(|&&place| shows(frame, way.there(place))).count();
+                let transform = CameraTransform::new(&frames[host].camera, &frame.camera);
+                let shown = sample.iter().filter(|&&place| shows(frame, transform.apply(place))).count();
                 found.push((shown, other));
             }
         }
@@ -63,18 +63,18 @@ fn shows(frame: &Frame, place: DVec3) -> bool {
 
 /// The way from one camera space to another.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct CameraTransform {
     turn: DMat3,
     shift: DVec3,
 }
 
-impl Way {
+impl CameraTransform {
     pub(super) fn new(from: &Camera, to: &Camera) -> Self {
         let turn = to.rotation * from.rotation.transpose();
         Self { turn, shift: to.translation - turn * from.translation }
     }
 
-    fn there(&self, place: DVec3) -> DVec3 {
+    fn apply(&self, place: DVec3) -> DVec3 {
         self.turn * place + self.shift
     }
 }
@@ -88,18 +88,19 @@ pub(super) struct Comparison {
     /// Of x and y, 1 / px.
     pub(super) pull: [f64; 2],
     /// Derivatives of x and y, px, by the numbers.
-    pub(super) places: [[f64; NUMBERS]; 2],
+    pub(super) places: [[f64; COMPARISON_PARAMETERS]; 2],
 }
 
 /// Compares a patch with a frame. `None` if the frame does not show it, `Some(None)` if it shows something else there.
-pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<Comparison>> {
-    let middle = way.there(patch.places[MIDDLE]);
+pub(super) fn compare(transform: &CameraTransform, patch: &Patch, frame: &Frame) -> Option<Option<Comparison>> {
+    let middle = transform.apply(patch.places[PATCH_CENTRE]);
     if !shows(frame, middle) {
         return None;
     }
-    let (mut colours, mut by_x, mut by_y) = ([[0.0; 3]; PIXELS], [[0.0; 3]; PIXELS], [[0.0; 3]; PIXELS]);
+    let (mut colours, mut by_x, mut by_y) =
+        ([[0.0; 3]; PATCH_PIXELS], [[0.0; 3]; PATCH_PIXELS], [[0.0; 3]; PATCH_PIXELS]);
     for (k, &place) in patch.places.iter().enumerate() {
-        let place = way.there(place);
+        let place = transform.apply(place);
         let at: DVec2 = frame.camera.project(place);
         if place.z <= 0.0 {
             return None;
@@ -107,7 +108,7 @@ pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<
         [colours[k], by_x[k], by_y[k]] = frame.colours(at.x, at.y)?;
     }
     [&mut colours, &mut by_x, &mut by_y].into_iter().for_each(without_mean);
-    let product = |a: &[[f64; 3]; PIXELS], b: &[[f64; 3]; PIXELS]| -> f64 {
+    let product = |a: &[[f64; 3]; PATCH_PIXELS], b: &[[f64; 3]; PATCH_PIXELS]| -> f64 {
         a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
     };
     let (own, there) = (product(&patch.colours, &patch.colours), product(&colours, &colours));
@@ -120,28 +121,28 @@ pub(super) fn compare(way: &Way, patch: &Patch, frame: &Frame) -> Option<Option<
     for (own, there) in difference.as_flattened_mut().iter_mut().zip(colours.as_flattened()) {
         *own = gain * *own - there;
     }
-    let count = (3 * PIXELS) as f64;
+    let count = (3 * PATCH_PIXELS) as f64;
     let square = product(&difference, &difference) / count;
-    let weight = 1.0 / (count * (1.0 + square / (NOISE * NOISE)));
+    let weight = 1.0 / (count * (1.0 + square / (COLOUR_NOISE * COLOUR_NOISE)));
     Some(Some(Comparison {
         moments: [product(&by_x, &by_x), product(&by_x, &by_y), product(&by_y, &by_y)].map(|sum| weight * sum),
         pull: [product(&by_x, &difference), product(&by_y, &difference)].map(|sum| weight * sum),
-        places: derivatives(way, &frame.camera, patch.places[MIDDLE]),
+        places: derivatives(transform, &frame.camera, patch.places[PATCH_CENTRE]),
     }))
 }
 
 /// Returns the derivatives of the place of a patch in the other photo.
-fn derivatives(way: &Way, other: &Camera, own: DVec3) -> [[f64; NUMBERS]; 2] {
-    let there = way.there(own);
-    let mut found = [[0.0; NUMBERS]; 2];
-    for k in 0..NUMBERS {
+fn derivatives(transform: &CameraTransform, other: &Camera, own: DVec3) -> [[f64; COMPARISON_PARAMETERS]; 2] {
+    let there = transform.apply(own);
+    let mut found = [[0.0; COMPARISON_PARAMETERS]; 2];
+    for k in 0..COMPARISON_PARAMETERS {
         let axis = DVec3::AXES[k % 3];
         let d = match k / 3 {
             0 => axis.cross(there),
             1 => axis,
-            2 => -(way.turn * axis.cross(own)),
-            3 => -(way.turn * axis),
-            _ => way.turn * own,
+            2 => -(transform.turn * axis.cross(own)),
+            3 => -(transform.turn * axis),
+            _ => transform.turn * own,
         };
         found[0][k] = other.fx * (d.x - there.x / there.z * d.z) / there.z;
         found[1][k] = other.fy * (d.y - there.y / there.z * d.z) / there.z;
@@ -151,7 +152,7 @@ fn derivatives(way: &Way, other: &Camera, own: DVec3) -> [[f64; NUMBERS]; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{NUMBERS, POSE, Way, derivatives, moved};
+    use super::{COMPARISON_PARAMETERS, CameraTransform, POSE_PARAMETERS, derivatives, moved};
     use crate::scene::Camera;
     use glam::{DMat3, DVec3};
 
@@ -163,13 +164,13 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_differences() {
         let (host, other, place) = (camera(0.1), camera(-0.2), DVec3::new(0.4, -0.3, 2.5));
-        let at = |numbers: [f64; NUMBERS]| {
-            let step = |of: &[f64]| -> [f64; POSE] { std::array::from_fn(|k| of[k]) };
-            let (there, own) = (moved(&other, &step(&numbers)), moved(&host, &step(&numbers[POSE..])));
-            there.project(Way::new(&own, &there).there(place * numbers[NUMBERS - 1].exp()))
+        let at = |numbers: [f64; COMPARISON_PARAMETERS]| {
+            let step = |of: &[f64]| -> [f64; POSE_PARAMETERS] { std::array::from_fn(|k| of[k]) };
+            let (there, own) = (moved(&other, &step(&numbers)), moved(&host, &step(&numbers[POSE_PARAMETERS..])));
+            there.project(CameraTransform::new(&own, &there).apply(place * numbers[COMPARISON_PARAMETERS - 1].exp()))
         };
-        let found = derivatives(&Way::new(&host, &other), &other, place);
-        for k in 0..NUMBERS {
+        let found = derivatives(&CameraTransform::new(&host, &other), &other, place);
+        for k in 0..COMPARISON_PARAMETERS {
             let by = |step: f64| at(std::array::from_fn(|of| if of == k { step } else { 0.0 }));
             let expected = (by(1e-5) - by(-1e-5)) / 2e-5;
             let error = (expected.x - found[0][k]).abs().max((expected.y - found[1][k]).abs());

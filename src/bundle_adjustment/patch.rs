@@ -4,11 +4,11 @@ use super::Frame;
 use glam::{DVec2, DVec3};
 
 /// Pixels on each side of the middle of a patch. Larger patches reach over contours more often.
-const REACH: u32 = 2;
+const PATCH_REACH_PX: u32 = 2;
 /// Pixels of a patch.
-pub(super) const PIXELS: usize = ((2 * REACH + 1) * (2 * REACH + 1)) as usize;
+pub(super) const PATCH_PIXELS: usize = ((2 * PATCH_REACH_PX + 1) * (2 * PATCH_REACH_PX + 1)) as usize;
 /// Index of the middle.
-pub(super) const MIDDLE: usize = PIXELS / 2;
+pub(super) const PATCH_CENTRE: usize = PATCH_PIXELS / 2;
 /// Smallest side of the cells of a frame, px, each of which has at most one patch.
 const CELL_MIN: u32 = 8;
 /// Most cells of a frame.
@@ -22,26 +22,26 @@ const DEPTH_RANGE_MAX: f32 = 0.04;
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
     /// Places of the pixels, camera space, world units.
-    pub(super) places: [DVec3; PIXELS],
+    pub(super) places: [DVec3; PATCH_PIXELS],
     /// Their colours, with the mean of each channel taken away.
-    pub(super) colours: [[f64; 3]; PIXELS],
+    pub(super) colours: [[f64; 3]; PATCH_PIXELS],
 }
 
 /// Returns the patches of a frame: in each cell where the colours change most.
-pub(super) fn of_frame(frame: &Frame) -> Vec<Patch> {
+pub(super) fn frame_patches(frame: &Frame) -> Vec<Patch> {
     let (width, height) = (frame.camera.width, frame.camera.height);
     let cell = CELL_MIN.max((f64::from(width) * f64::from(height) / CELLS_MAX).sqrt().ceil() as u32);
     // The square of the derivatives of each pixel, all channels together.
     let square = |[_, by_x, by_y]: &[[f32; 3]; 3]| by_x.iter().chain(by_y).map(|value| value * value).sum::<f32>();
     let change: Vec<f32> = frame.colours.iter().map(square).collect();
-    let margin = REACH + 1;
+    let margin = PATCH_REACH_PX + 1;
     let mut found = Vec::new();
     for top in (margin..height.saturating_sub(margin + cell - 1)).step_by(cell as usize) {
         for left in (margin..width.saturating_sub(margin + cell - 1)).step_by(cell as usize) {
             let pixels = (top..top + cell).flat_map(|y| (left..left + cell).map(move |x| (x, y)));
             let sum = |&(x, y): &(u32, u32)| around(x, y).map(|(x, y)| change[(y * width + x) as usize]).sum::<f32>();
             let largest = pixels.map(|at| (sum(&at), at)).max_by(|a, b| a.0.total_cmp(&b.0));
-            let strong = largest.filter(|(sum, _)| *sum >= CONTRAST_MIN * PIXELS as f32);
+            let strong = largest.filter(|(sum, _)| *sum >= CONTRAST_MIN * PATCH_PIXELS as f32);
             found.extend(strong.and_then(|(_, (x, y))| patch(frame, x, y)));
         }
     }
@@ -50,11 +50,12 @@ pub(super) fn of_frame(frame: &Frame) -> Vec<Patch> {
 
 /// Returns the pixels of the patch around a pixel.
 fn around(x: u32, y: u32) -> impl Iterator<Item = (u32, u32)> {
-    (y - REACH..=y + REACH).flat_map(move |row| (x - REACH..=x + REACH).map(move |column| (column, row)))
+    (y - PATCH_REACH_PX..=y + PATCH_REACH_PX)
+        .flat_map(move |row| (x - PATCH_REACH_PX..=x + PATCH_REACH_PX).map(move |column| (column, row)))
 }
 
 fn patch(frame: &Frame, x: u32, y: u32) -> Option<Patch> {
-    let (mut places, mut colours) = ([DVec3::ZERO; PIXELS], [[0.0; 3]; PIXELS]);
+    let (mut places, mut colours) = ([DVec3::ZERO; PATCH_PIXELS], [[0.0; 3]; PATCH_PIXELS]);
     let (mut nearest, mut farthest) = (f32::INFINITY, 0.0_f32);
     for (k, (x, y)) in around(x, y).enumerate() {
         let index = (y * frame.camera.width + x) as usize;
@@ -71,9 +72,9 @@ fn patch(frame: &Frame, x: u32, y: u32) -> Option<Patch> {
 }
 
 /// Takes the mean of each channel away.
-pub(super) fn without_mean(colours: &mut [[f64; 3]; PIXELS]) {
+pub(super) fn without_mean(colours: &mut [[f64; 3]; PATCH_PIXELS]) {
     for k in 0..3 {
-        let mean = colours.iter().map(|colour| colour[k]).sum::<f64>() / PIXELS as f64;
+        let mean = colours.iter().map(|colour| colour[k]).sum::<f64>() / PATCH_PIXELS as f64;
         colours.iter_mut().for_each(|colour| colour[k] -= mean);
     }
 }

@@ -1,12 +1,12 @@
 //! The equations of all poses, and their solution.
 
 use super::Frame;
-use super::pair::{Comparison, NUMBERS, POSE, Way, compare};
+use super::pair::{COMPARISON_PARAMETERS, CameraTransform, Comparison, POSE_PARAMETERS, compare};
 use super::patch::Patch;
 use rayon::prelude::*;
 
 /// Share of its diagonal that is added to the equations of poses: place, turn and size of the whole are open.
-const DAMPING: f64 = 1e-7;
+const POSE_DAMPING: f64 = 1e-7;
 /// The same for depths.
 const DEPTH_DAMPING: f64 = 1e-3;
 /// Largest step of the logarithm of a depth.
@@ -18,50 +18,53 @@ const ROWS_MIN: usize = 64;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     /// Patches that were looked up in places that show them by their depth.
-    pub(super) looked: usize,
+    pub(super) compared: usize,
     /// Those that found something alike.
-    pub(super) alike: usize,
+    pub(super) matching: usize,
 }
 
 impl std::ops::Add for Counts {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        Self { looked: self.looked + other.looked, alike: self.alike + other.alike }
+        Self { compared: self.compared + other.compared, matching: self.matching + other.matching }
     }
 }
 
 /// The equations of a patch's depth.
 #[derive(Clone, Debug)]
-struct Depth {
+struct DepthEquation {
     /// Second derivative.
     curvature: f64,
     /// First derivative, with its sign changed.
     pull: f64,
     /// Mixed derivatives by poses: the index of the frame among host and partners, and its six numbers.
-    mixed: Vec<(usize, [f64; POSE])>,
+    mixed: Vec<(usize, [f64; POSE_PARAMETERS])>,
 }
 
 /// The equations of the patches of one frame, by the poses of the frame itself and its partners, in this order. Depths are
 /// eliminated.
 #[derive(Clone, Debug)]
-pub(super) struct Sums {
+pub(super) struct FrameEquations {
     /// Row-major.
     matrix: Vec<f64>,
     right: Vec<f64>,
     /// Comparisons of each frame.
     counts: Vec<Counts>,
-    depths: Vec<Depth>,
+    depths: Vec<DepthEquation>,
 }
 
 /// Returns the equations of the patches of each frame.
-pub(super) fn sums(frames: &[Frame], patches: &[Vec<Patch>], partners: &[Vec<usize>]) -> Vec<Sums> {
+pub(super) fn sums(frames: &[Frame], patches: &[Vec<Patch>], partners: &[Vec<usize>]) -> Vec<FrameEquations> {
     let of = |host: usize| {
-        let ways: Vec<Way> =
-            partners[host].iter().map(|&other| Way::new(&frames[host].camera, &frames[other].camera)).collect();
-        let mut sums = Sums::new(1 + ways.len());
+        let ways: Vec<CameraTransform> = partners[host]
+            .iter()
+            .map(|&other| CameraTransform::new(&frames[host].camera, &frames[other].camera))
+            .collect();
+        let mut sums = FrameEquations::new(1 + ways.len());
         for patch in &patches[host] {
-            let each = ways.iter().zip(&partners[host]).map(|(way, &other)| compare(way, patch, &frames[other]));
+            let each =
+                ways.iter().zip(&partners[host]).map(|(transform, &other)| compare(transform, patch, &frames[other]));
             sums.add(each);
         }
         sums
@@ -70,13 +73,17 @@ pub(super) fn sums(frames: &[Frame], patches: &[Vec<Patch>], partners: &[Vec<usi
 }
 
 /// Returns the steps of a frame and its partners.
-pub(super) fn steps_of(host: usize, partners: &[usize], steps: &[[f64; POSE]]) -> Vec<[f64; POSE]> {
+pub(super) fn steps_of(
+    host: usize,
+    partners: &[usize],
+    steps: &[[f64; POSE_PARAMETERS]],
+) -> Vec<[f64; POSE_PARAMETERS]> {
     std::iter::once(&host).chain(partners).map(|&frame| steps[frame]).collect()
 }
 
-impl Sums {
+impl FrameEquations {
     fn new(frames: usize) -> Self {
-        let side = POSE * frames;
+        let side = POSE_PARAMETERS * frames;
         Self {
             matrix: vec![0.0; side * side],
             right: vec![0.0; side],
@@ -87,27 +94,27 @@ impl Sums {
 
     /// Adds a patch, by its comparison with each partner.
     fn add(&mut self, each: impl Iterator<Item = Option<Option<Comparison>>>) {
-        let mut own = [0.0; POSE];
-        let mut depth = Depth { curvature: 0.0, pull: 0.0, mixed: Vec::new() };
+        let mut own = [0.0; POSE_PARAMETERS];
+        let mut depth = DepthEquation { curvature: 0.0, pull: 0.0, mixed: Vec::new() };
         for (partner, compared) in each.enumerate().filter_map(|(k, compared)| Some((k + 1, compared?))) {
             for frame in [0, partner] {
                 let counts = &mut self.counts[frame];
-                *counts = *counts + Counts { looked: 1, alike: compared.is_some().into() };
+                *counts = *counts + Counts { compared: 1, matching: compared.is_some().into() };
             }
             let Some(compared) = compared else { continue };
             let (matrix, right) = products(&compared);
-            for i in 0..2 * POSE {
+            for i in 0..2 * POSE_PARAMETERS {
                 let row = index(partner, i);
                 self.right[row] += right[i];
-                for j in 0..2 * POSE {
+                for j in 0..2 * POSE_PARAMETERS {
                     self.matrix[row * self.right.len() + index(partner, j)] += matrix[i][j];
                 }
             }
-            let mixed = matrix[NUMBERS - 1];
-            depth.curvature += mixed[NUMBERS - 1];
-            depth.pull += right[NUMBERS - 1];
+            let mixed = matrix[COMPARISON_PARAMETERS - 1];
+            depth.curvature += mixed[COMPARISON_PARAMETERS - 1];
+            depth.pull += right[COMPARISON_PARAMETERS - 1];
             depth.mixed.push((partner, std::array::from_fn(|k| mixed[k])));
-            own.iter_mut().zip(&mixed[POSE..]).for_each(|(sum, mixed)| *sum += mixed);
+            own.iter_mut().zip(&mixed[POSE_PARAMETERS..]).for_each(|(sum, mixed)| *sum += mixed);
         }
         depth.mixed.push((0, own));
         depth.curvature *= 1.0 + DEPTH_DAMPING;
@@ -117,22 +124,25 @@ impl Sums {
         self.depths.push(depth);
     }
 
-    fn eliminate(&mut self, depth: &Depth) {
+    fn eliminate(&mut self, depth: &DepthEquation) {
         let side = self.right.len();
         for (a, by_a) in &depth.mixed {
-            for i in 0..POSE {
-                let (row, share) = (POSE * a + i, by_a[i] / depth.curvature);
+            for i in 0..POSE_PARAMETERS {
+                let (row, share) = (POSE_PARAMETERS * a + i, by_a[i] / depth.curvature);
                 self.right[row] -= share * depth.pull;
                 for (b, by_b) in &depth.mixed {
-                    let at = row * side + POSE * b;
-                    self.matrix[at..at + POSE].iter_mut().zip(by_b).for_each(|(sum, by_b)| *sum -= share * by_b);
+                    let at = row * side + POSE_PARAMETERS * b;
+                    self.matrix[at..at + POSE_PARAMETERS]
+                        .iter_mut()
+                        .zip(by_b)
+                        .for_each(|(sum, by_b)| *sum -= share * by_b);
                 }
             }
         }
     }
 
     /// Moves the depths of the patches after the steps of the frame and its partners.
-    pub(super) fn move_depths(&self, patches: &mut [Patch], steps: &[[f64; POSE]]) {
+    pub(super) fn move_depths(&self, patches: &mut [Patch], steps: &[[f64; POSE_PARAMETERS]]) {
         for (patch, depth) in patches.iter_mut().zip(&self.depths).filter(|(_, depth)| depth.curvature > 0.0) {
             let by_poses: f64 = depth.mixed.iter().map(|(frame, by)| dot(by, &steps[*frame])).sum();
             let step = ((depth.pull - by_poses) / depth.curvature).clamp(-DEPTH_STEP_MAX, DEPTH_STEP_MAX);
@@ -141,13 +151,15 @@ impl Sums {
     }
 }
 
-/// Returns the place of a number of a comparison with a partner in [`Sums`].
+/// Returns the place of a number of a comparison with a partner in [`FrameEquations`].
 fn index(partner: usize, number: usize) -> usize {
-    if number < POSE { POSE * partner + number } else { number - POSE }
+    if number < POSE_PARAMETERS { POSE_PARAMETERS * partner + number } else { number - POSE_PARAMETERS }
 }
 
 /// Returns the matrix and the right side of a comparison.
-fn products(compared: &Comparison) -> ([[f64; NUMBERS]; NUMBERS], [f64; NUMBERS]) {
+fn products(
+    compared: &Comparison,
+) -> ([[f64; COMPARISON_PARAMETERS]; COMPARISON_PARAMETERS], [f64; COMPARISON_PARAMETERS]) {
     let ([xx, xy, yy], [x, y]) = (compared.moments, compared.places);
     let matrix = std::array::from_fn(|i| {
         let (by_x, by_y) = (xx * x[i] + xy * y[i], xy * x[i] + yy * y[i]);
@@ -171,13 +183,13 @@ pub(super) struct System {
 }
 
 impl System {
-    pub(super) fn of(sums: &[Sums], partners: &[Vec<usize>], frames: usize) -> Self {
-        let side = POSE * frames;
+    pub(super) fn from_frame_equations(sums: &[FrameEquations], partners: &[Vec<usize>], frames: usize) -> Self {
+        let side = POSE_PARAMETERS * frames;
         let mut all =
             Self { matrix: vec![0.0; side * side], right: vec![0.0; side], counts: vec![Counts::default(); frames] };
         for (host, (sums, partners)) in sums.iter().zip(partners).enumerate() {
             let of: Vec<usize> = std::iter::once(host).chain(partners.iter().copied()).collect();
-            let row = |local: usize| POSE * of[local / POSE] + local % POSE;
+            let row = |local: usize| POSE_PARAMETERS * of[local / POSE_PARAMETERS] + local % POSE_PARAMETERS;
             for (i, right) in sums.right.iter().enumerate() {
                 all.right[row(i)] += right;
                 for j in 0..sums.right.len() {
@@ -190,16 +202,16 @@ impl System {
     }
 
     /// Returns the step of each frame, 0 for those that are not told; `None` if the equations have no solution.
-    pub(super) fn solved(mut self, is_told: &[bool]) -> Option<Vec<[f64; POSE]>> {
+    pub(super) fn solved(mut self, is_told: &[bool]) -> Option<Vec<[f64; POSE_PARAMETERS]>> {
         let side = self.right.len();
         for row in 0..side {
             for column in 0..side {
-                if !is_told[row / POSE] || !is_told[column / POSE] {
+                if !is_told[row / POSE_PARAMETERS] || !is_told[column / POSE_PARAMETERS] {
                     self.matrix[row * side + column] = if row == column { 1.0 } else { 0.0 };
                 }
             }
-            if is_told[row / POSE] {
-                self.matrix[row * side + row] *= 1.0 + DAMPING;
+            if is_told[row / POSE_PARAMETERS] {
+                self.matrix[row * side + row] *= 1.0 + POSE_DAMPING;
             } else {
                 self.right[row] = 0.0;
             }

@@ -8,12 +8,12 @@ use std::thread::{self, JoinHandle};
 
 /// A thread that compiles kernels, until it is dropped.
 #[derive(Debug)]
-pub(super) struct Ahead {
+pub(super) struct KernelCompiler {
     is_over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Ahead {
+impl KernelCompiler {
     /// Begins to compile the kernels of these lists, in their order. A failure is that of the list which needs the kernel.
     pub(super) fn new(gpu: &Arc<Gpu>, lists: Vec<PassList>) -> Self {
         let (gpu, is_over) = (Arc::clone(gpu), Arc::new(AtomicBool::new(false)));
@@ -30,7 +30,7 @@ impl Ahead {
     }
 }
 
-impl Drop for Ahead {
+impl Drop for KernelCompiler {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

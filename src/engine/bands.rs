@@ -27,7 +27,7 @@ impl Band {
     }
 
     /// Returns the bands of a picture, all but the last with `most` rows.
-    pub(crate) fn all(height: u32, most: u32) -> Vec<Self> {
+    pub(crate) fn split(height: u32, most: u32) -> Vec<Self> {
         let most = most.max(1);
         (0..height.div_ceil(most)).map(|at| Self { first: at * most, rows: most.min(height - at * most) }).collect()
     }
@@ -36,7 +36,7 @@ impl Band {
 impl Engine {
     /// Returns the bands in which a picture of the camera is drawn: one, unless the device cannot walk its tiles at once.
     pub(crate) fn bands(&self, camera: &Camera) -> Vec<Band> {
-        Band::all(camera.height, self.size.band(&self.shape).unwrap_or(camera.height))
+        Band::split(camera.height, self.size.band(&self.shape).unwrap_or(camera.height))
     }
 
     /// Returns the camera's part of the uniforms for a band. Slopes keep the limits of the whole picture.
@@ -65,8 +65,8 @@ mod tests {
     #[test]
     fn bands_cover_a_picture_once() {
         let band = |first, rows| Band { first, rows };
-        assert_eq!(Band::all(7, 3), [band(0, 3), band(3, 3), band(6, 1)]);
-        assert_eq!(Band::all(6, 6), [band(0, 6)]);
+        assert_eq!(Band::split(7, 3), [band(0, 3), band(3, 3), band(6, 1)]);
+        assert_eq!(Band::split(6, 6), [band(0, 6)]);
         assert_eq!(band(3, 3).pixels(10), 30..60);
     }
 }

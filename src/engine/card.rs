@@ -1,6 +1,6 @@
 //! Predictions of memory for a device that is not here.
 
-use super::growth::of_votes;
+use super::growth::vote_capacity;
 use super::{Engine, EngineSize, capacity};
 use crate::error::Result;
 use crate::gpu::limits::PlanLimits;
@@ -11,15 +11,19 @@ use crate::scheduler::plan::{MemoryReport, PlanOptions};
 /// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
 /// allocations of 4 GiB.
 pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
-    const RANGE: u64 = u32::MAX as u64 & !0xffff;
-    let limits =
-        PlanLimits { max_storage_range: RANGE, max_allocation: RANGE, max_memory: memory, ..PlanLimits::default() };
+    const BINDING_BYTES_MAX: u64 = u32::MAX as u64 & !0xffff;
+    let limits = PlanLimits {
+        max_storage_range: BINDING_BYTES_MAX,
+        max_allocation: BINDING_BYTES_MAX,
+        max_memory: memory,
+        ..PlanLimits::default()
+    };
     // Cards bind far more buffers than is usual elsewhere.
     let limits = PlanLimits { max_storage_buffers: 1 << 20, ..limits };
     let own = KernelShape::new(32, false);
     let shape = KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys: true, ..own };
     let shape = KernelShape { group_walks: true, update: Update::Lazy, ..shape };
-    (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.of_card())
+    (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.for_gpu())
 }
 
 /// Predicts the memory of an engine of this size on a device with these kernels and limits.
@@ -43,6 +47,6 @@ pub(crate) fn predict_votes(
     size: &EngineSize,
 ) -> Result<Option<MemoryReport>> {
     let size = &size.in_bands(shape);
-    let Some((counting, list)) = of_votes(shape, &capacity(shape, size), size) else { return Ok(None) };
+    let Some((counting, list)) = vote_capacity(shape, &capacity(shape, size), size) else { return Ok(None) };
     MemoryReport::predict(TABLE, &counting.counts(), &[list], limits, PlanOptions::default()).map(Some)
 }

@@ -25,9 +25,9 @@ pub struct GrownSizes {
 }
 
 /// Pairs (Gaussian, label) that one sweep of votes counts, of 8 bytes: 128 MiB.
-const VOTE_CELLS: u64 = 1 << 24;
+const VOTE_CELLS_MAX: u64 = 1 << 24;
 /// Labels that one sweep counts whatever the number of Gaussians.
-const VOTE_COLUMNS: u64 = 16;
+const VOTE_COLUMNS_MIN: u64 = 16;
 
 /// Returns initial capacities for `size`, before any measurement.
 pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
@@ -72,7 +72,11 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
 }
 
 /// Returns the capacities of a training that counts votes, and the list that does so; `None` where nothing changes.
-pub(super) fn of_votes(shape: &KernelShape, capacity: &Capacity, size: &EngineSize) -> Option<(Capacity, PassList)> {
+pub(super) fn vote_capacity(
+    shape: &KernelShape,
+    capacity: &Capacity,
+    size: &EngineSize,
+) -> Option<(Capacity, PassList)> {
     let mut counting = Capacity { vote_cells: vote_columns(size) * capacity.gaussians, ..*capacity };
     // Nor is there a gradient.
     derive(shape, &mut counting, capacity.instances, false);
@@ -80,9 +84,9 @@ pub(super) fn of_votes(shape: &KernelShape, capacity: &Capacity, size: &EngineSi
     (size.trained && counting.vote_cells > 0).then(|| (counting, list()))
 }
 
-/// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS`], and always [`VOTE_COLUMNS`].
+/// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS_MAX`], and always [`VOTE_COLUMNS_MIN`].
 fn vote_columns(size: &EngineSize) -> u64 {
-    let fit = (VOTE_CELLS / size.gaussians.max(1)).max(VOTE_COLUMNS);
+    let fit = (VOTE_CELLS_MAX / size.gaussians.max(1)).max(VOTE_COLUMNS_MIN);
     size.labels.map_or(0, |labels| u64::from(labels.vote_columns)).min(fit)
 }
 
@@ -132,7 +136,7 @@ impl Engine {
     /// Predicts the memory of an engine of this size, without allocating.
     #[doc(hidden)]
     pub fn predict(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Result<MemoryReport> {
-        predict_for(&KernelShape::of(gpu.capabilities()), &options.limits(gpu), size)
+        predict_for(&KernelShape::for_device(gpu.capabilities()), &options.limits(gpu), size)
     }
 
     /// Returns the lists that decide the amount of scratch memory.
@@ -240,7 +244,7 @@ impl Engine {
             Err(Error::OutOfMemory { .. }) => Ok(false),
             Err(other) => Err(other),
         };
-        let counting = of_votes(&self.shape, capacity, &self.size);
+        let counting = vote_capacity(&self.shape, capacity, &self.size);
         Ok(fit(capacity, &lists)? && counting.map_or(Ok(true), |(counting, list)| fit(&counting, &[list]))?)
     }
 
@@ -248,7 +252,7 @@ impl Engine {
     /// gradients and scratch of its steps were. No list may be in flight.
     pub(crate) fn begin_votes(&mut self) -> Result<()> {
         self.check_idle()?;
-        match of_votes(&self.shape, &self.capacity, &self.size) {
+        match vote_capacity(&self.shape, &self.capacity, &self.size) {
             Some((counting, _)) => self.set_capacity(counting),
             None => Ok(()),
         }

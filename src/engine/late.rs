@@ -2,10 +2,10 @@
 //! the same bits whoever reads it.
 
 use super::Engine;
-use super::missed::{Missed, Weights};
+use super::missed::{MissedUpdates, Weights};
 use super::moments::{pack_all, unpack_all};
 use crate::error::Result;
-use crate::pass::ATTRIBUTES;
+use crate::pass::MODEL_ATTRIBUTES;
 use crate::pass::buffers::TABLE;
 use crate::records::checkpoint::Plane;
 use crate::scheduler::Scheduler;
@@ -13,15 +13,15 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::constants::ADAM_EPSILON;
 
 /// Name of the plane with the weights of missed updates, after a row with the numbers of updates.
-const MISSED: &str = "missed_updates";
+const MISSED_PLANE: &str = "missed_updates";
 /// Words of its rows.
-const WORDS: u32 = 8;
+const MISSED_ROW_WORDS: u32 = 8;
 
 /// Which of the eight rates each component of a vec4 has, by the rate of its attribute.
-const RATES: [[usize; 4]; 5] = [[0, 1, 2, 3], [4; 4], [5; 4], [6, 6, 6, 7], [7; 4]];
+const COMPONENT_RATES: [[usize; 4]; 5] = [[0, 1, 2, 3], [4; 4], [5; 4], [6, 6, 6, 7], [7; 4]];
 
 /// What each Gaussian has missed.
-pub(super) struct Late {
+pub(super) struct PendingUpdates {
     /// Number of updates, of each trained Gaussian.
     ages: Vec<usize>,
     /// By number of updates: sums for the eight rates, factors of first and second moments.
@@ -30,16 +30,16 @@ pub(super) struct Late {
     half: bool,
 }
 
-impl Late {
-    fn new(missed: &Missed, touched_at: &[u32], half: bool) -> Self {
+impl PendingUpdates {
+    fn new(missed: &MissedUpdates, touched_at: &[u32], half: bool) -> Self {
         let ages = touched_at.iter().map(|&at| missed.age(at) as usize).collect();
         Self { ages, sums: missed.sums(), half }
     }
 
     /// Catches up the values of a plane of parameters, given with its moments, which it catches up too.
     fn settle(&self, plane: Buf, [values, m, u]: [&mut [f32]; 3]) {
-        let Some(attribute) = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane) else { return };
-        let (rates, floats) = (RATES[attribute.rate as usize], 4 * attribute.stride as usize);
+        let Some(attribute) = MODEL_ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane) else { return };
+        let (rates, floats) = (COMPONENT_RATES[attribute.rate as usize], 4 * attribute.stride as usize);
         for (row, &age) in self.ages.iter().enumerate().filter(|(_, age)| **age > 0) {
             let (sums, [first, second]) = &self.sums[age];
             for at in row * floats..(row + 1) * floats {
@@ -52,9 +52,14 @@ impl Late {
 }
 
 /// Reads floats of a plane of parameters; `late`, with the updates that Gaussians have missed.
-pub(super) fn read(sched: &mut Scheduler, late: Option<&Late>, plane: Buf, floats: usize) -> Result<Vec<f32>> {
+pub(super) fn read(
+    sched: &mut Scheduler,
+    late: Option<&PendingUpdates>,
+    plane: Buf,
+    floats: usize,
+) -> Result<Vec<f32>> {
     let mut values = sched.download::<f32>(plane, 0, 0, floats)?;
-    let attribute = ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane);
+    let attribute = MODEL_ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane);
     if let (Some(late), Some(attribute)) = (late, attribute) {
         let trained = late.ages.len() * 4 * attribute.stride as usize;
         let (mut m, mut u) = match attribute.moments(late.half) {
@@ -69,12 +74,12 @@ pub(super) fn read(sched: &mut Scheduler, late: Option<&Late>, plane: Buf, float
 /// Returns the planes of a state without the updates that Gaussians have missed, and with these where no Gaussian may be late.
 pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
     let find = |name: &str| planes.iter().find(|plane| plane.name == name);
-    let (missed, touched_at) = (find(MISSED)?, find(TABLE[Buf::TOUCHED_AT.index()].name)?);
-    let late = Late::new(&Missed::of_words(&missed.data), &touched_at.data, false);
+    let (missed, touched_at) = (find(MISSED_PLANE)?, find(TABLE[Buf::TOUCHED_AT.index()].name)?);
+    let late = PendingUpdates::new(&MissedUpdates::from_words(&missed.data), &touched_at.data, false);
     let mut all: Vec<Plane> = planes.to_vec();
     let floats = |plane: &Plane| plane.data.iter().map(|&word| f32::from_bits(word)).collect::<Vec<f32>>();
     let words = |values: Vec<f32>| values.into_iter().map(f32::to_bits).collect::<Vec<u32>>();
-    for attribute in &ATTRIBUTES {
+    for attribute in &MODEL_ATTRIBUTES {
         let named = |buf: Buf| all.iter().position(|plane| plane.name == TABLE[buf.index()].name);
         let [Some(values), Some(first), second] = attribute.planes.map(named) else { continue };
         let mut row = floats(&all[values]);
@@ -95,40 +100,41 @@ pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
 
 /// Checks the planes of late Gaussians in a state; `take` removes a plane from those that were given.
 pub(super) fn check<'a>(mut take: impl FnMut(&str) -> Option<&'a Plane>, trained: u32) -> Result<(), String> {
-    match (take(TABLE[Buf::TOUCHED_AT.index()].name), take(MISSED)) {
+    match (take(TABLE[Buf::TOUCHED_AT.index()].name), take(MISSED_PLANE)) {
         (None, None) => Ok(()),
         (Some(touched_at), Some(missed)) => {
             let rows = touched_at.data.len() == trained as usize && touched_at.words == 1;
-            let is_whole = missed.words == WORDS && missed.data.len().is_multiple_of(WORDS as usize);
-            let knows = |missed: &Missed| touched_at.data.iter().all(|&at| missed.knows(at));
-            match rows && is_whole && !missed.data.is_empty() && knows(&Missed::of_words(&missed.data)) {
+            let is_whole =
+                missed.words == MISSED_ROW_WORDS && missed.data.len().is_multiple_of(MISSED_ROW_WORDS as usize);
+            let knows = |missed: &MissedUpdates| touched_at.data.iter().all(|&at| missed.knows(at));
+            match rows && is_whole && !missed.data.is_empty() && knows(&MissedUpdates::from_words(&missed.data)) {
                 true => Ok(()),
-                false => Err(format!("the planes {} and {MISSED} do not fit", touched_at.name)),
+                false => Err(format!("the planes {} and {MISSED_PLANE} do not fit", touched_at.name)),
             }
         }
-        _ => Err(format!("one of the planes {} and {MISSED} is missing", TABLE[Buf::TOUCHED_AT.index()].name)),
+        _ => Err(format!("one of the planes {} and {MISSED_PLANE} is missing", TABLE[Buf::TOUCHED_AT.index()].name)),
     }
 }
 
-impl Missed {
+impl MissedUpdates {
     /// The plane of a state.
     pub(super) fn plane(&self) -> Plane {
-        Plane { name: MISSED.to_owned(), words: WORDS, data: self.words() }
+        Plane { name: MISSED_PLANE.to_owned(), words: MISSED_ROW_WORDS, data: self.words() }
     }
 
     /// Finds it.
     pub(super) fn find(planes: &[Plane]) -> Option<Self> {
-        planes.iter().find(|plane| plane.name == MISSED).map(|plane| Self::of_words(&plane.data))
+        planes.iter().find(|plane| plane.name == MISSED_PLANE).map(|plane| Self::from_words(&plane.data))
     }
 }
 
 impl Engine {
     /// Returns what Gaussians have missed; `None` if nothing.
-    pub(super) fn late(&mut self) -> Result<Option<Late>> {
+    pub(super) fn late(&mut self) -> Result<Option<PendingUpdates>> {
         if !self.missed.is_late() {
             return Ok(None);
         }
         let touched_at = self.sched.download::<u32>(Buf::TOUCHED_AT, 0, 0, self.trained_count() as usize)?;
-        Ok(Some(Late::new(&self.missed, &touched_at, self.size.half_moments)))
+        Ok(Some(PendingUpdates::new(&self.missed, &touched_at, self.size.half_moments)))
     }
 }

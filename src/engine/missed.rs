@@ -19,11 +19,11 @@ pub(super) type Weights = [f32; 8];
 type Row = [[u32; 4]; 3];
 
 /// Updates that a failure may take back: more than there are steps in flight.
-const TAKEN_BACK: usize = 32;
+const UNDONE_UPDATES_MAX: usize = 32;
 
 /// Numbers of updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Mark {
+pub(crate) struct UpdateMark {
     /// All updates so far.
     now: u32,
     /// The last one that no Gaussian has missed.
@@ -32,13 +32,13 @@ pub(crate) struct Mark {
 
 /// The updates that Gaussians may have missed.
 #[derive(Debug, Default)]
-pub(super) struct Missed {
-    mark: Mark,
+pub(super) struct MissedUpdates {
+    mark: UpdateMark,
     /// Weights of the newest updates, the last one at the end.
     weights: VecDeque<Weights>,
 }
 
-impl Missed {
+impl MissedUpdates {
     /// Returns true if Gaussians have missed updates.
     pub(super) fn is_late(&self) -> bool {
         self.mark.now > self.mark.whole
@@ -98,22 +98,23 @@ impl Missed {
         std::iter::once(head).chain(self.weights.iter().map(|weights| weights.map(f32::to_bits))).flatten().collect()
     }
 
-    /// The inverse of [`Missed::words`].
-    pub(super) fn of_words(words: &[u32]) -> Self {
+    /// The inverse of [`MissedUpdates::words`].
+    pub(super) fn from_words(words: &[u32]) -> Self {
         let mut rows = words.as_chunks::<8>().0.iter();
-        let mark = rows.next().map_or(Mark::default(), |head| Mark { now: head[0], whole: head[1].min(head[0]) });
+        let mark =
+            rows.next().map_or(UpdateMark::default(), |head| UpdateMark { now: head[0], whole: head[1].min(head[0]) });
         Self { mark, weights: rows.map(|row| row.map(f32::from_bits)).collect() }
     }
 
     fn advance(&mut self, weights: Weights) {
         self.mark.now += 1;
         self.weights.push_back(weights);
-        if self.weights.len() > MISSED_MOST as usize + TAKEN_BACK {
+        if self.weights.len() > MISSED_MOST as usize + UNDONE_UPDATES_MAX {
             self.weights.pop_front();
         }
     }
 
-    fn go_back(&mut self, mark: Mark) {
+    fn go_back(&mut self, mark: UpdateMark) {
         let taken_back = self.mark.now.saturating_sub(mark.now) as usize;
         self.weights.truncate(self.weights.len().saturating_sub(taken_back));
         self.mark = mark;
@@ -146,7 +147,7 @@ impl Engine {
 
     /// Returns the list for a step: with a pass in which all Gaussians catch up, if it is due.
     pub(super) fn caught_up(&self, key: ListKey) -> ListKey {
-        let (Mark { now, whole }, of) = (self.missed.mark, self.step_of(key));
+        let (UpdateMark { now, whole }, of) = (self.missed.mark, self.step_of(key));
         let catch_up = match of.filter(|_| self.may_be_late()) {
             Some((_, true)) if self.shape.update == Update::Fused => true,
             Some((_, true)) => now - whole >= MISSED_MOST,
@@ -161,7 +162,7 @@ impl Engine {
     }
 
     /// Notes the update of a step that was submitted. Returns the numbers before it.
-    pub(super) fn note_update(&mut self, key: ListKey, uniforms: &StepUniforms) -> Mark {
+    pub(super) fn note_update(&mut self, key: ListKey, uniforms: &StepUniforms) -> UpdateMark {
         let before = self.missed.mark;
         if let Some((variant, is_fused)) = self.step_of(key).filter(|_| self.may_be_late()) {
             if variant.catch_up {
@@ -179,13 +180,13 @@ impl Engine {
     }
 
     /// Takes the updates back that a failed list and those after it have not made.
-    pub(super) fn take_back(&mut self, before: Mark) {
+    pub(super) fn take_back(&mut self, before: UpdateMark) {
         self.missed.go_back(before);
     }
 
     /// Starts anew, with a model that has missed nothing.
     pub(super) fn start_updates(&mut self) -> Result<()> {
-        self.missed = Missed::default();
+        self.missed = MissedUpdates::default();
         if self.may_be_late() { self.sched.fill(Buf::TOUCHED_AT, 0) } else { Ok(()) }
     }
 
@@ -219,7 +220,7 @@ impl Engine {
 
 #[cfg(test)]
 mod tests {
-    use super::{Mark, Missed};
+    use super::{MissedUpdates, UpdateMark};
 
     fn number(word: u32) -> f64 {
         f64::from(f32::from_bits(word))
@@ -227,7 +228,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_the_updates_missed() {
-        let mut missed = Missed::default();
+        let mut missed = MissedUpdates::default();
         for update in 1..=400 {
             missed.advance([update as f32; 8]);
         }
@@ -251,7 +252,7 @@ mod tests {
 
     #[test]
     fn updates_that_were_not_made_are_taken_back() {
-        let (mut missed, mut other) = (Missed::default(), Missed::default());
+        let (mut missed, mut other) = (MissedUpdates::default(), MissedUpdates::default());
         for update in 0..300 {
             [&mut missed, &mut other].into_iter().for_each(|of| of.advance([update as f32; 8]));
         }
@@ -259,7 +260,7 @@ mod tests {
         (0..4).for_each(|_| missed.advance([1e9; 8]));
         missed.mark.whole = 302;
         missed.go_back(before);
-        assert_eq!(missed.mark, Mark { now: 300, whole: 0 });
+        assert_eq!(missed.mark, UpdateMark { now: 300, whole: 0 });
         assert_eq!(missed.table([0.0; 8], true), other.table([0.0; 8], true));
     }
 }

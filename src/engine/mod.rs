@@ -1,6 +1,6 @@
 //! A device with a model in its memory.
 //!
-//! [`Engine::of_model`] opens one that is ready to [`render`](crate::render::render()). Inside of the crate, all modules
+//! [`Engine::for_model`] opens one that is ready to [`render`](crate::render::render()). Inside of the crate, all modules
 //! above use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
 //! `Engine::retire` keep steps in flight, and transfers are typed.
 
@@ -35,10 +35,10 @@ use crate::pass::{Extension, KernelShape};
 use crate::scene::{Camera, Gaussians, Zone};
 use crate::scheduler::{ListId, Scheduler, SchedulerOptions};
 use crate::shaders::structs::StepUniforms;
-use ahead::Ahead;
+use ahead::KernelCompiler;
 use glam::DVec3;
 use label_ids::LabelIds;
-use missed::Missed;
+use missed::MissedUpdates;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -66,9 +66,9 @@ pub struct Engine {
     /// Frames with an unread report.
     in_flight: Vec<bool>,
     /// What Gaussians have missed.
-    missed: Missed,
+    missed: MissedUpdates,
     /// Compiles kernels of later lists.
-    ahead: Option<Ahead>,
+    ahead: Option<KernelCompiler>,
     /// Every run is checked for writes outside of its buffers.
     has_guards: bool,
 }
@@ -77,14 +77,14 @@ impl Engine {
     /// Creates an engine with memory for `size`.
     #[doc(hidden)]
     pub fn new(gpu: Arc<Gpu>, size: EngineSize, options: SchedulerOptions) -> Result<Self> {
-        let shape = KernelShape::of(gpu.capabilities());
+        let shape = KernelShape::for_device(gpu.capabilities());
         Self::with_shape(gpu, shape, size, options)
     }
 
     /// Opens an engine with `model` on the device, ready to [`render`](crate::render::render) pictures of up to the
     /// largest of `images`, (width, height) in px.
-    pub fn of_model(gpu: Arc<Gpu>, model: &Gaussians, images: impl IntoIterator<Item = (u32, u32)>) -> Result<Self> {
-        let size = EngineSize::of_model(model, images.into_iter());
+    pub fn for_model(gpu: Arc<Gpu>, model: &Gaussians, images: impl IntoIterator<Item = (u32, u32)>) -> Result<Self> {
+        let size = EngineSize::for_model(model, images.into_iter());
         let mut engine = Self::new(gpu, size, SchedulerOptions::default())?;
         engine.upload_model(model)?;
         Ok(engine)
@@ -115,7 +115,7 @@ impl Engine {
             label_rounds: 1,
             stamp: 0,
             last_frame: 0,
-            missed: Missed::default(),
+            missed: MissedUpdates::default(),
             ahead: None,
             has_guards: options.plan.guards,
         })

@@ -2,15 +2,15 @@
 
 use super::EngineSize;
 use super::label_ids::LabelIds;
-use super::late::{self, Late};
+use super::late::{self, PendingUpdates};
 use crate::error::{Error, Result};
-use crate::pass::ATTRIBUTES;
+use crate::pass::MODEL_ATTRIBUTES;
 use crate::scene::{Gaussians, LABEL_MAX, UNLABELLED};
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
 /// Planes of colours after the first one: floats of each Gaussian, and how many above degree 0 are in the planes before.
-const COLOURS: [(Buf, usize, usize); 3] = [(Buf::SH1, 8, 1), (Buf::SH2, 16, 9), (Buf::SH3, 20, 25)];
+const HIGHER_COLOUR_PLANES: [(Buf, usize, usize); 3] = [(Buf::SH1, 8, 1), (Buf::SH2, 16, 9), (Buf::SH3, 20, 25)];
 
 /// Writes the planes; sets the optimiser state to 0. Returns the ids of the labels on the device.
 pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize) -> Result<LabelIds> {
@@ -22,7 +22,7 @@ pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize
     sched.upload(Buf::SCALES, 0, 0, &with(&model.scales, &|_| 0.0))?;
     sched.upload(Buf::QUATS, 0, 0, &model.quats)?;
     sched.upload(Buf::SH0, 0, 0, &with(&model.sh0, &|i| model.rest(i).first().map_or(0.0, |first| first[0])))?;
-    for (plane, floats, before) in COLOURS {
+    for (plane, floats, before) in HIGHER_COLOUR_PLANES {
         let mut words = vec![0.0_f32; model.len() * floats];
         for (row, to) in words.chunks_exact_mut(floats).enumerate() {
             let from = model.rest(row).as_flattened().get(before..).unwrap_or_default();
@@ -31,7 +31,7 @@ pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize
         }
         sched.upload(plane, 0, 0, &words)?;
     }
-    for plane in ATTRIBUTES.iter().flat_map(|a| a.moments(size.half_moments)).chain([&Buf::DENSIFY_STATS]) {
+    for plane in MODEL_ATTRIBUTES.iter().flat_map(|a| a.moments(size.half_moments)).chain([&Buf::DENSIFY_STATS]) {
         sched.fill(*plane, 0)?;
     }
     match (size.labels, &model.labels) {
@@ -57,7 +57,12 @@ pub(super) fn upload_labels(sched: &mut Scheduler, labels: &[u32], size: &Engine
 }
 
 /// Reads the planes of `count` Gaussians; without labels. `late`: with the updates that they have missed.
-pub(super) fn download(sched: &mut Scheduler, late: Option<&Late>, count: usize, sh_degree: u32) -> Result<Gaussians> {
+pub(super) fn download(
+    sched: &mut Scheduler,
+    late: Option<&PendingUpdates>,
+    count: usize,
+    sh_degree: u32,
+) -> Result<Gaussians> {
     let xyz = |rows: &[[f32; 4]]| rows.iter().map(|&[x, y, z, _]| [x, y, z]).collect::<Vec<_>>();
     let mut rows = |plane: Buf| late::read(sched, late, plane, 4 * count).map(|all| all.as_chunks::<4>().0.to_vec());
     let (means, sh0) = (rows(Buf::MEANS)?, rows(Buf::SH0)?);
@@ -73,7 +78,7 @@ pub(super) fn download(sched: &mut Scheduler, late: Option<&Late>, count: usize,
     let rest = model.rest_per_gaussian();
     model.sh_rest = vec![[0.0; 3]; count * rest];
     model.sh_rest.chunks_exact_mut(rest.max(1)).zip(&sh0).for_each(|(to, from)| to[0][0] = from[3]);
-    for (plane, floats, before) in COLOURS.into_iter().filter(|plane| plane.2 < 3 * rest) {
+    for (plane, floats, before) in HIGHER_COLOUR_PLANES.into_iter().filter(|plane| plane.2 < 3 * rest) {
         let words = late::read(sched, late, plane, count * floats)?;
         for (to, from) in model.sh_rest.chunks_exact_mut(rest).zip(words.chunks_exact(floats)) {
             let to = &mut to.as_flattened_mut()[before..];

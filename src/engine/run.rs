@@ -1,7 +1,7 @@
 //! Lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
 
-use super::ahead::Ahead;
-use super::missed::Mark;
+use super::ahead::KernelCompiler;
+use super::missed::UpdateMark;
 use super::{Engine, Input};
 use crate::error::{Error, Result};
 use crate::pass::{self, Stage, Variant};
@@ -61,7 +61,7 @@ pub(crate) struct InFlight {
     pub recording: Recording,
     ticket: Ticket,
     /// Updates before it.
-    before: Mark,
+    before: UpdateMark,
 }
 
 /// A recording of a list for a frame. After buffers have grown, the list is recorded anew.
@@ -103,7 +103,7 @@ impl Engine {
             return;
         }
         let lists = keys.into_iter().map(|key| self.declare(key)).collect();
-        self.ahead = Some(Ahead::new(self.gpu(), lists));
+        self.ahead = Some(KernelCompiler::new(self.gpu(), lists));
     }
 
     fn declare(&self, key: ListKey) -> PassList {

@@ -53,7 +53,7 @@ impl EngineSize {
     }
 
     /// Sizes for rendering a model, and its labels if it has some, in images of up to the largest of `sizes`, px.
-    pub fn of_model(model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Self {
+    pub fn for_model(model: &Gaussians, sizes: impl Iterator<Item = (u32, u32)>) -> Self {
         let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
         let labels = model.labels.as_ref().map(|_| LabelSize::default());
         Self::new((model.len() as u64).max(1), image).with_labels(labels)

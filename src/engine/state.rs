@@ -1,11 +1,11 @@
 //! Device state that a training needs to continue: the buffers of kind Model, unchanged. All other buffers start at
 //! zero, both in a new and in a continued training.
 
-use super::missed::Missed;
+use super::missed::MissedUpdates;
 use super::{Engine, EngineSize, ListKey, late};
 use crate::error::Result;
 use crate::pass::buffers::TABLE;
-use crate::pass::{ATTRIBUTES, Attribute, SHARED_PLANES};
+use crate::pass::{Attribute, MODEL_ATTRIBUTES, SHARED_PLANES};
 use crate::records::checkpoint::Plane;
 use crate::scheduler::Snapshot;
 use crate::scheduler::plan::{Buf, Domain};
@@ -30,7 +30,7 @@ pub(crate) struct Counts {
 }
 
 impl Counts {
-    fn of(&self, buf: Buf) -> u32 {
+    fn rows_of(&self, buf: Buf) -> u32 {
         let domain = &TABLE[buf.index()].domain;
         if domain.is_trained() {
             self.gaussians.saturating_sub(self.frozen)
@@ -45,11 +45,11 @@ impl Counts {
 /// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
 fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], counts: Counts) -> Vec<(Buf, u32)> {
     let planes = |a: &'static Attribute| iter::once(a.planes[0]).chain(a.moments(counts.half_moments).iter().copied());
-    let attributes = ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(planes);
+    let attributes = MODEL_ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(planes);
     let labels = labels.then_some(Buf::LABELS);
     let shared = SHARED_PLANES.into_iter().filter(|_| counts.shared > 0);
     let all = attributes.chain(kept.iter().copied()).chain(labels).chain(shared);
-    all.map(|buf| (buf, counts.of(buf))).collect()
+    all.map(|buf| (buf, counts.rows_of(buf))).collect()
 }
 
 fn named(name: &str) -> Option<Buf> {
@@ -85,29 +85,29 @@ pub(crate) fn check(
             ));
         }
     }
-    late::check(|name| given.remove(name), counts.of(Buf::DENSIFY_STATS))?;
+    late::check(|name| given.remove(name), counts.rows_of(Buf::DENSIFY_STATS))?;
     given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
 }
 
 /// A state on its way from the device, for any thread.
-pub(crate) struct Copied {
+pub(crate) struct StateCopy {
     shapes: Vec<(Buf, u64)>,
-    words: Words,
+    words: StateWords,
     /// What Gaussians have missed.
     missed: Option<Plane>,
 }
 
-enum Words {
+enum StateWords {
     Read(Vec<Vec<u32>>),
     OnDevice(Box<Snapshot>),
 }
 
-impl Copied {
+impl StateCopy {
     /// Returns the planes, read from the device if need be.
     pub(crate) fn planes(self) -> Result<Vec<Plane>> {
         let all = match self.words {
-            Words::Read(all) => all,
-            Words::OnDevice(snapshot) => snapshot.read()?,
+            StateWords::Read(all) => all,
+            StateWords::OnDevice(snapshot) => snapshot.read()?,
         };
         let plane = |((buf, _), data): ((Buf, u64), _)| Plane {
             name: TABLE[buf.index()].name.to_owned(),
@@ -121,18 +121,20 @@ impl Copied {
 impl Engine {
     /// Copies the state, including the buffers that the strategy keeps: on a card in its memory, to be read while lists go on,
     /// else to the host at once. No list may be in flight.
-    pub(crate) fn copy_state(&mut self, kept: &[Buf]) -> Result<Copied> {
+    pub(crate) fn copy_state(&mut self, kept: &[Buf]) -> Result<StateCopy> {
         self.check_idle()?;
         let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
         let counts = Counts { gaussians, frozen, ..self.no_gaussians() };
         let buffers = buffers(self.sh_degree, self.size.labels.is_some(), kept, counts).into_iter();
-        let late = self.missed.is_late().then(|| (Buf::TOUCHED_AT, counts.of(Buf::DENSIFY_STATS)));
+        let late = self.missed.is_late().then(|| (Buf::TOUCHED_AT, counts.rows_of(Buf::DENSIFY_STATS)));
         let missed = late.map(|_| self.missed.plane());
         let shapes: Vec<(Buf, u64)> =
             buffers.chain(late).map(|(buf, count)| (buf, u64::from(count) * u64::from(words(buf)))).collect();
         if self.runs_ahead() {
             match self.sched.snapshot(&shapes) {
-                Ok(snapshot) => return Ok(Copied { shapes, words: Words::OnDevice(Box::new(snapshot)), missed }),
+                Ok(snapshot) => {
+                    return Ok(StateCopy { shapes, words: StateWords::OnDevice(Box::new(snapshot)), missed });
+                }
                 Err(error) if error.is_out_of_memory() => {
                     tracing::info!("{error}; the training waits until its state is read");
                 }
@@ -140,8 +142,8 @@ impl Engine {
             }
         }
         let read = shapes.iter().map(|&(buf, words)| self.sched.download(buf, 0, 0, words as usize));
-        let words = Words::Read(read.collect::<Result<_>>()?);
-        Ok(Copied { shapes, words, missed })
+        let words = StateWords::Read(read.collect::<Result<_>>()?);
+        Ok(StateCopy { shapes, words, missed })
     }
 
     fn no_gaussians(&self) -> Counts {
@@ -152,7 +154,7 @@ impl Engine {
     /// Planes of floats of the state. Packed moments are none: all words stand for finite numbers.
     pub(super) fn floats(&self, kept: &[Buf]) -> Vec<Buf> {
         let all = buffers(self.sh_degree, false, kept, self.no_gaussians()).into_iter().map(|(buf, _)| buf);
-        let is_packed = |buf: &Buf| self.size.half_moments && ATTRIBUTES.iter().any(|a| a.planes[1] == *buf);
+        let is_packed = |buf: &Buf| self.size.half_moments && MODEL_ATTRIBUTES.iter().any(|a| a.planes[1] == *buf);
         all.filter(|buf| !is_packed(buf)).collect()
     }
 
@@ -178,7 +180,7 @@ impl Engine {
             }
         }
         (self.gaussian_count, self.origin) = (count, origin);
-        self.missed = Missed::find(planes).unwrap_or_default();
+        self.missed = MissedUpdates::find(planes).unwrap_or_default();
         Ok(())
     }
 }

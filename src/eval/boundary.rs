@@ -3,11 +3,11 @@
 use super::metrics::Overlap;
 
 /// Width of the rim as a share of the image diagonal.
-pub(crate) const RATIO: f64 = 0.02;
+pub(crate) const RIM_DIAGONAL_SHARE: f64 = 0.02;
 
-/// Returns the width of the rim, px: `RATIO` times the diagonal, rounded, at least 1.
+/// Returns the width of the rim, px: `RIM_DIAGONAL_SHARE` times the diagonal, rounded, at least 1.
 pub fn rim_width(width: usize, height: usize) -> usize {
-    ((RATIO * (width as f64).hypot(height as f64)).round() as usize).max(1)
+    ((RIM_DIAGONAL_SHARE * (width as f64).hypot(height as f64)).round() as usize).max(1)
 }
 
 /// Returns the pixels of a mask (row-major) within `reach` px of a pixel outside of it, diagonals included. Everything

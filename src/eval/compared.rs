@@ -5,7 +5,7 @@ use crate::scene::{LabelMap, Photo};
 
 /// A scored picture.
 #[derive(Clone, Debug)]
-pub struct Compared<'a> {
+pub struct ScoredPicture<'a> {
     /// Name of the view.
     pub view: &'a str,
     /// Name of the object; `None` for the whole view.
@@ -26,7 +26,7 @@ pub struct Compared<'a> {
     pub note: String,
 }
 
-impl<'a> Compared<'a> {
+impl<'a> ScoredPicture<'a> {
     /// Makes an entry for a whole view, without scores.
     pub fn new(view: &'a str, photo: &'a Photo, rgb: &'a [[f32; 3]]) -> Self {
         Self {
@@ -49,9 +49,9 @@ impl<'a> Compared<'a> {
 }
 
 /// Receives every scored picture.
-pub trait Watch {
+pub trait PictureObserver {
     /// Receives a picture after it was scored.
-    fn see(&mut self, _picture: &Compared) -> Result<()> {
+    fn observe(&mut self, _picture: &ScoredPicture) -> Result<()> {
         Ok(())
     }
 
@@ -62,4 +62,4 @@ pub trait Watch {
 }
 
 /// Ignores all pictures.
-impl Watch for () {}
+impl PictureObserver for () {}

@@ -8,7 +8,7 @@ use crate::scene::Photo;
 use glam::{DMat4, DVec4};
 
 /// Keeps the equations of a picture with few colours solvable; much less than a pixel's rounding.
-const RIDGE: f64 = 1e-6;
+const COLOUR_RIDGE: f64 = 1e-6;
 
 /// Returns the PSNR of the corrected render over the photo's valid pixels that count, dB; `None` without any. The map
 /// is that of the same pixels. `render` has the photo's pixels.
@@ -21,9 +21,9 @@ pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo, counts: impl Fn
             (DVec4::new(x, y, z, 1.0), colour_of(texel))
         })
     };
-    let mut products = DMat4::from_diagonal(DVec4::splat(RIDGE));
+    let mut products = DMat4::from_diagonal(DVec4::splat(COLOUR_RIDGE));
     // Without information the map is the identity.
-    let mut sides = [DVec4::X, DVec4::Y, DVec4::Z].map(|unit| RIDGE * unit);
+    let mut sides = [DVec4::X, DVec4::Y, DVec4::Z].map(|unit| COLOUR_RIDGE * unit);
     for (colour, truth) in pairs() {
         for axis in 0..4 {
             *products.col_mut(axis) += colour * colour[axis];

@@ -10,7 +10,7 @@ pub struct Crop {
 }
 
 /// Padding on each side, as a share of the side of the object's box.
-const PADDING: f64 = 0.15;
+const PADDING_SHARE: f64 = 0.15;
 
 impl Crop {
     /// Returns the crop in which the paper's later scorer compares an object: the box of its mask, padded by 15 % on
@@ -28,7 +28,7 @@ impl Crop {
         }
         let padded = |low: usize, high: usize, side: usize| {
             let (low, high) = (low as f64, high as f64);
-            let more = PADDING * (high - low);
+            let more = PADDING_SHARE * (high - low);
             ((low - more).max(0.0), (high + more).min(side as f64))
         };
         let (x, y) = (padded(low.0, high.0, width), padded(low.1, high.1, height));

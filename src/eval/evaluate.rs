@@ -1,16 +1,16 @@
 //! Scores a model on posed photos: renders every view, then every object alone.
 
-use super::compared::{Compared, Watch};
+use super::compared::{PictureObserver, ScoredPicture};
 use super::metrics::covered;
 use super::protocol::score::Distance;
-use super::regions::{RegionScores, Witnesses};
+use super::regions::{RegionScores, TrainingDepths};
 use super::scores::{ObjectRender, ObjectTruth, Scores, ViewScores};
 use super::subject::Subject;
 use super::target::Target;
 use crate::error::Result;
-use crate::label::occlusion::{Rule, by_contour};
+use crate::label::occlusion::{Rule, occluders_by_contour};
 use crate::label::vote::model::objects_of;
-use crate::render::{Parts, RenderOptions, Rendered};
+use crate::render::{Parts, Render, RenderOptions};
 use crate::scene::{LabelMap, Photo, View};
 use std::collections::BTreeMap;
 
@@ -58,12 +58,12 @@ pub fn evaluate(
     views: &[&View],
     how: Rendering,
     wholes: &dyn AmodalTruth,
-    watch: &mut dyn Watch,
+    watch: &mut dyn PictureObserver,
 ) -> Result<Scores> {
     subject.show(None)?;
     let witnesses = match how.train {
         [] => None,
-        train => Some(Witnesses::new(subject, train, how.options)?),
+        train => Some(TrainingDepths::new(subject, train, how.options)?),
     };
     let (mut scores, mut hidden) = (Vec::new(), Vec::new());
     for view in views {
@@ -78,7 +78,7 @@ pub fn evaluate(
             let rendered = if is_there { Some(subject.render(&view.camera, &of_object)?) } else { None };
             let alone = rendered.as_ref().map(|r| ObjectRender { colour: &r.rgb, alpha: &r.alpha });
             let (whole, picture) = (wholes.outline(id, view)?, wholes.alone(id, view)?);
-            let (Target { photo, .. }, mask) = (Target::of(view, [0.0; 3])?, view.mask()?);
+            let (Target { photo, .. }, mask) = (Target::for_view(view, [0.0; 3])?, view.mask()?);
             let mask = mask.as_deref();
             let unknown = pixels_of(mask, hidden[index].get(&(id as u16)));
             let truth = ObjectTruth {
@@ -100,8 +100,8 @@ fn score_scene(
     subject: &mut dyn Subject,
     view: &View,
     how: Rendering,
-    witnesses: Option<&Witnesses>,
-    watch: &mut dyn Watch,
+    witnesses: Option<&TrainingDepths>,
+    watch: &mut dyn PictureObserver,
 ) -> Result<(ViewScores, BTreeMap<u16, Vec<u16>>)> {
     let labelled = subject.labels().is_some();
     let parts = Parts { main: how.by_main, labels: labelled && !how.by_main, ..Parts::DEPTH };
@@ -111,9 +111,9 @@ fn score_scene(
         false => rendered.label_map(),
     });
     let map = map.transpose()?;
-    let (target, mask) = (Target::of(view, how.options.background)?, view.mask()?);
+    let (target, mask) = (Target::for_view(view, how.options.background)?, view.mask()?);
     let (photo, mask) = (&*target.photo, mask.as_deref());
-    let mut score = ViewScores::of(&rendered.rgb, (photo, target.coloured()), map.as_ref(), mask)?;
+    let mut score = ViewScores::with_colour_photo(&rendered.rgb, (photo, target.coloured()), map.as_ref(), mask)?;
     if let Some(witnesses) = witnesses {
         let seen = witnesses.see(&view.camera, &rendered)?;
         score.regions = Some(RegionScores::new(&rendered.rgb, photo, mask, &seen));
@@ -122,7 +122,7 @@ fn score_scene(
     let numbers = vec![("PSNR", Some(score.psnr)), ("SSIM", Some(score.ssim)), ("LPIPS", score.lpips)];
     let numbers = numbers.into_iter().filter(|(_, value)| value.is_some()).collect();
     let (labels, truth) = (map.as_ref(), mask);
-    watch.see(&Compared { numbers, labels, truth, ..Compared::new(&view.name, photo, &rendered.rgb) })?;
+    watch.observe(&ScoredPicture { numbers, labels, truth, ..ScoredPicture::new(&view.name, photo, &rendered.rgb) })?;
     Ok((score, hidden_by(mask, &rendered)?))
 }
 
@@ -139,7 +139,7 @@ fn distance(lpips: &dyn Distance, render: &[[f32; 3]], photo: &Photo) -> Result<
 
 /// Passes an object of a view to `watch`, if it has ground truth there.
 fn show(
-    watch: &mut dyn Watch,
+    watch: &mut dyn PictureObserver,
     id: u32,
     view: &View,
     render: Option<ObjectRender>,
@@ -153,11 +153,11 @@ fn show(
         Some(render) => (render.colour, covered(render.alpha)),
         None => (&black[..], vec![false; pixels]),
     };
-    watch.see(&Compared {
+    watch.observe(&ScoredPicture {
         object: Some(id.to_string()),
         masks: Some((&found, &outline)),
         numbers: vec![("IoU", row.iou_object), ("boundary IoU", row.boundary_iou), ("PSNR", row.object_psnr)],
-        ..Compared::new(&view.name, truth.photo, rgb)
+        ..ScoredPicture::new(&view.name, truth.photo, rgb)
     })
 }
 
@@ -167,11 +167,11 @@ pub(crate) fn picture_count(views: &[&View]) -> u64 {
     (views.len() * (1 + objects_of(views).len())) as u64
 }
 
-fn hidden_by(mask: Option<&LabelMap>, rendered: &Rendered) -> Result<BTreeMap<u16, Vec<u16>>> {
+fn hidden_by(mask: Option<&LabelMap>, rendered: &Render) -> Result<BTreeMap<u16, Vec<u16>>> {
     let Some(mask) = mask else { return Ok(BTreeMap::new()) };
     // Few pixels are left out, whatever may stand in some of the others: a score must not excuse what is wrong.
     let rule = Rule { share: 0.5, unlabelled: false, ..Rule::default() };
-    Ok(by_contour(mask, &rendered.mean_depth()?, rule))
+    Ok(occluders_by_contour(mask, &rendered.mean_depth()?, rule))
 }
 
 /// Returns the pixels at which the mask shows one of `ids`.

@@ -4,13 +4,13 @@ use crate::error::{Error, Result};
 use crate::scene::{LabelMap, Photo};
 
 /// Opacity above which an object rendered alone covers a pixel.
-const COVERED: f32 = 0.5;
+const COVERED_OPACITY_MIN: f32 = 0.5;
 /// Channel value above which an object on black covers a pixel, in the rule of the paper.
-pub(crate) const PAPER_COVERED: f32 = 0.01;
+pub(crate) const PAPER_COVERED_VALUE_MIN: f32 = 0.01;
 
 /// Returns the pixels that an object rendered alone covers.
 pub(crate) fn covered(alpha: &[f32]) -> Vec<bool> {
-    alpha.iter().map(|&alpha| alpha > COVERED).collect()
+    alpha.iter().map(|&alpha| alpha > COVERED_OPACITY_MIN).collect()
 }
 
 /// Returns the value of a photo's byte in 0 to 1, rounded to f32 as on the device, so that an exact render has no
@@ -110,7 +110,7 @@ pub fn paper_score(object: &[[f32; 3]], photo: &Photo, inside: &[bool]) -> Paper
     }
     let pixels = object.len() as f64;
     let psnr = squares.iter().map(|sum| psnr_of(sum / pixels)).sum::<f64>() / 3.0;
-    let covered = object.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED));
+    let covered = object.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED_VALUE_MIN));
     PaperScore { iou: Overlap::count(covered.zip(inside.iter().copied())).iou(), psnr }
 }
 

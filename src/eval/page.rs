@@ -1,6 +1,6 @@
 //! An HTML page with ground truth, prediction and difference of every scored picture, in one folder with its PNGs.
 
-use super::compared::{Compared, Watch};
+use super::compared::{PictureObserver, ScoredPicture};
 use crate::files::atomic;
 use crate::files::image::write_png_rgb8;
 use crate::report::panels::heat;
@@ -12,9 +12,9 @@ use maud::{Markup, PreEscaped, html};
 use std::path::{Path, PathBuf};
 
 /// Colours in the difference of two masks.
-const ONLY_FOUND: [u8; 3] = [230, 60, 40];
-const ONLY_TRUE: [u8; 3] = [40, 110, 240];
-const BOTH: [u8; 3] = [60, 190, 90];
+const ONLY_PREDICTED_COLOUR: [u8; 3] = [230, 60, 40];
+const ONLY_TRUE_COLOUR: [u8; 3] = [40, 110, 240];
+const IN_BOTH_COLOUR: [u8; 3] = [60, 190, 90];
 
 /// The page of a run. Pictures are written at once, the page itself by [`Page::finish`].
 #[derive(Debug)]
@@ -50,15 +50,15 @@ impl Page {
         Ok(path)
     }
 
-    fn picture(&self, kind: &str, picture: &Compared, pixels: &[[u8; 3]]) -> Result<String> {
+    fn picture(&self, kind: &str, picture: &ScoredPicture, pixels: &[[u8; 3]]) -> Result<String> {
         let name = format!("{:05}-{kind}.png", self.count);
         write_png_rgb8(self.folder.join(&name), picture.photo.width, picture.photo.height, pixels)?;
         Ok(name)
     }
 }
 
-impl Watch for Page {
-    fn see(&mut self, picture: &Compared) -> Result<()> {
+impl PictureObserver for Page {
+    fn observe(&mut self, picture: &ScoredPicture) -> Result<()> {
         self.count += 1;
         let kinds = [("truth", "ground truth"), ("prediction", "prediction"), ("difference", "difference")];
         let mut panels = Vec::new();
@@ -67,7 +67,7 @@ impl Watch for Page {
             let name = if is_heat { "error" } else { name };
             panels.push(Panel { name: name.to_owned(), source: self.picture(kind, picture, &pixels)?, is_heat });
         }
-        let number = |&(name, value): &(&str, Option<f64>)| Some((name.to_owned(), told(name, value?)));
+        let number = |&(name, value): &(&str, Option<f64>)| Some((name.to_owned(), score_text(name, value?)));
         let figure = Figure {
             view: picture.view.to_owned(),
             object: picture.object.clone(),
@@ -82,22 +82,22 @@ impl Watch for Page {
 }
 
 /// A score with its digits and unit.
-fn told(name: &str, value: f64) -> String {
+fn score_text(name: &str, value: f64) -> String {
     let is_decibels = name.to_lowercase().contains("psnr");
     if is_decibels { format!("{value:.DECIBELS$} dB") } else { format!("{value:.SCORE$}") }
 }
 
 /// Ground truth, prediction and difference.
-fn pixels(picture: &Compared) -> [Vec<[u8; 3]>; 3] {
+fn pixels(picture: &ScoredPicture) -> [Vec<[u8; 3]>; 3] {
     let (photo, found) = (picture.photo.rgb(), picture.rgb.iter().map(|colour| colour.map(to_byte)).collect());
     let Some((inside, outline)) = picture.masks else {
         return [photo, found, heat(picture.photo, picture.rgb)];
     };
     let truth = photo.iter().zip(outline).map(|(&colour, &inside)| if inside { colour } else { [0; 3] }).collect();
     let difference = |index: usize| match (inside[index], outline[index]) {
-        (true, true) => BOTH,
-        (true, false) => ONLY_FOUND,
-        (false, true) => ONLY_TRUE,
+        (true, true) => IN_BOTH_COLOUR,
+        (true, false) => ONLY_PREDICTED_COLOUR,
+        (false, true) => ONLY_TRUE_COLOUR,
         (false, false) => photo[index].map(|value| value / 4),
     };
     [truth, found, (0..photo.len()).map(difference).collect()]

@@ -3,19 +3,19 @@
 use super::metrics::{clamped, colour_of, psnr_of, square};
 use super::regions::world_points;
 use crate::error::Result;
-use crate::render::{Parts, RenderOptions, Rendered};
+use crate::render::{Parts, Render, RenderOptions};
 use crate::scene::{Camera, View};
 use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Groups of places, by which pixels are scored.
-pub trait Places: Sync {
+pub trait PlaceGroups: Sync {
     /// Returns the names of the groups.
     fn names(&self) -> Vec<String>;
 
     /// Returns the groups of a world point, by index.
-    fn of(&self, world: DVec3) -> Vec<usize>;
+    fn groups_at(&self, world: DVec3) -> Vec<usize>;
 }
 
 /// The score of a group.
@@ -29,11 +29,11 @@ pub struct PlaceScore {
 
 /// Scores the pixels of each group over some views, which have photos: a pixel is where the model's depth puts it. `draw`
 /// renders the model. Groups without a pixel are absent.
-pub fn by_place(
-    draw: &mut dyn FnMut(&Camera, &RenderOptions) -> Result<Rendered>,
+pub fn score_by_place(
+    draw: &mut dyn FnMut(&Camera, &RenderOptions) -> Result<Render>,
     views: &[&View],
     options: RenderOptions,
-    places: &dyn Places,
+    places: &dyn PlaceGroups,
 ) -> Result<BTreeMap<String, PlaceScore>> {
     let names = places.names();
     let mut sums = vec![(0.0, 0_u64); names.len()];
@@ -43,7 +43,7 @@ pub fn by_place(
         let pixels = world.iter().zip(&rendered.rgb).zip(&photo.rgba).filter(|(_, pixel)| pixel[3] > 0);
         for ((&world, &render), &pixel) in pixels {
             let squared = square(clamped(render), colour_of(pixel));
-            for group in places.of(world) {
+            for group in places.groups_at(world) {
                 sums[group].0 += squared;
                 sums[group].1 += 1;
             }

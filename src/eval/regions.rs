@@ -6,20 +6,20 @@ use super::corrected::psnr_corrected;
 use super::subject::Subject;
 use crate::Result;
 use crate::eval::metrics::{psnr_over, scores};
-use crate::render::{Parts, RenderOptions, Rendered};
+use crate::render::{Parts, Render, RenderOptions};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
 use crate::scenes::shelf::Shelf;
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Training views that have to see a pixel of a held-out view.
-const VIEWS_MIN: usize = 3;
+const SEEING_VIEWS_MIN: usize = 3;
 /// A training view sees a point if its own depth there is not less than this share of the point's.
-const DEPTH_SHARE: f64 = 0.95;
+const DEPTH_SHARE_MIN: f64 = 0.95;
 /// Distance of what has no depth, such as the sky, in distances of the farthest depth.
-const BEYOND: f64 = 1e3;
+const BACKGROUND_DEPTH_FACTOR: f64 = 1e3;
 /// Pixels within this distance of a contour of the mask, px, are its contour.
-const CONTOUR: u32 = 2;
+const CONTOUR_WIDTH_PX: u32 = 2;
 
 scores! {
     /// PSNR by region, dB; `None` for a region without pixels.
@@ -45,7 +45,7 @@ impl RegionScores {
     /// Scores a picture.
     pub(super) fn new(rgb: &[[f32; 3]], photo: &Photo, mask: Option<&LabelMap>, seen: &[bool]) -> Self {
         let over = |counts: &dyn Fn(usize) -> bool| psnr_over(rgb, photo, counts);
-        let near = mask.map(|mask| mask.near_contour(CONTOUR));
+        let near = mask.map(|mask| mask.near_contour(CONTOUR_WIDTH_PX));
         let labelled = |counts: &dyn Fn(bool, bool) -> bool| {
             let (mask, near) = (mask?, near.as_ref()?);
             over(&|index| counts(mask.ids[index] != 0, near[index]))
@@ -63,11 +63,11 @@ impl RegionScores {
 }
 
 /// What the training views see, by the depth of the model.
-pub(super) struct Witnesses {
+pub(super) struct TrainingDepths {
     cameras: Vec<(Camera, Pixels<Vec<f32>>)>,
 }
 
-impl Witnesses {
+impl TrainingDepths {
     /// Renders the depth of every training view.
     pub(super) fn new(subject: &mut dyn Subject, train: &[View], options: RenderOptions) -> Result<Self> {
         let mut shelf = Shelf::default();
@@ -80,27 +80,27 @@ impl Witnesses {
     }
 
     /// Returns the pixels of a rendered view that enough training views see.
-    pub(super) fn see(&self, camera: &Camera, rendered: &Rendered) -> Result<Vec<bool>> {
+    pub(super) fn see(&self, camera: &Camera, rendered: &Render) -> Result<Vec<bool>> {
         // One witness after the other, because the depths of all of them may not fit into memory.
         let world = world_points(camera, &rendered.mean_depth()?);
         let mut open: Vec<(DVec3, usize)> = world.into_iter().map(|world| (world, 0)).collect();
         for (other, depths) in &self.cameras {
             let depths = depths.get()?;
             let is_open = |(world, seen): &mut (DVec3, usize)| {
-                *seen += usize::from(*seen < VIEWS_MIN && sees(other, &depths, *world));
-                *seen < VIEWS_MIN
+                *seen += usize::from(*seen < SEEING_VIEWS_MIN && sees(other, &depths, *world));
+                *seen < SEEING_VIEWS_MIN
             };
             if open.par_iter_mut().filter_map(|pixel| is_open(pixel).then_some(())).count() == 0 {
                 break;
             }
         }
-        Ok(open.into_iter().map(|(_, seen)| seen == VIEWS_MIN).collect())
+        Ok(open.into_iter().map(|(_, seen)| seen == SEEING_VIEWS_MIN).collect())
     }
 }
 
 /// Returns the world point that each pixel shows, by the mean depth there; what has none is far away.
 pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
-    let far = BEYOND * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
+    let far = BACKGROUND_DEPTH_FACTOR * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
     let place = |(index, &depth): (usize, &f32)| {
         let depth = if depth > 0.0 { f64::from(depth) } else { far };
         camera.unproject(camera.pixel_centre(index), depth)
@@ -112,5 +112,5 @@ pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
 fn sees(camera: &Camera, depths: &[f32], world: DVec3) -> bool {
     let Some(pixel) = camera.sees(world) else { return false };
     let depth = f64::from(depths[pixel.y as usize * camera.width as usize + pixel.x as usize]);
-    depth <= 0.0 || depth >= DEPTH_SHARE * camera.to_camera(world).z
+    depth <= 0.0 || depth >= DEPTH_SHARE_MIN * camera.to_camera(world).z
 }

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 
 /// Distance below the median PSNR from which a view is an outlier, dB. The views of a trained scene usually lie within
 /// 3 dB.
-const ODD: f64 = 6.0;
+const OUTLIER_PSNR_GAP_DB: f64 = 6.0;
 
 scores! {
     /// Scores of one object, in one view or on average over views; `None` if there was nothing to compare.
@@ -116,11 +116,11 @@ impl ObjectTruth<'_> {
 impl ViewScores {
     /// Scores a render, and its label map if both it and the mask of the view are given.
     pub fn new(render: &[[f32; 3]], photo: &Photo, map: Option<&LabelMap>, mask: Option<&LabelMap>) -> Result<Self> {
-        Self::of(render, (photo, photo), map, mask)
+        Self::with_colour_photo(render, (photo, photo), map, mask)
     }
 
     /// The same, with another photo for the scores of colours: that of the pixels that count for them.
-    pub(super) fn of(
+    pub(super) fn with_colour_photo(
         render: &[[f32; 3]],
         (photo, coloured): (&Photo, &Photo),
         map: Option<&LabelMap>,
@@ -305,7 +305,7 @@ impl Scores {
         let mut sorted: Vec<(&str, f64)> = self.views.iter().map(|(name, view)| (name.as_str(), view.psnr)).collect();
         sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (&(name, worst), median) = (sorted.first()?, sorted[sorted.len() / 2].1);
-        (worst < median - ODD).then_some((name, worst, median))
+        (worst < median - OUTLIER_PSNR_GAP_DB).then_some((name, worst, median))
     }
 
     /// Compares the mean PSNR and the mean IoU of the label map with the bounds of `--min-psnr` and `--min-iou`.

@@ -3,7 +3,7 @@
 use crate::scene::LabelMap;
 
 /// Pixels of the smallest region that is no speck.
-const LEAST: usize = 12;
+const REGION_PIXELS_MIN: usize = 12;
 
 /// Returns the number of specks: regions of one id, no label (0) included, connected by edges of pixels, of fewer than 12 px,
 /// inside one other id, at least half of whose pixels have another id in `truth`. Both maps have one size.
@@ -31,7 +31,7 @@ pub fn specks(map: &LabelMap, truth: &LabelMap) -> u64 {
         }
         let inside_one = !around.is_empty() && around.iter().all(|&other| other == around[0]);
         let right = region.iter().filter(|&&index| truth.ids[index] == id).count();
-        specks += u64::from(region.len() < LEAST && inside_one && 2 * right <= region.len());
+        specks += u64::from(region.len() < REGION_PIXELS_MIN && inside_one && 2 * right <= region.len());
     }
     specks
 }

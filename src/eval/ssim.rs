@@ -6,8 +6,8 @@ use crate::scene::Photo;
 use rayon::prelude::*;
 
 /// Half of the window, px.
-const REACH: usize = 5;
-const SIGMA: f64 = 1.5;
+const WINDOW_REACH_PX: usize = 5;
+const WINDOW_SIGMA_PX: f64 = 1.5;
 /// Stabilising constants for values in 0 to 1.
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
@@ -47,11 +47,11 @@ pub fn ssim_map(a: &[f64], b: &[f64], width: usize, height: usize) -> Vec<f64> {
 }
 
 /// Returns the window in one dimension, with sum 1.
-pub fn window() -> [f64; 2 * REACH + 1] {
-    let mut weights = [0.0; 2 * REACH + 1];
+pub fn window() -> [f64; 2 * WINDOW_REACH_PX + 1] {
+    let mut weights = [0.0; 2 * WINDOW_REACH_PX + 1];
     for (index, weight) in weights.iter_mut().enumerate() {
-        let offset = index as f64 - REACH as f64;
-        *weight = (-offset * offset / (2.0 * SIGMA * SIGMA)).exp();
+        let offset = index as f64 - WINDOW_REACH_PX as f64;
+        *weight = (-offset * offset / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)).exp();
     }
     let sum: f64 = weights.iter().sum();
     weights.map(|weight| weight / sum)
@@ -61,8 +61,10 @@ pub fn window() -> [f64; 2 * REACH + 1] {
 fn blur(image: &[f64], width: usize, height: usize) -> Vec<f64> {
     let weights = window();
     let tap = |centre: usize, length: usize, value: &dyn Fn(usize) -> f64| {
-        let first = centre.saturating_sub(REACH);
-        (first..(centre + REACH + 1).min(length)).map(|at| weights[at + REACH - centre] * value(at)).sum::<f64>()
+        let first = centre.saturating_sub(WINDOW_REACH_PX);
+        (first..(centre + WINDOW_REACH_PX + 1).min(length))
+            .map(|at| weights[at + WINDOW_REACH_PX - centre] * value(at))
+            .sum::<f64>()
     };
     let rows: Vec<f64> =
         (0..width * height).into_par_iter().map(|i| tap(i % width, width, &|x| image[i / width * width + x])).collect();

@@ -2,7 +2,7 @@
 //! uniform window of 7 x 7 px inside the image, sample covariance, data range 255, each channel alone.
 
 /// Side of the window, px.
-const SIDE: usize = 7;
+const WINDOW_SIDE_PX: usize = 7;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
@@ -14,10 +14,10 @@ pub fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
 
 /// Returns the mean over all windows and channels; `None` for pictures smaller than the window.
 pub fn ssim8(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> Option<f64> {
-    if width < SIDE || height < SIDE {
+    if width < WINDOW_SIDE_PX || height < WINDOW_SIDE_PX {
         return None;
     }
-    let count = (width - SIDE + 1) * (height - SIDE + 1) * 3;
+    let count = (width - WINDOW_SIDE_PX + 1) * (height - WINDOW_SIDE_PX + 1) * 3;
     let total: f64 = (0..3).map(|channel| channel_sum(a, b, width, height, channel)).sum();
     Some(total / count as f64)
 }
@@ -39,16 +39,20 @@ fn channel_sum(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize, channe
     }
     let window = |x: usize, y: usize| {
         let corner = |x: usize, y: usize| sums[y * stride + x];
-        let (low, right, below, high) =
-            (corner(x, y), corner(x + SIDE, y), corner(x, y + SIDE), corner(x + SIDE, y + SIDE));
+        let (low, right, below, high) = (
+            corner(x, y),
+            corner(x + WINDOW_SIDE_PX, y),
+            corner(x, y + WINDOW_SIDE_PX),
+            corner(x + WINDOW_SIDE_PX, y + WINDOW_SIDE_PX),
+        );
         let sum: [f64; 5] = std::array::from_fn(|i| (high[i] + low[i] - right[i] - below[i]) as f64);
         similarity(sum)
     };
-    (0..=height - SIDE).map(|y| (0..=width - SIDE).map(|x| window(x, y)).sum::<f64>()).sum()
+    (0..=height - WINDOW_SIDE_PX).map(|y| (0..=width - WINDOW_SIDE_PX).map(|x| window(x, y)).sum::<f64>()).sum()
 }
 
 fn similarity(sums: [f64; 5]) -> f64 {
-    let count = (SIDE * SIDE) as f64;
+    let count = (WINDOW_SIDE_PX * WINDOW_SIDE_PX) as f64;
     let [p, q, pp, qq, pq] = sums.map(|sum| sum / count);
     let sample = count / (count - 1.0);
     let (var_p, var_q, cov) = (sample * (pp - p * p), sample * (qq - q * q), sample * (pq - p * q));

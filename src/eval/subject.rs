@@ -4,7 +4,7 @@ use crate::edit::select::extract;
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::render::large::Painter;
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 
 /// A model to draw pictures of, as a whole or some objects of it alone.
@@ -16,13 +16,13 @@ pub trait Subject {
     fn show(&mut self, only: Option<&[u32]>) -> Result<bool>;
 
     /// Draws what is shown.
-    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered>;
+    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render>;
 
     /// Draws the label of each pixel of everything: the one with the largest sum of weights, or that of the main Gaussian,
     /// as in LabelGS.
     fn label_map(&mut self, camera: &Camera, near: f32, by_main: bool) -> Result<LabelMap> {
         if by_main {
-            let rendered = self.render(camera, &RenderOptions::of_main(near))?;
+            let rendered = self.render(camera, &RenderOptions::for_main(near))?;
             return rendered.main_label_map(self.labels().unwrap_or_default());
         }
         self.render(camera, &RenderOptions { sh_degree: Some(0), ..RenderOptions::new(near, Parts::LABELS) })?
@@ -31,7 +31,7 @@ pub trait Subject {
 }
 
 /// A model on the device.
-pub struct Whole<'a> {
+pub struct WholeModel<'a> {
     /// The device.
     pub engine: &'a mut Engine,
     /// The model.
@@ -40,7 +40,7 @@ pub struct Whole<'a> {
     pub min_confidence: f32,
 }
 
-impl Subject for Whole<'_> {
+impl Subject for WholeModel<'_> {
     fn labels(&self) -> Option<&[u32]> {
         self.model.labels.as_deref()
     }
@@ -58,7 +58,7 @@ impl Subject for Whole<'_> {
         Ok(!part.is_empty())
     }
 
-    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         render(self.engine, camera, options)
     }
 }
@@ -72,7 +72,7 @@ impl Subject for Painter<'_> {
         Ok(Painter::show(self, only))
     }
 
-    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+    fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         Painter::render(self, camera, options)
     }
 }

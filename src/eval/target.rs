@@ -15,7 +15,7 @@ pub(crate) struct Target {
 
 impl Target {
     /// Takes the photo of a view.
-    pub(crate) fn of(view: &View, background: [f32; 3]) -> Result<Self> {
+    pub(crate) fn for_view(view: &View, background: [f32; 3]) -> Result<Self> {
         let photo = view.photo()?;
         let Some(rgba) = photo.over(background) else { return Ok(Self { photo, objects: None }) };
         let shown = |(over, own): (&[u8; 4], &[u8; 4])| if own[3] == ALPHA_CLEAR { [0; 4] } else { *over };

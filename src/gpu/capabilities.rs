@@ -23,7 +23,7 @@ pub enum DeviceKind {
 
 /// One line of the table of `labelgs devices`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Need {
+pub struct Requirement {
     /// The feature or limit.
     pub what: &'static str,
     /// True if the engine does not run without it.
@@ -39,7 +39,7 @@ pub struct Need {
 }
 
 /// The need for memory, which compiling does without.
-pub(super) const MEMORY: &str = "memory";
+pub(super) const MEMORY_REQUIREMENT: &str = "memory";
 /// Smallest subgroup size with kernels.
 pub(crate) const SUBGROUP_MIN: u32 = 4;
 /// Smallest size of the device's own subgroups that kernels use; smaller ones are emulated.
@@ -162,7 +162,7 @@ pub struct Capabilities {
     /// Subgroups.
     pub subgroup: Subgroup,
     /// Requirements and optional features, met or not.
-    pub needs: Vec<Need>,
+    pub needs: Vec<Requirement>,
     pub(super) features: Features,
     pub(super) queue_family: u32,
     /// Family of a queue that copies beside the compute queue.
@@ -191,7 +191,7 @@ impl Capabilities {
     }
 
     /// Requirements that the device does not meet.
-    pub fn missing(&self) -> Vec<&Need> {
+    pub fn missing(&self) -> Vec<&Requirement> {
         self.needs.iter().filter(|need| need.is_required && !need.is_met).collect()
     }
 

@@ -7,7 +7,7 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const NAMES: [&str; 9] = [
+const HIDEABLE_FEATURES: [&str; 9] = [
     "memory_model",
     "timeline",
     "robust",
@@ -21,16 +21,17 @@ const NAMES: [&str; 9] = [
 
 /// The names in `LABELGS_HIDE`, separated by commas.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Hidden(Vec<String>);
+pub(super) struct HiddenFeatures(Vec<String>);
 
-impl Hidden {
-    pub(super) fn by_env() -> Result<Self> {
+impl HiddenFeatures {
+    pub(super) fn from_env() -> Result<Self> {
         let Some(text) = lab::var("LABELGS_HIDE") else { return Ok(Self::default()) };
         let names: Vec<String> = text.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect();
-        match names.iter().find(|name| !NAMES.contains(&name.as_str())) {
-            Some(name) => {
-                Err(Error::usage("LABELGS_HIDE", format!("{name} is unknown; expected one of {}", NAMES.join(", "))))
-            }
+        match names.iter().find(|name| !HIDEABLE_FEATURES.contains(&name.as_str())) {
+            Some(name) => Err(Error::usage(
+                "LABELGS_HIDE",
+                format!("{name} is unknown; expected one of {}", HIDEABLE_FEATURES.join(", ")),
+            )),
             None => Ok(Self(names)),
         }
     }

@@ -8,7 +8,7 @@ use ash::vk;
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex};
 
-const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// Checks of the validation layer, if it is installed. Only one mode is active at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct Message {
 }
 
 /// Messages beyond this number are dropped; a broken kernel makes one per invocation.
-const MESSAGES_KEPT: usize = 1000;
+const MESSAGES_MAX: usize = 1000;
 
 /// Messages of the validation layer. The log outlives the device, because destroying the device also makes messages.
 #[derive(Clone, Debug, Default)]
@@ -165,7 +165,7 @@ fn has_layer(entry: &ash::Entry) -> Result<bool> {
     // SAFETY: no preconditions.
     let layers =
         vk_call("vkEnumerateInstanceLayerProperties", || unsafe { entry.enumerate_instance_layer_properties() })?;
-    Ok(layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(LAYER)))
+    Ok(layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)))
 }
 
 fn create(
@@ -176,7 +176,7 @@ fn create(
     messages: &Messages,
 ) -> Result<ash::Instance> {
     let application = vk::ApplicationInfo::default().application_name(c"labelgs").api_version(version);
-    let layers: &[*const c_char] = if validated { &[LAYER.as_ptr()] } else { &[] };
+    let layers: &[*const c_char] = if validated { &[VALIDATION_LAYER.as_ptr()] } else { &[] };
     let extensions: &[*const c_char] = if validated {
         &[ash::ext::debug_utils::NAME.as_ptr(), vk::EXT_VALIDATION_FEATURES_NAME.as_ptr()]
     } else {
@@ -222,7 +222,7 @@ unsafe extern "system" fn on_message(
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
     let is_error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);
     let mut messages = lock(&messages.0);
-    if messages.len() < MESSAGES_KEPT {
+    if messages.len() < MESSAGES_MAX {
         messages.push(Message { is_error, id: text(data.p_message_id_name), text: text(data.p_message) });
     }
     vk::FALSE

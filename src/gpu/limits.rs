@@ -81,7 +81,7 @@ impl Default for PlanLimits {
 
 impl PlanLimits {
     /// Steps in flight on a card, and their data in its own memory: the host runs ahead, and each pass reads a photo from there.
-    pub(crate) fn of_card(self) -> Self {
+    pub(crate) fn for_gpu(self) -> Self {
         Self { frames: 4, stages: true, runs_ahead: true, ..self }
     }
 
@@ -138,7 +138,7 @@ impl Limits {
     /// or G), and `_BUFFERS` (storage buffers per shader), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, the
     /// way of their data from `LABELGS_PHOTOS` (`upload` or `resident`), and whether the host works ahead from `LABELGS_AHEAD`
     /// (`no` or `yes`).
-    pub(super) fn change_by_env(&mut self) -> Result<()> {
+    pub(super) fn change_from_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),
             ("LABELGS_LIMIT_TEXELS", &mut self.plan.max_texel_elements),

@@ -11,12 +11,12 @@ use std::sync::{Arc, Mutex, Weak};
 pub(super) type DeviceLock = Arc<File>;
 
 /// Locks of this process: a device that it opens again, such as a lost one, is its own.
-static OWN: Mutex<BTreeMap<PathBuf, Weak<File>>> = Mutex::new(BTreeMap::new());
+static PROCESS_LOCKS: Mutex<BTreeMap<PathBuf, Weak<File>>> = Mutex::new(BTreeMap::new());
 
 /// Locks a device; `None` if another process holds it.
 pub(super) fn take(folder: &Path, device: &Capabilities) -> Result<Option<DeviceLock>> {
     let path = path(folder, device);
-    let mut own = super::lock(&OWN);
+    let mut own = super::lock(&PROCESS_LOCKS);
     if let Some(lock) = own.get(&path).and_then(Weak::upgrade) {
         return Ok(Some(lock));
     }

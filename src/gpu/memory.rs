@@ -22,12 +22,12 @@ pub(crate) enum MemoryKind {
 
 /// Bytes of all buffers.
 #[derive(Debug, Default)]
-pub(super) struct Used {
+pub(super) struct MemoryUse {
     now: AtomicU64,
     peak: AtomicU64,
 }
 
-impl Used {
+impl MemoryUse {
     fn add(&self, bytes: u64) {
         let now = self.now.fetch_add(bytes, Ordering::Relaxed) + bytes;
         self.peak.fetch_max(now, Ordering::Relaxed);

@@ -27,7 +27,7 @@ mod statistics;
 mod timeline;
 
 pub use cache::PipelineStore;
-pub use capabilities::{Capabilities, DeviceKind, Need, Subgroup};
+pub use capabilities::{Capabilities, DeviceKind, Requirement, Subgroup};
 pub(crate) use capabilities::{SUBGROUP_MAX, SUBGROUP_MIN};
 pub use devices::devices;
 pub use instance::{Message, MessageLog, Validation};
@@ -50,7 +50,7 @@ use crate::lab;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use instance::Instance;
-use select::Picked;
+use select::SelectedDevice;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -107,12 +107,12 @@ pub(crate) enum Lane {
 pub struct Gpu {
     pipelines: Mutex<HashMap<PipelineKey, PipelineSlot>>,
     allocator: Mutex<Option<Allocator>>,
-    used: memory::Used,
+    used: memory::MemoryUse,
     queue: Mutex<vk::Queue>,
     /// The queue for copies beside the compute queue.
     transfer: Option<Mutex<vk::Queue>>,
     names: Option<ash::ext::debug_utils::Device>,
-    statistics: Option<statistics::Functions>,
+    statistics: Option<statistics::StatisticFunctions>,
     cache: Mutex<cache::PipelineCache>,
     device: ash::Device,
     capabilities: Capabilities,
@@ -125,7 +125,7 @@ impl Gpu {
     /// Opens a device. The error lists all devices and the missing features of each.
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
-        let Picked { physical, mut capabilities, lock } = select::pick(&instance, options)?;
+        let SelectedDevice { physical, mut capabilities, lock } = select::pick(&instance, options)?;
         capabilities.choose_subgroup(options)?;
         let device = select::open(&instance, physical, &capabilities, options)?;
         // SAFETY: the device has this family and was created with one queue of it.
@@ -147,13 +147,13 @@ impl Gpu {
             Error::NoDevice(format!("the memory allocator does not start: {error}"))
         })?;
         let names = instance.has_debug_utils().then(|| ash::ext::debug_utils::Device::new(instance.raw(), &device));
-        let statistics = options.statistics.then(|| statistics::Functions::new(instance.raw(), &device));
+        let statistics = options.statistics.then(|| statistics::StatisticFunctions::new(instance.raw(), &device));
         let cache = cache::PipelineCache::new(&device, &capabilities, options.pipelines.as_ref());
         Ok(Arc::new(Self {
             pipelines: Mutex::new(HashMap::new()),
             cache: Mutex::new(cache),
             allocator: Mutex::new(Some(allocator)),
-            used: memory::Used::default(),
+            used: memory::MemoryUse::default(),
             queue: Mutex::new(queue),
             transfer,
             names,

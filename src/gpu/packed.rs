@@ -146,7 +146,7 @@ fn put(out: &mut Vec<u32>, opcode: u32, operands: &[u32]) {
 
 /// Types and variables of a module.
 #[derive(Default)]
-struct Found {
+struct StorageTypes {
     bindings: BTreeMap<u32, u32>,
     strides: BTreeMap<u32, u32>,
     /// Element bytes of runtime arrays.
@@ -159,7 +159,7 @@ struct Found {
     functions: u32,
 }
 
-impl Found {
+impl StorageTypes {
     fn add(&mut self, opcode: u32, of: &[u32]) {
         match (opcode, of) {
             (op::DECORATE, &[_, id, op::BINDING, number]) => drop(self.bindings.insert(id, number)),
@@ -182,7 +182,7 @@ impl Module {
         storage: &[&BindingDesc],
         (windows, first): (Windows<'_>, u32),
     ) -> Result<Self, String> {
-        let mut found = Found::default();
+        let mut found = StorageTypes::default();
         all.iter().for_each(|(opcode, of)| found.add(*opcode, of));
         if found.functions != 1 {
             return Err(format!("{} functions", found.functions));

@@ -1,8 +1,10 @@
 //! Queries that fill [`Capabilities`].
 
 use super::call::vk_call;
-use super::capabilities::{Capabilities, DeviceKind, Features, MEMORY, Need, SUBGROUP_MAX, Subgroup};
-use super::hidden::Hidden;
+use super::capabilities::{
+    Capabilities, DeviceKind, Features, MEMORY_REQUIREMENT, Requirement, SUBGROUP_MAX, Subgroup,
+};
+use super::hidden::HiddenFeatures;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
 use ash::vk;
@@ -25,7 +27,7 @@ impl Capabilities {
         let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
-        let hidden = Hidden::by_env()?;
+        let hidden = HiddenFeatures::from_env()?;
         let statistics = has(ash::khr::pipeline_executable_properties::NAME);
         let mut features = features(instance, physical, has_size_control, statistics);
         hidden.features(&mut features);
@@ -50,7 +52,7 @@ impl Capabilities {
         let memory = memory(instance, physical, has(ash::ext::memory_budget::NAME));
         let timestamp_bits = family.map_or(0, |(_, properties)| properties.timestamp_valid_bits);
         let mut limits = limits(&core, &eleven, max_buffer, memory, timestamp_bits);
-        limits.change_by_env()?;
+        limits.change_from_env()?;
         hidden.limits(&mut limits);
         let bindings = limits.plan.max_storage_buffers;
         limits.plan = limits.plan.packed();
@@ -179,7 +181,7 @@ fn limits(
         max_memory,
         ..PlanLimits::default()
     };
-    let plan = if kind(properties.device_type) == DeviceKind::Cpu { plan } else { plan.of_card() };
+    let plan = if kind(properties.device_type) == DeviceKind::Cpu { plan } else { plan.for_gpu() };
     Limits {
         plan,
         max_group_size: core.max_compute_work_group_size,
@@ -220,7 +222,7 @@ fn subgroup(
 }
 
 /// Compares the requirements and optional features with the device.
-fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
+fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Requirement> {
     let (limits, features) = (&found.limits, &found.features);
     let (major, minor, patch) = found.api_version;
     let flag = |what, is_met, reason| need(what, is_met, "yes", if is_met { "yes" } else { "no" }.to_owned(), reason);
@@ -230,7 +232,13 @@ fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
     let mut needs = vec![
         need("Vulkan", (major, minor) >= (1, 2), "1.2", format!("{major}.{minor}.{patch}"), "everything"),
         flag("compute queue", has_queue, "everything"),
-        need(MEMORY, limits.heap >= MEMORY_MIN, "64 MiB", format!("{} MiB", limits.heap >> 20), "everything"),
+        need(
+            MEMORY_REQUIREMENT,
+            limits.heap >= MEMORY_MIN,
+            "64 MiB",
+            format!("{} MiB", limits.heap >> 20),
+            "everything",
+        ),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
         least("workgroup size", 128, limits.max_invocations, "projection"),
         least("storage buffers per shader", WINDOWS_MIN, bindings, "all buffers share them, if they are few"),
@@ -240,8 +248,8 @@ fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Need> {
 }
 
 /// Optional features; without them, the engine runs with a drawback, which the reason says.
-fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
-    let wish = |what, is_met, found: String, reason| Need {
+fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Requirement; 5] {
+    let wish = |what, is_met, found: String, reason| Requirement {
         is_required: false,
         ..need(what, is_met, "optional", found, reason)
     };
@@ -257,8 +265,8 @@ fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Need; 5] {
     ]
 }
 
-fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &'static str) -> Need {
-    Need { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
+fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &'static str) -> Requirement {
+    Requirement { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
 }
 
 fn text<E>(name: std::result::Result<&std::ffi::CStr, E>) -> String {

@@ -2,7 +2,7 @@
 
 use super::GpuOptions;
 use super::call::vk_call;
-use super::capabilities::{Capabilities, MEMORY};
+use super::capabilities::{Capabilities, MEMORY_REQUIREMENT};
 use super::instance::Instance;
 use super::lock::{self, DeviceLock};
 use super::statistics;
@@ -21,7 +21,7 @@ pub(super) fn all(instance: &Instance) -> Result<Vec<Found>> {
 }
 
 /// A device, and the lock on it if it came from a list.
-pub(super) struct Picked {
+pub(super) struct SelectedDevice {
     pub(super) physical: vk::PhysicalDevice,
     pub(super) capabilities: Capabilities,
     pub(super) lock: Option<DeviceLock>,
@@ -29,7 +29,7 @@ pub(super) struct Picked {
 
 /// Picks a device by index, UUID or part of its name, or the first free one of a list of these; by default the best that
 /// meets the requirements.
-pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<Picked> {
+pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<SelectedDevice> {
     let devices = all(instance)?;
     if devices.is_empty() {
         return Err(Error::NoDevice("the Vulkan loader found no device; install a Vulkan driver".to_owned()));
@@ -54,7 +54,9 @@ fn usable(devices: &[Found], wanted: Option<&str>, options: &GpuOptions) -> Resu
             return Err(Error::NoDevice(format!("none matches {wanted}; found: {}", listing())));
         }
     }
-    found.retain(|(_, device)| device.missing().iter().all(|need| options.statistics && need.what == MEMORY));
+    found.retain(|(_, device)| {
+        device.missing().iter().all(|need| options.statistics && need.what == MEMORY_REQUIREMENT)
+    });
     if found.is_empty() {
         return Err(Error::NoDevice(format!("none meets the requirements: {}", listing())));
     }
@@ -62,13 +64,13 @@ fn usable(devices: &[Found], wanted: Option<&str>, options: &GpuOptions) -> Resu
     Ok(found)
 }
 
-fn best(usable: Vec<Found>) -> Result<Picked> {
+fn best(usable: Vec<Found>) -> Result<SelectedDevice> {
     let best = usable.into_iter().next().ok_or_else(|| Error::Bug("no device is left".to_owned()))?;
-    Ok(Picked { physical: best.0, capabilities: best.1, lock: None })
+    Ok(SelectedDevice { physical: best.0, capabilities: best.1, lock: None })
 }
 
 /// Locks the first device that no other process holds.
-fn first_free(listed: &[Found], options: &GpuOptions) -> Result<Picked> {
+fn first_free(listed: &[Found], options: &GpuOptions) -> Result<SelectedDevice> {
     let Some(folder) = &options.locks else {
         return Err(Error::usage(
             Setting("device"),
@@ -77,7 +79,7 @@ fn first_free(listed: &[Found], options: &GpuOptions) -> Result<Picked> {
     };
     for (physical, device) in listed {
         if let Some(lock) = lock::take(folder, device)? {
-            return Ok(Picked { physical: *physical, capabilities: device.clone(), lock: Some(lock) });
+            return Ok(SelectedDevice { physical: *physical, capabilities: device.clone(), lock: Some(lock) });
         }
     }
     let names = listed.iter().map(|(_, device)| format!("{}: {}", device.index, device.name)).collect::<Vec<_>>();

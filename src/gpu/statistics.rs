@@ -17,7 +17,7 @@ pub struct Statistic {
 }
 
 /// The extension's functions.
-pub(super) type Functions = ash::khr::pipeline_executable_properties::Device;
+pub(super) type StatisticFunctions = ash::khr::pipeline_executable_properties::Device;
 
 /// The error for a driver without the extension.
 pub(super) fn unknown(device: &Capabilities) -> Error {

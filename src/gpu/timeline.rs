@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Time for which a wait asks before it sleeps.
-const POLLED: Duration = Duration::from_micros(200);
+const POLLING_TIME_MAX: Duration = Duration::from_micros(200);
 
 /// A timeline semaphore that starts at 0.
 pub(crate) struct Timeline {
@@ -42,7 +42,7 @@ impl Timeline {
     /// sleeps wakes up 30 to 60 us late.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
         let start = Instant::now();
-        while !self.gpu.is_cpu() && start.elapsed() < POLLED {
+        while !self.gpu.is_cpu() && start.elapsed() < POLLING_TIME_MAX {
             if self.is_reached(value)? {
                 return Ok(());
             }

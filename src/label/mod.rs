@@ -11,4 +11,4 @@ pub mod strokes;
 pub mod vote;
 
 pub use vote::decide::Decision;
-pub use vote::model::{Counting, columns_of, label_by_lift, label_by_votes, vote_engine};
+pub use vote::model::{VoteOptions, columns_of, label_by_lift, label_by_votes, vote_engine};

@@ -28,12 +28,12 @@ pub fn seeds(
     file: &Path,
 ) -> Result<Vec<Seed>> {
     let sizes = strokes.iter().map(|(_, view)| view.camera.size());
-    let mut engine = Engine::new(gpu, EngineSize::of_model(model, sizes), SchedulerOptions::default())?;
+    let mut engine = Engine::new(gpu, EngineSize::for_model(model, sizes), SchedulerOptions::default())?;
     engine.upload_model(model)?;
     let (mut shown, mut seeds) = (BTreeMap::<&str, Vec<i32>>::new(), Vec::new());
     for (number, &(stroke, view)) in (1..).zip(strokes) {
         if !shown.contains_key(view.name.as_str()) {
-            let rendered = render(&mut engine, &view.camera, &RenderOptions::of_main(near))?;
+            let rendered = render(&mut engine, &view.camera, &RenderOptions::for_main(near))?;
             shown.insert(&view.name, rendered.top_id);
         }
         let wrong = |problem: String| Error::data(file, place(number), problem);

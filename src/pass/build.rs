@@ -150,7 +150,7 @@ pub(crate) fn over_splats() -> Grid {
 }
 
 /// Grid of one workgroup.
-pub(crate) const ONE: Grid = Grid::Groups(1, 1, 1);
+pub(crate) const ONE_GROUP: Grid = Grid::Groups(1, 1, 1);
 
 /// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a kernel's pass.
 ///

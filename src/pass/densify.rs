@@ -1,7 +1,7 @@
 //! Clones, splits and prunes on the device: marks and counts Gaussians, then rewrites attributes in the new order.
 
 use super::build::{Builder, Count, args, over_gaussians};
-use super::optimize::ATTRIBUTES;
+use super::optimize::MODEL_ATTRIBUTES;
 use super::scan::{self, Total};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
@@ -56,7 +56,7 @@ pub(super) fn apply(b: &mut Builder, labels: bool) {
         densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
         quats: Buf::QUATS,
     } [], over_gaussians());
-    for a in &ATTRIBUTES {
+    for a in &MODEL_ATTRIBUTES {
         let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);
         let moments = a.moments(b.half).iter().map(|&plane| (plane, true));
         let planes = [(a.planes[0], false)].into_iter().skip(usize::from(geometry)).chain(moments);

@@ -17,7 +17,7 @@ pub struct CompiledKernel {
 }
 
 /// Names under which drivers (Mesa's for AMD and Intel, NVIDIA's) tell the same figure.
-pub const FIGURES: [(&str, &[&str]); 7] = [
+pub const STATISTIC_NAMES: [(&str, &[&str]); 7] = [
     ("registers", &["VGPRs", "Register Count", "Max live registers"]),
     ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size"]),
     ("shared B", &["LDS size", "Shared Memory Size", "Workgroup Memory Size"]),
@@ -37,7 +37,11 @@ impl CompiledKernel {
 
     /// Registers that did not fit, and were put into memory.
     pub fn spills(&self) -> f64 {
-        FIGURES.iter().find(|(name, _)| *name == "spills").and_then(|(_, names)| self.figure(names)).unwrap_or(0.0)
+        STATISTIC_NAMES
+            .iter()
+            .find(|(name, _)| *name == "spills")
+            .and_then(|(_, names)| self.figure(names))
+            .unwrap_or(0.0)
     }
 }
 

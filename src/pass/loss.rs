@@ -3,24 +3,24 @@
 //! Two forms, chosen by [`KernelShape::loss_tile`]: a dispatch for each direction of each separable filter, without barriers;
 //! or one for all, whose tiles go through shared memory.
 
-use super::build::{Builder, ONE};
+use super::build::{Builder, ONE_GROUP};
 use super::{KernelShape, Supervision};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
 /// Rows or columns that one lane filters in registers (glsl/include/ssim.glsl).
-const STRIP: u32 = 8;
+const STRIP_PIXELS: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
 pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     b.list.stage = Stage::LOSS;
     b.loss_partials = partials(b.shape, width, height);
     if b.shape.loss_tile > 0 {
-        return by_tiles(b, width, height);
+        return tiled_loss(b, width, height);
     }
-    let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP), channels);
-    let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP), 3);
+    let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP_PIXELS), channels);
+    let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP_PIXELS), 3);
     pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
         columns(3));
     pass!(b, ssim_rows { step: Buf::STEP, moments: Buf::SSIM_A, target: Buf::TARGET, v_moments: Buf::SSIM_B } [],
@@ -35,7 +35,7 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     }
 }
 
-fn by_tiles(b: &mut Builder, width: u32, height: u32) {
+fn tiled_loss(b: &mut Builder, width: u32, height: u32) {
     let side = b.shape.loss_tile;
     let macros = (b.supervision.has_layers(), b.exposure.is_some());
     pass!(b, loss_tile(labels: macros.0, exposure: macros.1) {
@@ -73,7 +73,7 @@ pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
     pass!(b, expose_reduce {
         step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
         v_shared: Buf::V_SHARED,
-    } [stride: stride, rows: rows, row: row, partials: count], ONE);
+    } [stride: stride, rows: rows, row: row, partials: count], ONE_GROUP);
 }
 
 /// Grid over the pixels of an image, `each` per workgroup.
@@ -88,13 +88,13 @@ pub(super) fn reduce(b: &mut Builder) {
     pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
         disagreement: Buf::DISAGREEMENT,
-    } [partials: b.loss_partials], ONE);
+    } [partials: b.loss_partials], ONE_GROUP);
 }
 
 /// Number of partial loss sums of an image: one for each tile, or for each subgroup of each strip.
 pub(crate) fn partials(shape: &KernelShape, width: u32, height: u32) -> u32 {
     match shape.loss_tile {
-        0 => width.div_ceil(64) * (64 / shape.subgroup) * height.div_ceil(STRIP),
+        0 => width.div_ceil(64) * (64 / shape.subgroup) * height.div_ceil(STRIP_PIXELS),
         side => width.div_ceil(side) * height.div_ceil(side),
     }
 }

@@ -21,8 +21,8 @@ mod tile;
 mod update;
 
 pub use build::Builder;
-pub use kernels::{CompiledKernel, FIGURES, compiled_kernels};
-pub(crate) use optimize::{ATTRIBUTES, Attribute, SHARED_PLANES};
+pub use kernels::{CompiledKernel, STATISTIC_NAMES, compiled_kernels};
+pub(crate) use optimize::{Attribute, MODEL_ATTRIBUTES, SHARED_PLANES};
 pub use shape::{GroupBlend, KernelShape, Update};
 pub(crate) use tile::TileSort;
 pub(crate) use update::is_fused;

@@ -24,7 +24,7 @@ pub(crate) struct Attribute {
 }
 
 /// All attributes.
-pub(crate) const ATTRIBUTES: [Attribute; 7] = [
+pub(crate) const MODEL_ATTRIBUTES: [Attribute; 7] = [
     attribute([Buf::MEANS, Buf::M_MEANS, Buf::U_MEANS], Buf::V_MEANS, 1, 0, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::SCALES, Buf::M_SCALES, Buf::U_SCALES], Buf::V_SCALES, 1, 1, 0, constants::ARGS_GAUSSIANS),
     attribute([Buf::QUATS, Buf::M_QUATS, Buf::U_QUATS], Buf::V_QUATS, 1, 2, 0, constants::ARGS_GAUSSIANS),
@@ -53,7 +53,7 @@ pub(crate) const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_S
 pub(super) fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::OPTIMISE;
-    for a in ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
+    for a in MODEL_ATTRIBUTES.iter().filter(|a| a.from_degree <= degree) {
         update(b, false, (a.planes, a.gradient), [a.stride, a.rate, seen_only], args(a.args));
     }
 }
@@ -125,14 +125,14 @@ pub(super) fn opacity_reset(b: &mut Builder) {
 
 #[cfg(test)]
 mod tests {
-    use super::ATTRIBUTES;
+    use super::MODEL_ATTRIBUTES;
     use crate::pass::buffers::TABLE;
 
     /// Three vec4 of geometry, and 16 rgb triples without padding; moments and gradients likewise.
     #[test]
     fn a_gaussian_of_degree_3_has_15_vec4() {
         for (degree, vectors) in [(0, 4), (1, 6), (2, 10), (3, 15)] {
-            let attributes = || ATTRIBUTES.iter().filter(|a| a.from_degree <= degree);
+            let attributes = || MODEL_ATTRIBUTES.iter().filter(|a| a.from_degree <= degree);
             assert_eq!(attributes().map(|a| a.stride).sum::<u32>(), vectors, "degree {degree}");
             for set in 0..4 {
                 let planes = attributes().map(|a| if set < 3 { a.planes[set] } else { a.gradient });

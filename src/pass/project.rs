@@ -1,6 +1,6 @@
 //! Projects Gaussians to splats in depth order, and carries gradients back.
 
-use super::build::{Builder, Count, ONE, args, over_gaussians, over_splats};
+use super::build::{Builder, Count, ONE_GROUP, args, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
 use crate::pass::build::pass;
@@ -74,7 +74,7 @@ fn project_visible(b: &mut Builder, keys: Buf) {
 /// Corrects the pose of the step's camera by rows `row` and the next of the step.
 pub(crate) fn pose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::PROJECT;
-    pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE);
+    pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE_GROUP);
 }
 
 /// Writes the gradient of that correction.
@@ -90,7 +90,7 @@ pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
     pass!(b, pose_reduce {
         step: Buf::STEP, counters: Buf::COUNTERS, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED,
         pose_partials: partials, v_shared: Buf::V_SHARED,
-    } [row: row], ONE);
+    } [row: row], ONE_GROUP);
 }
 
 /// Carries the gradients of splats back to the parameters of their Gaussians.

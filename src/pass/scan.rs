@@ -1,6 +1,6 @@
 //! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait, so it runs on any device.
 
-use super::build::{Builder, Count, ONE};
+use super::build::{Builder, Count, ONE_GROUP};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid};
 
@@ -53,7 +53,7 @@ fn reduce_then_scan(b: &mut Builder, (values, offsets): (Buf, Buf), count: Count
     } [count_source: count as u32, lanes: lanes], groups);
     pass!(b, scan_spine {
         partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS, step: Buf::STEP, dispatch_args: Buf::DISPATCH_ARGS,
-    } [lanes: lanes, total: total as u32], ONE);
+    } [lanes: lanes, total: total as u32], ONE_GROUP);
     pass!(b, scan_apply(flag: flag) {
         step: Buf::STEP, counters: Buf::COUNTERS, values: values, partials: Buf::SCAN_PARTIALS,
         offsets: offsets,

@@ -106,7 +106,7 @@ const TEXELS_MIN: u64 = 1 << 26;
 
 impl KernelShape {
     /// Returns the shape for a device.
-    pub fn of(device: &Capabilities) -> Self {
+    pub fn for_device(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
         let limits = &device.limits.plan;
         let most_texels = shaders::ALL.iter().map(|shader| shader.texel_buffers()).max().unwrap_or(0);

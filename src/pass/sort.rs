@@ -1,7 +1,7 @@
 //! Stable radix sort of (key, value) pairs by the low bits of the key.
 
 use super::KernelShape;
-use super::build::{Builder, Count, ONE};
+use super::build::{Builder, Count, ONE_GROUP};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage, Work};
 
@@ -67,7 +67,7 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
             step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
             histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
         } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
-        pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: workgroups << digit_bits], ONE);
+        pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: workgroups << digit_bits], ONE_GROUP);
         pass!(b, radix_scatter {
             step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
             values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,

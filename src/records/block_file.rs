@@ -9,11 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Name of the file of all blocks, in the folder of the blocks and in that of the merged model.
-pub(crate) const BLOCKS: &str = "blocks.json";
+pub(crate) const BLOCKS_FILE: &str = "blocks.json";
 /// Name of the file of a block, in its folder and in that of its training.
-pub(crate) const BLOCK: &str = "block.json";
+pub(crate) const BLOCK_FILE: &str = "block.json";
 /// Name of the model of what no block trains.
-pub(crate) const REST: &str = "rest.ply";
+pub(crate) const REST_MODEL_FILE: &str = "rest.ply";
 /// Version of both layouts.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
@@ -145,7 +145,7 @@ pub struct BlocksFile {
 impl BlocksFile {
     /// Reads the file in a folder, with the checksum by which blocks know it.
     pub fn read(folder: &Path) -> Result<(Self, u32)> {
-        let path = folder.join(BLOCKS);
+        let path = folder.join(BLOCKS_FILE);
         require(&path, folder, "blocks")?;
         let text = read::bytes(&path)?;
         let file: Self = read::parse_json(&path, &text, "expected the file of all blocks; split the scene again")?;
@@ -167,7 +167,7 @@ impl BlocksFile {
 impl BlockFile {
     /// Reads the file in the folder of a block.
     pub fn read(folder: &Path) -> Result<Self> {
-        let path = folder.join(BLOCK);
+        let path = folder.join(BLOCK_FILE);
         require(&path, folder, "a block")?;
         let file: Self = read::json(&path, "expected the file of a block; split the scene again")?;
         check_version(&path, file.schema_version)?;
@@ -179,7 +179,7 @@ impl BlockFile {
 
     /// Writes the file.
     pub fn write(&self, folder: &Path) -> Result<()> {
-        atomic::write_json(&folder.join(BLOCK), self)
+        atomic::write_json(&folder.join(BLOCK_FILE), self)
     }
 
     /// Returns the names of all its views.

@@ -22,7 +22,7 @@ pub const VERSION: u32 = 3;
 
 const MAGIC: [u8; 8] = *b"labelgsC";
 /// Number of bytes before the checksummed part.
-const HEADER: usize = 24;
+const HEADER_BYTES: usize = 24;
 
 #[cfg(target_endian = "big")]
 compile_error!("checkpoints have the words of planes as the machine has them, little-endian");
@@ -95,10 +95,10 @@ impl Checkpoint {
         let mut file = read::open(path)?;
         let length = file.get_ref().length().map_err(Error::read(path))?;
         check(&mut file, path, length)?;
-        file.seek(SeekFrom::Start(HEADER as u64)).map_err(Error::read(path))?;
+        file.seek(SeekFrom::Start(HEADER_BYTES as u64)).map_err(Error::read(path))?;
         // The checksum was right: an inconsistency from here on was written that way.
         let odd = |problem: String| Error::data(path, "contents", problem);
-        let mut rest = length - HEADER as u64;
+        let mut rest = length - HEADER_BYTES as u64;
         let mut take = |bytes: u64| {
             rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than the file has")))?;
             Ok::<usize, Error>(bytes as usize)
@@ -146,14 +146,14 @@ impl Write for Body {
 /// Checks the header, the checksum and the length (`length` bytes) of a file.
 fn check(file: &mut impl Read, path: &Path, length: u64) -> Result<()> {
     let refuse = |problem: String| Err(Error::data(path, "", problem));
-    let mut header = Vec::with_capacity(HEADER);
-    file.take(HEADER as u64).read_to_end(&mut header).map_err(Error::read(path))?;
+    let mut header = Vec::with_capacity(HEADER_BYTES);
+    file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(Error::read(path))?;
     let magic = &header[..header.len().min(MAGIC.len())];
     if !MAGIC.starts_with(magic) {
         return refuse("is no checkpoint of labelgs".to_owned());
     }
-    let Ok::<[u8; HEADER], _>(header) = header.try_into() else {
-        return refuse(format!("was cut short: {length} bytes, a checkpoint has more than {HEADER}"));
+    let Ok::<[u8; HEADER_BYTES], _>(header) = header.try_into() else {
+        return refuse(format!("was cut short: {length} bytes, a checkpoint has more than {HEADER_BYTES}"));
     };
     let u32_at = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
     let version = u32_at(8);
@@ -164,7 +164,7 @@ fn check(file: &mut impl Read, path: &Path, length: u64) -> Result<()> {
         ));
     }
     let body = u64::from(u32_at(16)) | u64::from(u32_at(20)) << 32;
-    let whole = body.saturating_add(HEADER as u64);
+    let whole = body.saturating_add(HEADER_BYTES as u64);
     if length != whole {
         let what = if length < whole { "was cut short" } else { "grew" };
         return refuse(format!("{what}: {length} bytes, {whole} were written"));

@@ -6,12 +6,12 @@ use crate::files::read;
 use std::path::{Path, PathBuf};
 
 /// Name of the folder inside the folder of the run.
-pub(crate) const FOLDER: &str = "checkpoints";
-const EXTENSION: &str = ".ckpt";
+pub(crate) const CHECKPOINTS_FOLDER: &str = "checkpoints";
+const CHECKPOINT_EXTENSION: &str = ".ckpt";
 
 /// A checkpoint, known by its file name only.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Found {
+pub struct CheckpointFile {
     /// Number in the file name; larger is newer.
     pub number: u64,
     /// Step after which it was written.
@@ -21,26 +21,26 @@ pub struct Found {
 }
 
 /// Lists the checkpoints in the folder of a run, the newest first; empty without the folder.
-pub fn list(out: &Path) -> Result<Vec<Found>> {
-    let folder = out.join(FOLDER);
+pub fn list(out: &Path) -> Result<Vec<CheckpointFile>> {
+    let folder = out.join(CHECKPOINTS_FOLDER);
     let entries = match read::folder(&folder) {
         Err(Error::Read { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
         other => other?,
     };
-    let mut found: Vec<Found> = entries.into_iter().filter_map(parse).collect();
+    let mut found: Vec<CheckpointFile> = entries.into_iter().filter_map(parse).collect();
     found.sort_unstable_by(|a, b| b.cmp(a));
     Ok(found)
 }
 
-fn parse(path: PathBuf) -> Option<Found> {
-    let (number, step) = path.file_name()?.to_str()?.strip_suffix(EXTENSION)?.split_once("-step-")?;
-    Some(Found { number: number.parse().ok()?, step: step.parse().ok()?, path })
+fn parse(path: PathBuf) -> Option<CheckpointFile> {
+    let (number, step) = path.file_name()?.to_str()?.strip_suffix(CHECKPOINT_EXTENSION)?.split_once("-step-")?;
+    Some(CheckpointFile { number: number.parse().ok()?, step: step.parse().ok()?, path })
 }
 
 /// Returns the path for a new checkpoint.
 pub fn next(out: &Path, step: u32) -> Result<PathBuf> {
     let newest = list(out)?.first().map_or(0, |found| found.number);
-    Ok(out.join(FOLDER).join(format!("{}-step-{step}{EXTENSION}", newest.saturating_add(1))))
+    Ok(out.join(CHECKPOINTS_FOLDER).join(format!("{}-step-{step}{CHECKPOINT_EXTENSION}", newest.saturating_add(1))))
 }
 
 /// Removes all checkpoints except `kept`. Leftovers do no harm, so a failure is only logged.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Name of the file in the folder of a run.
-pub(crate) const FILE: &str = "occlusion.json";
+pub(crate) const OCCLUSION_FILE: &str = "occlusion.json";
 const SCHEMA_VERSION: u32 = 1;
 
 /// A table of occluders.

@@ -6,7 +6,7 @@ use etcetera::base_strategy::{BaseStrategy, choose_native_strategy};
 use std::path::PathBuf;
 
 const MAGIC: [u8; 8] = *b"labelgsP";
-const HEADER: usize = 20;
+const HEADER_BYTES: usize = 20;
 
 /// A folder of pipeline caches.
 #[derive(Clone, Debug)]
@@ -21,13 +21,13 @@ impl PipelineFolder {
     }
 
     /// Uses the folder of the user's caches.
-    pub fn of_user() -> Option<Self> {
+    pub fn for_user() -> Option<Self> {
         user_cache().map(Self::new)
     }
 
     /// Returns the folder for locks of the user's processes: that of the caches, else the system's for temporary files.
-    pub fn of_locks() -> PathBuf {
-        Self::of_user().map_or_else(|| std::env::temp_dir().join("labelgs"), |cache| cache.folder)
+    pub fn locks_folder() -> PathBuf {
+        Self::for_user().map_or_else(|| std::env::temp_dir().join("labelgs"), |cache| cache.folder)
     }
 
     fn path(&self, device: &str) -> PathBuf {
@@ -72,7 +72,7 @@ impl PipelineStore for PipelineFolder {
 
 /// Returns the data if it is undamaged: a driver may trust it without checks.
 fn unpack(bytes: &[u8]) -> Option<&[u8]> {
-    let (header, data) = bytes.split_at_checked(HEADER)?;
+    let (header, data) = bytes.split_at_checked(HEADER_BYTES)?;
     let (magic, rest) = header.split_at(MAGIC.len());
     let (sum, length) = rest.split_at(4);
     let whole =

@@ -8,7 +8,7 @@ pub struct Rates(pub [f64; 8]);
 
 /// Parameters with their moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Optimised {
+pub struct AdamState {
     /// Parameters.
     pub row: Row,
     /// First moments.
@@ -18,7 +18,7 @@ pub struct Optimised {
 }
 
 /// One update of one Gaussian; `step` counts from 1 and corrects the bias of the moments.
-pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &Optimised, gradient: &Row) -> Optimised {
+pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &AdamState, gradient: &Row) -> AdamState {
     let (mut row, mut m, mut u) = (state.row.floats(), state.m.floats(), state.u.floats());
     let g = gradient.floats();
     for (group, rate) in Group::ALL.into_iter().zip(rates.0) {
@@ -26,7 +26,7 @@ pub fn adam(rules: &Rules, rates: &Rates, step: u32, state: &Optimised, gradient
             [row[i], m[i], u[i]] = adam_value(rules, rate, step, [row[i], m[i], u[i]], g[i]);
         }
     }
-    Optimised { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
+    AdamState { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
 }
 
 /// One update of one parameter with its moments; `step` counts from 1.

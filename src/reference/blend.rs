@@ -78,18 +78,18 @@ pub fn reach(rules: &Rules, splat: &Splat) -> Option<[f64; 2]> {
 }
 
 /// Splats with their boxes, one pixel wider than exact, so that margins near the border are included.
-struct Boxed<'a> {
+struct BoxedSplats<'a> {
     splats: &'a [Splat],
     reaches: Vec<[f64; 2]>,
 }
 
-impl<'a> Boxed<'a> {
+impl<'a> BoxedSplats<'a> {
     fn new(rules: &Rules, splats: &'a [Splat]) -> Self {
         let reaches = splats.iter().map(|s| reach(rules, s).map_or([-1.0; 2], |r| r.map(|v| v + 1.0)));
         Self { splats, reaches: reaches.collect() }
     }
 
-    fn near(&self, at: [f64; 2]) -> impl Iterator<Item = (usize, &Splat)> {
+    fn splats_near(&self, at: [f64; 2]) -> impl Iterator<Item = (usize, &Splat)> {
         let inside = move |place: usize, splat: &Splat| {
             (splat.mean2d[0] - at[0]).abs() <= self.reaches[place][0]
                 && (splat.mean2d[1] - at[1]).abs() <= self.reaches[place][1]
@@ -146,14 +146,14 @@ pub struct Pixel {
 
 /// An image of pixels, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blended {
+pub struct BlendedImage {
     /// Width and height, px.
     pub size: (usize, usize),
     /// `[height, width]`.
     pub pixels: Vec<Pixel>,
 }
 
-impl Blended {
+impl BlendedImage {
     /// Colours of the pixels.
     pub fn colours(&self) -> Vec<[f64; 3]> {
         self.pixels.iter().map(|pixel| pixel.colour).collect()
@@ -201,24 +201,24 @@ pub fn centre(index: usize, width: usize) -> [f64; 2] {
 }
 
 /// Blends depth-ordered splats over a background.
-pub fn blend_forward(rules: &Rules, splats: &[Splat], size: (usize, usize), background: [f64; 3]) -> Blended {
-    layer_forward(rules, &Boxed::new(rules, splats), |_| true, size, background)
+pub fn blend_forward(rules: &Rules, splats: &[Splat], size: (usize, usize), background: [f64; 3]) -> BlendedImage {
+    layer_forward(rules, &BoxedSplats::new(rules, splats), |_| true, size, background)
 }
 
 /// Blends the splats of `member`.
 fn layer_forward(
     rules: &Rules,
-    boxed: &Boxed,
+    boxed: &BoxedSplats,
     member: impl Fn(&Splat) -> bool,
     size: (usize, usize),
     background: [f64; 3],
-) -> Blended {
+) -> BlendedImage {
     let pixel = |index: usize| {
         let at = centre(index, size.0);
-        let members = boxed.near(at).filter(|(_, splat)| member(splat));
+        let members = boxed.splats_near(at).filter(|(_, splat)| member(splat));
         shade(boxed.splats, &trace(rules, members, at), background)
     };
-    Blended { size, pixels: (0..size.0 * size.1).map(pixel).collect() }
+    BlendedImage { size, pixels: (0..size.0 * size.1).map(pixel).collect() }
 }
 
 /// Gradients of splats, with the margins of the decisions that affect them.
@@ -247,7 +247,7 @@ pub struct Upstream {
 
 impl Upstream {
     /// Gradient of a loss that depends on colours only.
-    pub fn of_colours(colours: &[[f64; 3]]) -> Self {
+    pub fn from_colours(colours: &[[f64; 3]]) -> Self {
         Self { colours: colours.to_vec(), alphas: vec![0.0; colours.len()] }
     }
 }
@@ -260,13 +260,13 @@ pub fn blend_backward(
     background: [f64; 3],
     v_image: &Upstream,
 ) -> SplatGradients {
-    layer_backward(rules, &Boxed::new(rules, splats), |_| true, size, background, v_image)
+    layer_backward(rules, &BoxedSplats::new(rules, splats), |_| true, size, background, v_image)
 }
 
 /// Gradients of a layer with the splats of `member`; all other splats get 0.
 fn layer_backward(
     rules: &Rules,
-    boxed: &Boxed,
+    boxed: &BoxedSplats,
     member: impl Fn(&Splat) -> bool,
     size: (usize, usize),
     background: [f64; 3],
@@ -275,7 +275,7 @@ fn layer_backward(
     let mut out = SplatGradients::none(boxed.splats.len());
     for (index, (&v_colour, &v_alpha)) in v_image.colours.iter().zip(&v_image.alphas).enumerate() {
         let at = centre(index, size.0);
-        let near = || boxed.near(at).filter(|(_, splat)| member(splat));
+        let near = || boxed.splats_near(at).filter(|(_, splat)| member(splat));
         let ray = trace(rules, near(), at);
         ray_backward(boxed.splats, &ray, at, dot(background, v_colour) - v_alpha, v_colour, &mut out.values);
         for (place, splat) in near() {
@@ -289,11 +289,11 @@ fn layer_backward(
 
 /// For each splat, the smallest of the values of all pixels where it is large enough to count (hidden or not).
 pub fn smallest_over_pixels(rules: &Rules, splats: &[Splat], size: (usize, usize), values: &[f64]) -> Vec<f64> {
-    let boxed = Boxed::new(rules, splats);
+    let boxed = BoxedSplats::new(rules, splats);
     let mut out = vec![f64::INFINITY; splats.len()];
     for (index, &value) in values.iter().enumerate() {
         let at = centre(index, size.0);
-        for (place, splat) in boxed.near(at) {
+        for (place, splat) in boxed.splats_near(at) {
             if exponent(splat, at) >= rules.exponent_min() {
                 out[place] = out[place].min(value);
             }
@@ -350,8 +350,8 @@ pub fn blend_layers_forward(
     slots: &[u32],
     size: (usize, usize),
     background: [f64; 3],
-) -> Vec<Blended> {
-    let boxed = Boxed::new(rules, splats);
+) -> Vec<BlendedImage> {
+    let boxed = BoxedSplats::new(rules, splats);
     let object = |&slot: &u32| layer_forward(rules, &boxed, |splat| labels[splat.gaussian] == slot, size, [0.0; 3]);
     let scene = layer_forward(rules, &boxed, |_| true, size, background);
     std::iter::once(scene).chain(slots.iter().map(object)).collect()
@@ -367,7 +367,7 @@ pub fn blend_layers_backward(
     background: [f64; 3],
     v_layers: &[Upstream],
 ) -> (SplatGradients, SplatGradients) {
-    let boxed = Boxed::new(rules, splats);
+    let boxed = BoxedSplats::new(rules, splats);
     let scene = layer_backward(rules, &boxed, |_| true, size, background, &v_layers[0]);
     let mut objects = SplatGradients::none(splats.len());
     for (slot, &label) in slots.iter().enumerate() {

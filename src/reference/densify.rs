@@ -45,7 +45,7 @@ pub enum Origin {
 
 /// The population after densification.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Densified {
+pub struct DensifiedPopulation {
     /// Parameters and labels.
     pub model: Model,
     /// First moments.
@@ -127,8 +127,9 @@ pub fn densify(
     extent: f64,
     step: u32,
     normal: impl Fn(usize, u32, usize) -> f64,
-) -> Densified {
-    let mut out = Densified { margins: vec![f64::INFINITY; before.model.rows.len()], ..Densified::default() };
+) -> DensifiedPopulation {
+    let mut out =
+        DensifiedPopulation { margins: vec![f64::INFINITY; before.model.rows.len()], ..DensifiedPopulation::default() };
     out.model.sh_degree = before.model.sh_degree;
     for (index, row) in before.model.rows.iter().enumerate() {
         if before.is_frozen(index) {
@@ -196,7 +197,7 @@ pub fn absolute_gradient2d(
         };
         let of_tile: Vec<[f64; 3]> =
             v_image.iter().enumerate().map(|(index, &v)| if inside(index) { v } else { [0.0; 3] }).collect();
-        let found = blend_backward(rules, splats, size, background, &Upstream::of_colours(&of_tile));
+        let found = blend_backward(rules, splats, size, background, &Upstream::from_colours(&of_tile));
         for (sum, v) in sums.iter_mut().zip(&found.values) {
             (0..2).for_each(|axis| sum[axis] += v.mean2d[axis].abs());
         }
@@ -214,7 +215,7 @@ pub fn accumulate(population: &mut Population, gradient2d: &[f64], visible: &[bo
     }
 }
 
-impl Densified {
+impl DensifiedPopulation {
     pub(super) fn push(&mut self, before: &Population, index: usize, (row, (m, u), origin): (Row, (Row, Row), Origin)) {
         self.model.rows.push(row);
         self.model.labels.push(before.model.labels[index]);

@@ -4,18 +4,18 @@
 pub type ExposureRows = [[f64; 3]; 3];
 
 /// Limit of what a channel takes of another one.
-const SHARE: f64 = 0.24;
+const CHANNEL_SHARE_MAX: f64 = 0.24;
 
 /// Returns gains and shares of a channel.
-fn of_channel(rows: &ExposureRows, k: usize) -> (f64, [f64; 2]) {
-    (rows[0][k].exp(), [rows[1][k], rows[2][k]].map(|x| x / (1.0 + x.abs() / SHARE)))
+fn channel_exposure(rows: &ExposureRows, k: usize) -> (f64, [f64; 2]) {
+    (rows[0][k].exp(), [rows[1][k], rows[2][k]].map(|x| x / (1.0 + x.abs() / CHANNEL_SHARE_MAX)))
 }
 
 /// Gives a picture the exposure of its photo.
 pub fn exposed(image: &[[f64; 3]], rows: &ExposureRows) -> Vec<[f64; 3]> {
     let pixel = |c: &[f64; 3]| {
         [0, 1, 2].map(|k| {
-            let (gain, [next, last]) = of_channel(rows, k);
+            let (gain, [next, last]) = channel_exposure(rows, k);
             gain * (c[k] + next * (c[(k + 1) % 3] - c[k]) + last * (c[(k + 2) % 3] - c[k]))
         })
     };
@@ -38,12 +38,12 @@ pub fn backward(
             if exposed[p][k] > 1.0 && photo[p][k] == 1.0 {
                 continue;
             }
-            let (gain, shares) = of_channel(rows, k);
+            let (gain, shares) = channel_exposure(rows, k);
             v_rows[0][k] += v[p][k] * exposed[p][k];
             v_image[p][k] += v[p][k] * gain * (1.0 - shares[0] - shares[1]);
             for (row, share) in [1, 2].into_iter().zip(shares) {
                 let other = (k + row) % 3;
-                let slope = (1.0 + rows[row][k].abs() / SHARE).powi(-2);
+                let slope = (1.0 + rows[row][k].abs() / CHANNEL_SHARE_MAX).powi(-2);
                 v_rows[row][k] += v[p][k] * gain * slope * (c[other] - c[k]);
                 v_image[p][other] += v[p][k] * gain * share;
             }

@@ -1,6 +1,6 @@
 //! Updates of Adam without gradients, all at once.
 
-use super::adam::{Optimised, Rates, adam_value};
+use super::adam::{AdamState, Rates, adam_value};
 use super::{Group, Row, Rules};
 
 /// The rates of an update with the corrections of its moments; `step` counts from 1.
@@ -14,7 +14,7 @@ pub fn corrected(rules: &Rules, rates: &Rates, step: u32) -> Rates {
 /// moments of 0.
 ///
 /// The k-th of them moves a parameter by its rate times (beta1 / sqrt(beta2))^k m / sqrt(u), with the moments of before.
-pub fn caught_up(rules: &Rules, missed: &[Rates], state: &Optimised) -> Optimised {
+pub fn caught_up(rules: &Rules, missed: &[Rates], state: &AdamState) -> AdamState {
     let ratio = rules.adam_beta1 / rules.adam_beta2.sqrt();
     let mut sums = [0.0; 8];
     for (k, rates) in (1..).zip(missed) {
@@ -29,7 +29,7 @@ pub fn caught_up(rules: &Rules, missed: &[Rates], state: &Optimised) -> Optimise
             u[i] *= rules.adam_beta2.powi(count);
         }
     }
-    Optimised { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
+    AdamState { row: Row::from_floats(&row), m: Row::from_floats(&m), u: Row::from_floats(&u) }
 }
 
 /// The same as [`caught_up`] for a parameter, update by update, with epsilon in each; `first` is the number of the first one.

@@ -1,7 +1,7 @@
 //! Labels from masks: main Gaussian labelling and the Gaussian projection filter. And back: the label map of a view.
 
 use super::Rules;
-use super::blend::{Blended, centre, trace};
+use super::blend::{BlendedImage, centre, trace};
 use super::splat::Splat;
 use super::tile::exponent;
 use std::collections::BTreeMap;
@@ -52,7 +52,7 @@ pub fn vote_key(weight: f64, label: u32) -> u32 {
 }
 
 /// Votes of one scene image. `centres[gaussian]` is its centre in the view, px; `None` if it is not drawn.
-pub fn lift(rules: &Rules, image: &Blended, centres: &[Option<[f64; 2]>], masks: &Masks) -> Votes {
+pub fn lift(rules: &Rules, image: &BlendedImage, centres: &[Option<[f64; 2]>], masks: &Masks) -> Votes {
     let mut votes = Votes { keys: vec![0; centres.len()], margins: vec![f64::INFINITY; centres.len()] };
     for (pixel, &label) in image.pixels.iter().zip(masks.label_map) {
         if pixel.main < 0 || label == 0 || !masks.sampled.contains(&label) {
@@ -106,7 +106,7 @@ pub fn vote(
 
 /// Label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Labelled {
+pub struct PixelLabel {
     /// Label with the largest sum of blending weights, the smaller of equals; 0 without any.
     pub label: u32,
     /// That sum.
@@ -119,7 +119,7 @@ pub struct Labelled {
 }
 
 /// Label map of one view, `[height, width]`.
-pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, usize)) -> Vec<Labelled> {
+pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, usize)) -> Vec<PixelLabel> {
     let pixel = |index: usize| {
         let ray = trace(rules, splats.iter().enumerate(), centre(index, size.0));
         let mut sums = BTreeMap::<u32, f64>::new();
@@ -138,7 +138,7 @@ pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, 
         }
         let margin =
             ray.margins.cut.min(ray.margins.stop).min(if sums.is_empty() { f64::INFINITY } else { best - second });
-        Labelled { label, weight: best, labels: sums.len(), margin }
+        PixelLabel { label, weight: best, labels: sums.len(), margin }
     };
     (0..size.0 * size.1).map(pixel).collect()
 }

@@ -185,7 +185,7 @@ pub fn photo_loss(rules: &Rules, image: &[[f64; 3]], photo: &Photo) -> Loss {
 }
 
 /// Bit of a label map's pixel near a contour; the label loss ignores such pixels.
-pub const BORDER: u32 = 0x1_0000;
+pub const CONTOUR_BIT: u32 = 0x1_0000;
 
 /// One object of a step: its label and the labels that hide it in this view.
 #[derive(Clone, Debug, PartialEq)]
@@ -211,7 +211,7 @@ pub fn label_loss(
     let (image, alphas) = picture;
     let pixel_weight = rules.label_weight * slot.weight / photo.elements();
     let mut loss = Loss::empty(image.len());
-    let says = |i: usize| label_map[i] & BORDER == 0 && !slot.occluders.contains(&label_map[i]);
+    let says = |i: usize| label_map[i] & CONTOUR_BIT == 0 && !slot.occluders.contains(&label_map[i]);
     for i in (0..image.len()).filter(|&i| photo.valid[i] && says(i)) {
         let inside = label_map[i] == slot.label;
         for channel in 0..3 {

@@ -6,11 +6,11 @@ use super::random::hash;
 /// First of the numbers that moments draw of those of an element.
 const FIRST_DRAW: u32 = 64;
 /// Parts of an element, each a parameter.
-const PARTS: u32 = 4;
+const ELEMENT_PARTS: u32 = 4;
 
 /// What is drawn for a parameter: part `part` of an element of a plane.
 pub fn draw(seed: u32, element: u32, plane: u32, part: u32) -> u32 {
-    hash(seed, element, FIRST_DRAW + PARTS * plane + part)
+    hash(seed, element, FIRST_DRAW + ELEMENT_PARTS * plane + part)
 }
 
 /// Rounds to a whole number below or above, to the latter with a probability of what is above the former. `draw` has 16 bits.

@@ -1,6 +1,6 @@
 //! 3DGS-MCMC: draws by opacity, stacks of copies, random moves, and the terms of opacity and size in the loss.
 
-use super::densify::{Densified, Origin, Population};
+use super::densify::{DensifiedPopulation, Origin, Population};
 use super::project::{normalised, rotation, sigmoid};
 use super::{Row, Rules};
 use glam::DVec3;
@@ -51,7 +51,7 @@ pub fn stacked(rules: &Rules, row: &Row, count: u32) -> Row {
 }
 
 /// Removes dead rows, and stacks `draws` copies on the others.
-pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> Densified {
+pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> DensifiedPopulation {
     let weights = weights(rules, before);
     let counts = copies(rules, &weights.iter().map(|&(weight, _)| weight).collect::<Vec<_>>(), draws, phase);
     let count_of = |(index, (row, (count, margin))): (usize, (&Row, (u32, f64)))| {
@@ -61,7 +61,10 @@ pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> D
     };
     let counts: Vec<(u32, f64)> = before.model.rows.iter().zip(counts).enumerate().map(count_of).collect();
     let margin = |(weight, count): (&(u32, f64), &(u32, f64))| weight.1.min(count.1);
-    let mut out = Densified { margins: weights.iter().zip(&counts).map(margin).collect(), ..Densified::default() };
+    let mut out = DensifiedPopulation {
+        margins: weights.iter().zip(&counts).map(margin).collect(),
+        ..DensifiedPopulation::default()
+    };
     out.model.sh_degree = before.model.sh_degree;
     for (index, row) in before.model.rows.iter().enumerate() {
         let count = counts[index].0;

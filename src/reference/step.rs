@@ -1,6 +1,6 @@
 //! A complete training step: losses of a view and their gradients with respect to every parameter.
 
-use super::blend::{self, Blended, Upstream};
+use super::blend::{self, BlendedImage, Upstream};
 use super::loss::{self, Loss, ObjectPixel, Photo};
 use super::project::{self, Projection};
 use super::splat::{Splat, SplatGradient};
@@ -38,7 +38,7 @@ pub struct StepGradient {
     /// Splats, nearest first.
     pub splats: Vec<Projection>,
     /// The scene, then each slot over black.
-    pub layers: Vec<Blended>,
+    pub layers: Vec<BlendedImage>,
     /// Smallest margin of the decisions of all passes (without the main Gaussian, which affects no gradient).
     pub margin: f64,
     /// Smallest margin of the decisions that affect each Gaussian's gradient, `[N]`, without the order of depths.
@@ -113,7 +113,7 @@ fn smallest_margin(
     camera: &Camera,
     model: &Model,
     projections: &[Projection],
-    layers: &[Blended],
+    layers: &[BlendedImage],
 ) -> f64 {
     let near = model.rows.iter().map(|row| project::near_margin(rules, camera, row).abs());
     let clamps = projections.iter().map(|p| p.clamp_margin.min(p.colour_margin));

@@ -1,14 +1,14 @@
 //! Renders a model: colour, alpha, depth, label and main Gaussian of each pixel.
 //!
 //! [`render()`] draws the model of an [`Engine`] from a [`Camera`]. [`RenderOptions`] has near plane, background and
-//! the [`Parts`] to read back. The result is a [`Rendered`]; [`write_pictures`] writes it as PNG or EXR.
+//! the [`Parts`] to read back. The result is a [`Render`]; [`write_pictures`] writes it as PNG or EXR.
 
 pub mod large;
 pub mod mesh;
 pub(crate) mod pictures;
 pub(crate) mod portrait;
 
-pub use pictures::{Format, What, write_pictures, write_rgb};
+pub use pictures::{Format, PictureKind, write_pictures, write_rgb};
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result};
@@ -16,7 +16,7 @@ use crate::scene::{Camera, LABEL_MAX, LabelMap, UNLABELLED};
 use crate::shaders::structs::StepUniforms;
 
 /// Default near plane, of 3DGS, world units.
-pub const NEAR: f32 = crate::shaders::constants::NEAR;
+pub const NEAR_DEFAULT: f32 = crate::shaders::constants::NEAR;
 
 /// Alpha below which a pixel shows no surface.
 const SURFACE_ALPHA_MIN: f32 = 0.5;
@@ -61,11 +61,11 @@ pub struct RenderOptions {
 }
 
 /// Opacity below which a pixel counts as clear.
-const CLEAR: f32 = 0.5;
+const CLEAR_OPACITY_MAX: f32 = 0.5;
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { near: NEAR, background: [0.0; 3], sh_degree: None, parts: Parts::ALL, clear_labels: false }
+        Self { near: NEAR_DEFAULT, background: [0.0; 3], sh_degree: None, parts: Parts::ALL, clear_labels: false }
     }
 }
 
@@ -76,19 +76,19 @@ impl RenderOptions {
     }
 
     /// Makes options for main Gaussians only. Their colour does not matter, so the degree is 0.
-    pub fn of_main(near: f32) -> Self {
+    pub fn for_main(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
     }
 
     /// Makes options for depth only, which needs no colours either.
-    pub fn of_depth(near: f32) -> Self {
+    pub fn for_depth(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::DEPTH) }
     }
 }
 
 /// A rendered view, row-major. Parts that were not requested are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rendered {
+pub struct Render {
     /// Width, px.
     pub width: u32,
     /// Height, px.
@@ -108,7 +108,7 @@ pub struct Rendered {
     pub labels: Vec<u32>,
 }
 
-impl Rendered {
+impl Render {
     /// Returns the label of each pixel: of all labels, the one with the largest sum of blending weights. Returns an error
     /// without [`Parts::labels`], or for a label above [`LABEL_MAX`].
     pub fn label_map(&self) -> Result<LabelMap> {
@@ -158,8 +158,8 @@ impl Rendered {
 
 /// Renders the model in the engine; grows buffers as needed. The image of the camera must fit that of the engine
 /// ([`Engine::grow_image`]), and nothing may be in flight.
-pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
-    let mut whole: Option<Rendered> = None;
+pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> Result<Render> {
+    let mut whole: Option<Render> = None;
     for band in engine.bands(camera) {
         let uniforms = engine.band_uniforms(camera, band, options.near, options.background);
         whole = Some(render_band(engine, &uniforms, options)?.below(whole));
@@ -168,7 +168,7 @@ pub fn render(engine: &mut Engine, camera: &Camera, options: &RenderOptions) -> 
 }
 
 /// Draws the rows of the uniforms.
-fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOptions) -> Result<Rendered> {
+fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOptions) -> Result<Render> {
     let sh_degree = options.sh_degree.unwrap_or(engine.sh_degree());
     let Parts { depth, main, labels } = options.parts;
     let has_labels = engine.size().labels.is_some();
@@ -182,7 +182,7 @@ fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOpt
     let image = engine.picture(pixels)?;
     let weight_depth = if depth || main { engine.weights_and_depths(pixels)? } else { Vec::new() };
     let pick = |asked: bool, part: usize| weight_depth.iter().filter(|_| asked).map(|pair| pair[part]).collect();
-    let mut rendered = Rendered {
+    let mut rendered = Render {
         width,
         height,
         rgb: image.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
@@ -197,7 +197,7 @@ fn render_band(engine: &mut Engine, uniforms: &StepUniforms, options: &RenderOpt
         },
     };
     if options.clear_labels {
-        let clear = rendered.labels.iter_mut().zip(&rendered.alpha).filter(|(_, alpha)| **alpha < CLEAR);
+        let clear = rendered.labels.iter_mut().zip(&rendered.alpha).filter(|(_, alpha)| **alpha < CLEAR_OPACITY_MAX);
         clear.for_each(|(label, _)| *label = UNLABELLED);
     }
     Ok(rendered)

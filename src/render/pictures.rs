@@ -1,6 +1,6 @@
 //! Writes pictures of a view as NAME.WHAT.png or NAME.WHAT.exr.
 
-use super::Rendered;
+use super::Render;
 use crate::files::image::{write_exr_rgb, write_exr_uint, write_exr_y, write_png_grey16, write_png_rgb8};
 use crate::scene::LABEL_MAX;
 use crate::scene::colour::to_byte;
@@ -15,7 +15,7 @@ const FLOAT_EXACT: i32 = 1 << 24;
 /// A kind of picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum What {
+pub enum PictureKind {
     /// Colour.
     Rgb,
     /// Mean z per pixel, world units; a PNG only shows it in grey, an EXR has the values.
@@ -47,8 +47,8 @@ pub enum Format {
 pub fn write_pictures(
     folder: &Path,
     stem: &str,
-    rendered: &Rendered,
-    what: &[What],
+    rendered: &Render,
+    what: &[PictureKind],
     (format, wide_labels): (Format, bool),
 ) -> Result<Vec<PathBuf>> {
     let (width, height) = (rendered.width, rendered.height);
@@ -58,21 +58,21 @@ pub fn write_pictures(
         written.push(path.clone());
         path
     };
-    for what in what.iter().copied().collect::<BTreeSet<What>>() {
+    for what in what.iter().copied().collect::<BTreeSet<PictureKind>>() {
         check_size(stem, rendered, what)?;
         match (what, format) {
-            (What::Rgb, Format::Png) => write_rgb(&path("rgb", "png"), (width, height), &rendered.rgb, format)?,
-            (What::Rgb, Format::Exr) => write_rgb(&path("rgb", "exr"), (width, height), &rendered.rgb, format)?,
-            (What::Depth, Format::Png) => {
+            (PictureKind::Rgb, Format::Png) => write_rgb(&path("rgb", "png"), (width, height), &rendered.rgb, format)?,
+            (PictureKind::Rgb, Format::Exr) => write_rgb(&path("rgb", "exr"), (width, height), &rendered.rgb, format)?,
+            (PictureKind::Depth, Format::Png) => {
                 write_png_grey16(path("depth", "png"), width, height, &depth_preview(&rendered.depth))?;
             }
-            (What::Depth, Format::Exr) => write_exr_y(path("depth", "exr"), width, height, &rendered.depth)?,
-            (What::Alpha, Format::Png) => {
+            (PictureKind::Depth, Format::Exr) => write_exr_y(path("depth", "exr"), width, height, &rendered.depth)?,
+            (PictureKind::Alpha, Format::Png) => {
                 let words: Vec<u16> = rendered.alpha.iter().map(|&value| to_word(value)).collect();
                 write_png_grey16(path("alpha", "png"), width, height, &words)?;
             }
-            (What::Alpha, Format::Exr) => write_exr_y(path("alpha", "exr"), width, height, &rendered.alpha)?,
-            (What::Labels, _) => {
+            (PictureKind::Alpha, Format::Exr) => write_exr_y(path("alpha", "exr"), width, height, &rendered.alpha)?,
+            (PictureKind::Labels, _) => {
                 let labels = &rendered.labels;
                 match narrow(labels, wide_labels, format)? {
                     Some(ids) => write_png_grey16(path("labels", "png"), width, height, &ids)?,
@@ -80,8 +80,8 @@ pub fn write_pictures(
                 }
                 write_png_rgb8(path("labels-colour", "png"), width, height, &label_colours(labels))?;
             }
-            (What::TopId, _) => write_rows(&path("top-id", "exr"), (width, height), &rendered.top_id)?,
-            (What::TopWeight, _) => write_exr_y(path("top-weight", "exr"), width, height, &rendered.top_weight)?,
+            (PictureKind::TopId, _) => write_rows(&path("top-id", "exr"), (width, height), &rendered.top_id)?,
+            (PictureKind::TopWeight, _) => write_exr_y(path("top-weight", "exr"), width, height, &rendered.top_weight)?,
         }
     }
     Ok(written)
@@ -105,19 +105,21 @@ fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>
 
 /// Returns the colours of a picture in a video; fails for kinds that are no colours. Depths are grey between two bounds, which
 /// the first picture with some sets: else a surface would flicker.
-pub(crate) fn frame(rendered: &Rendered, what: What, depths: &mut Option<[f32; 2]>) -> Result<Vec<[u8; 3]>> {
+pub(crate) fn frame(rendered: &Render, what: PictureKind, depths: &mut Option<[f32; 2]>) -> Result<Vec<[u8; 3]>> {
     check_size("a video", rendered, what)?;
     Ok(match what {
-        What::Rgb => rendered.rgb.iter().map(|colour| colour.map(to_byte)).collect(),
-        What::Alpha => rendered.alpha.iter().map(|&alpha| [to_byte(alpha); 3]).collect(),
-        What::Labels => label_colours(&rendered.labels),
-        What::Depth => {
+        PictureKind::Rgb => rendered.rgb.iter().map(|colour| colour.map(to_byte)).collect(),
+        PictureKind::Alpha => rendered.alpha.iter().map(|&alpha| [to_byte(alpha); 3]).collect(),
+        PictureKind::Labels => label_colours(&rendered.labels),
+        PictureKind::Depth => {
             let range = depth_range(&rendered.depth);
             let range = *depths.get_or_insert(range);
             *depths = depths.filter(|[_, far]| *far > 0.0);
             depth_grey(&rendered.depth, range).into_iter().map(|grey| [(grey >> 8) as u8; 3]).collect()
         }
-        What::TopId | What::TopWeight => return Err(Error::Bug("a video of rows of the model".to_owned())),
+        PictureKind::TopId | PictureKind::TopWeight => {
+            return Err(Error::Bug("a video of rows of the model".to_owned()));
+        }
     })
 }
 
@@ -141,15 +143,15 @@ pub fn write_rgb(path: &Path, (width, height): (u32, u32), rgb: &[[f32; 3]], for
     }
 }
 
-fn check_size(stem: &str, rendered: &Rendered, what: What) -> Result<()> {
+fn check_size(stem: &str, rendered: &Render, what: PictureKind) -> Result<()> {
     let pixels = rendered.width as usize * rendered.height as usize;
     let length = match what {
-        What::Rgb => rendered.rgb.len(),
-        What::Depth => rendered.depth.len(),
-        What::Alpha => rendered.alpha.len(),
-        What::Labels => rendered.labels.len(),
-        What::TopId => rendered.top_id.len(),
-        What::TopWeight => rendered.top_weight.len(),
+        PictureKind::Rgb => rendered.rgb.len(),
+        PictureKind::Depth => rendered.depth.len(),
+        PictureKind::Alpha => rendered.alpha.len(),
+        PictureKind::Labels => rendered.labels.len(),
+        PictureKind::TopId => rendered.top_id.len(),
+        PictureKind::TopWeight => rendered.top_weight.len(),
     };
     if length == pixels {
         return Ok(());

@@ -10,11 +10,11 @@ use crate::scene::{Camera, Gaussians};
 use glam::{DVec2, DVec3};
 
 /// Shares of an object's Gaussians, in each direction, between which it is in the picture: single ones may be anywhere.
-const SPAN: [f64; 2] = [0.02, 0.98];
+const BOX_QUANTILES: [f64; 2] = [0.02, 0.98];
 /// Width of the picture around an object, in widths of the object.
-const MARGIN: f64 = 1.25;
+const FRAME_FACTOR: f64 = 1.25;
 /// Focal length where no camera gives a view, in widths of the picture.
-const FOCAL: f64 = 1.4;
+const FOCAL_WIDTHS: f64 = 1.4;
 
 /// Renders a label alone into a square of `side` px, as r, g, b and opacity, from the camera that shows it largest and whole;
 /// `up` is the way up where there is no camera. The model of `engine` is replaced. A label that does not occur is an error.
@@ -52,7 +52,7 @@ fn best<'a>(cameras: &[&'a Camera], corners: &[DVec3; 8], side: u32) -> Option<(
 
 /// The corners of a box around most Gaussians, in the world.
 fn corners(part: &Gaussians) -> [DVec3; 8] {
-    let ends = quantiles((0..part.len()).map(|row| part.world(row)), SPAN);
+    let ends = quantiles((0..part.len()).map(|row| part.world(row)), BOX_QUANTILES);
     std::array::from_fn(|corner| DVec3::from_array([0, 1, 2].map(|axis| ends[corner >> axis & 1][axis])))
 }
 
@@ -74,7 +74,7 @@ fn closer(camera: &Camera, corners: &[DVec3; 8], side: u32) -> Option<(f64, Came
     let whole = (high - low).max(DVec2::splat(1e-6));
     // Half in the picture counts a quarter.
     let share = seen.element_product() / whole.element_product();
-    let width = MARGIN * whole.max_element().max(1.0);
+    let width = FRAME_FACTOR * whole.max_element().max(1.0);
     let corner = 0.5 * (low + high) - 0.5 * width;
     let scale = f64::from(side) / width;
     let [fx, fy] = [camera.fx, camera.fy].map(|focal| focal * scale);
@@ -88,10 +88,10 @@ fn beside(corners: &[DVec3; 8], up: DVec3, side: u32) -> Camera {
     let middle = corners.iter().sum::<DVec3>() / 8.0;
     let radius = middle.distance(corners[7]).max(1e-6);
     let away = (up.any_orthonormal_vector() + 0.35 * up).normalize();
-    let focal = FOCAL * f64::from(side);
+    let focal = FOCAL_WIDTHS * f64::from(side);
     let half = f64::from(side) / 2.0;
     let camera = Camera::at_origin([focal, focal, half, half], (side, side));
-    camera.placed(middle + away * radius * MARGIN * FOCAL * 2.0, -away, up)
+    camera.placed(middle + away * radius * FRAME_FACTOR * FOCAL_WIDTHS * 2.0, -away, up)
 }
 
 /// Half the depth of the nearest corner: an object that stands alone is not cut by the near plane of its scene.

@@ -1,7 +1,7 @@
 //! A block of a larger scene, as the part that a run trains.
 
 use super::Settings;
-use super::resume::Resumed;
+use super::resume::ResumePoint;
 use crate::error::{Error, Result};
 use crate::records::block_file::{self, BlockFile, poses_crc};
 use crate::scene::{ColourMatrix, Dataset, View};
@@ -37,7 +37,7 @@ impl Block {
 
     /// Refuses a scene that is not the one that was split.
     pub(super) fn check_scene(&self, dataset: &Dataset) -> Result<()> {
-        let path = self.folder.join(block_file::BLOCK);
+        let path = self.folder.join(block_file::BLOCK_FILE);
         for (which, wanted, found) in
             [("views", &self.file.views, &dataset.train), ("test", &self.file.test, &dataset.test)]
         {
@@ -59,7 +59,7 @@ impl Block {
     pub(super) fn region(&self) -> Result<Region> {
         let rows = |(name, matrix): (&String, &ColourMatrix)| {
             let problem = || format!("{matrix:?} of {name} is not the matrix of a photo; split the scene again");
-            let error = || Error::data(self.folder.join(block_file::BLOCK), "exposures", problem());
+            let error = || Error::data(self.folder.join(block_file::BLOCK_FILE), "exposures", problem());
             Ok((name.clone(), exposure::rows_of(matrix).ok_or_else(error)?))
         };
         Ok(Region {
@@ -90,8 +90,8 @@ impl Block {
 /// # Errors
 ///
 /// A run that goes on with another block than before, or without one.
-pub(super) fn settle(block: Option<&Block>, resumed: Option<&Resumed>, out: &Path) -> Result<()> {
-    let path = out.join(block_file::BLOCK);
+pub(super) fn settle(block: Option<&Block>, resumed: Option<&ResumePoint>, out: &Path) -> Result<()> {
+    let path = out.join(block_file::BLOCK_FILE);
     let before = if path.is_file() { Some(BlockFile::read(out)?) } else { None };
     if resumed.is_some() && before.as_ref() != block.map(|block| &block.file) {
         let name = |file: Option<&BlockFile>| file.map_or("no block".to_owned(), |file| format!("block {}", file.id));

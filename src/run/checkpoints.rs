@@ -1,14 +1,14 @@
 //! The checkpoints that a run writes: by a thread, while the training goes on.
 
 use super::history::{Recorder, Sums};
-use super::resume::Record;
+use super::resume::RunState;
 use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::files::run_folder::Lock;
 use crate::lab::fault;
 use crate::records::checkpoint_folder;
 use crate::run::Every;
-use crate::train::between::Between;
+use crate::train::between::StepJob;
 use crate::train::{PendingState, TrainState, Trainer};
 use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
@@ -20,7 +20,7 @@ const FILES_MAX: usize = 2;
 pub(super) struct Checkpoints {
     out: PathBuf,
     lock: Lock,
-    record: Record,
+    record: RunState,
     /// Files of this run, the newest last.
     kept: Vec<PathBuf>,
     /// Step of the last one that was begun, and when that was.
@@ -79,7 +79,7 @@ impl Drop for Writer {
 
 impl Checkpoints {
     /// Makes the list for a run in the locked folder `out` that continues from `resumed`.
-    pub(super) fn new(out: &Path, lock: Lock, record: Record, resumed: Option<&TrainState>) -> Result<Self> {
+    pub(super) fn new(out: &Path, lock: Lock, record: RunState, resumed: Option<&TrainState>) -> Result<Self> {
         if resumed.is_none()
             && let Some(old) = checkpoint_folder::list(out)?.first()
         {
@@ -111,7 +111,7 @@ impl Checkpoints {
             tracing::warn!("the checkpoint of step {step} is missing: {error}");
         }
         while let Some(path) = self.kept.last() {
-            match TrainState::read(path).and_then(|state| Ok((Record::of(&state)?, state))) {
+            match TrainState::read(path).and_then(|state| Ok((RunState::from_state(&state)?, state))) {
                 Ok((record, state)) => {
                     tracing::warn!("{reason}; training goes back to {}", path.display());
                     trainer.restore(&state)?;
@@ -171,7 +171,7 @@ impl Checkpoints {
 /// Begins a checkpoint.
 pub(super) struct CheckpointJob;
 
-impl Between<Run<'_>> for CheckpointJob {
+impl StepJob<Run<'_>> for CheckpointJob {
     fn is_due(&self, step: u32, run: &Run) -> bool {
         run.checkpoints.is_due(step, run.settings.train.iterations)
     }

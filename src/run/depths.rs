@@ -9,7 +9,7 @@ use crate::train::input::known_depths::KnownDepths;
 use std::path::Path;
 
 /// Weight of known depths if nothing else is set.
-const WEIGHT: f64 = 0.3;
+const DEPTH_WEIGHT_DEFAULT: f64 = 0.3;
 
 /// Returns the settings with the weight of known depths decided, and these depths of each training photo, none with a
 /// weight of 0. Only a new run decides. `folder` has depth maps in place of the points of the reconstruction.
@@ -18,7 +18,7 @@ pub(super) fn decided(
     (config, is_new): (&TrainConfig, bool),
     (folder, sightings): (Option<&Path>, &Sightings),
 ) -> Result<(TrainConfig, Vec<KnownDepths>)> {
-    let weight = config.depth_weight.unwrap_or(if is_new { WEIGHT } else { 0.0 });
+    let weight = config.depth_weight.unwrap_or(if is_new { DEPTH_WEIGHT_DEFAULT } else { 0.0 });
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
         let problem = || format!("is only read with a {} above 0", Setting("depth_weight"));
@@ -26,10 +26,10 @@ pub(super) fn decided(
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
     let known = match folder {
-        Some(folder) => of_maps(folder, (scene, lookup, dataset))?,
+        Some(folder) => depths_from_maps(folder, (scene, lookup, dataset))?,
         None => {
             let points = sightings.points()?;
-            let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::of_points(view, points.into_iter());
+            let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::from_points(view, points.into_iter());
             dataset.train.iter().zip(points).map(of_view).collect()
         }
     };
@@ -52,9 +52,9 @@ pub(super) fn decided(
     Err(Error::data(scene, "points", problem))
 }
 
-fn of_maps(folder: &Path, (scene, lookup, dataset): (&Path, &Lookup, &Dataset)) -> Result<Vec<KnownDepths>> {
+fn depths_from_maps(folder: &Path, (scene, lookup, dataset): (&Path, &Lookup, &Dataset)) -> Result<Vec<KnownDepths>> {
     let maps = DepthFolder::open(folder, scene, lookup)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     maps.check_complete(&views)?;
-    views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::of_map(&map))).collect()
+    views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::from_map(&map))).collect()
 }

@@ -1,14 +1,14 @@
 //! The records of a run in its folder, and the scores at its end.
 
-use super::history::{Entry, Scored};
-use super::info::Ended;
-use super::pictures::Worst;
+use super::history::{Entry, ViewScore};
+use super::info::RunEnd;
+use super::pictures::WorstViews;
 use super::{Event, Run, Summary, models, objects, preview, report};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::error::Result;
 use crate::eval::evaluate::{Rendering, evaluate};
 use crate::eval::scores::{MeanScores, Scores};
-use crate::eval::subject::Whole;
+use crate::eval::subject::WholeModel;
 use crate::files::label_table::{self, LabelTable};
 use crate::files::{atomic, run_folder};
 use crate::records::occlusion_table::{self, OcclusionTable};
@@ -80,7 +80,7 @@ impl Run<'_> {
             self.hold_folder()?;
         }
         summary.stopped = self.stopped;
-        summary.objects = objects::of(model, self.names.as_ref(), summary.scores.as_ref());
+        summary.objects = objects::summaries(model, self.names.as_ref(), summary.scores.as_ref());
         summary.write(&self.request.output)?;
         self.finish_records(summary, model)?;
         let is_kept = kept?;
@@ -100,7 +100,7 @@ impl Run<'_> {
     fn finish_records(&mut self, summary: &Summary, model: &Gaussians) -> Result<()> {
         if let Some(scores) = &summary.scores {
             let MeanScores { psnr, ssim, objects, .. } = scores.mean;
-            let scored = Scored { step: summary.steps, view: None, psnr, ssim, iou: objects.iou_map };
+            let scored = ViewScore { step: summary.steps, view: None, psnr, ssim, iou: objects.iou_map };
             self.history.put(&Entry::Scores(scored));
         }
         self.history.sync();
@@ -108,10 +108,10 @@ impl Run<'_> {
         if !self.stopped {
             self.time_passes(model);
         }
-        self.info.ended = Some(Ended { stopped: summary.stopped, seconds: summary.seconds });
+        self.info.ended = Some(RunEnd { stopped: summary.stopped, seconds: summary.seconds });
         self.write_info()?;
         let out = &self.request.output;
-        let path = report::write(std::slice::from_ref(out), &out.join(report::FILE))?;
+        let path = report::write(std::slice::from_ref(out), &out.join(report::REPORT_FILE))?;
         tracing::info!("report: {}", path.display());
         Ok(())
     }
@@ -127,7 +127,7 @@ impl Run<'_> {
             (None, Occlusion::None) => "none",
             (None, _) => "rendered",
         };
-        OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::FILE))
+        OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::OCCLUSION_FILE))
     }
 
     /// Writes the matrices of the photos' colours, if they were trained.
@@ -170,9 +170,9 @@ impl Run<'_> {
         }
         let how = Rendering::new(self.trainer.render_options());
         let _stage = Stage::new("scoring the held-out views", 0);
-        let mut worst = Worst::default();
+        let mut worst = WorstViews::default();
         let engine = self.trainer.engine_mut();
-        let mut whole = Whole { engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
+        let mut whole = WholeModel { engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
         let scores = evaluate(&mut whole, &views, how, &(), &mut worst)?;
         scores.warn_of_odd_view(self.settings.train.near);
         self.info.pictures = worst.write(&self.request.output)?;

@@ -18,11 +18,11 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 /// Name of the file.
-pub(crate) const FILE: &str = "run.json";
+pub(crate) const RUN_FILE: &str = "run.json";
 /// Most warnings that are kept of a part.
 const WARNINGS_MAX: usize = 200;
 /// Buffers that are listed, the largest.
-const BUFFERS: usize = 12;
+const LISTED_BUFFERS_MAX: usize = 12;
 
 /// What was run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -34,14 +34,14 @@ pub(crate) struct Info {
     pub train_views: u64,
     pub test_views: u64,
     /// Whenever the run was started or went on, in turn.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ProgramStart>,
     pub memory: Memory,
     /// Seconds of the last part by phase, until its last step.
     pub phases: BTreeMap<String, f64>,
     /// The end; none while the run goes on, and after a kill.
-    pub ended: Option<Ended>,
+    pub ended: Option<RunEnd>,
     /// Views with pictures, the worst first.
-    pub pictures: Vec<Pictured>,
+    pub pictures: Vec<PicturedView>,
     /// Times by pass at the end of the run.
     pub passes: Vec<Pass>,
 }
@@ -49,7 +49,7 @@ pub(crate) struct Info {
 /// A start of the program for the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct Part {
+pub(crate) struct ProgramStart {
     /// What was typed.
     pub command: Option<String>,
     /// Version, commit and features of labelgs.
@@ -80,7 +80,7 @@ pub(crate) struct Memory {
 
 /// The end of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Ended {
+pub(crate) struct RunEnd {
     /// The observer stopped it.
     pub stopped: bool,
     /// Time of the training in all parts, s.
@@ -90,7 +90,7 @@ pub(crate) struct Ended {
 /// A view with pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct Pictured {
+pub(crate) struct PicturedView {
     pub view: String,
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
@@ -102,14 +102,14 @@ pub(crate) struct Pictured {
 impl Info {
     /// Begins a run, or goes on with that in the folder.
     pub(super) fn new(request: &Request, after: u32, masks: Option<&Path>, dataset: &Dataset, gpu: &Gpu) -> Self {
-        let before = if after > 0 { Self::read(&request.output.join(FILE)) } else { Ok(None) };
+        let before = if after > 0 { Self::read(&request.output.join(RUN_FILE)) } else { Ok(None) };
         let before = before.unwrap_or_else(|error| {
             tracing::warn!("{error}; the report will not know what was before step {after}");
             None
         });
         let mut info = before.unwrap_or_default();
         let found = gpu.capabilities();
-        info.parts.push(Part {
+        info.parts.push(ProgramStart {
             command: request.command.clone(),
             labelgs: crate::version::text(),
             device: format!("{} ({} {})", found.name, found.driver_name, found.driver_info),
@@ -149,7 +149,7 @@ impl Info {
 
     /// Writes the file.
     pub(super) fn write(&self, out: &Path) -> Result<()> {
-        atomic::write_json(&out.join(FILE), self)
+        atomic::write_json(&out.join(RUN_FILE), self)
     }
 
     /// Adds a warning, once.
@@ -191,7 +191,7 @@ impl Run<'_> {
             memory.planned_end = Some(plan.total);
             let mut rows: Vec<(String, u64)> = plan.rows.iter().map(|row| (row.name.to_owned(), row.bytes)).collect();
             rows.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-            rows.truncate(BUFFERS);
+            rows.truncate(LISTED_BUFFERS_MAX);
             memory.buffers = rows;
         }
     }

@@ -30,12 +30,12 @@ mod thumbnails;
 pub use every::Every;
 pub use models::{latest_model, model_file};
 pub use objects::ObjectSummary;
-pub use observer::{Event, Flow, Live, Observer};
+pub use observer::{Event, Flow, LiveScene, Observer};
 pub use report::write as write_report;
 pub use settings::{RunOptions, Settings};
 pub use summary::Summary;
 
-pub use crate::train::{Densified, LabelRule, LabelWork, Occlusion, StepKind, StepReport, TrainConfig};
+pub use crate::train::{DensifyCounts, LabelRule, LabelWork, Occlusion, StepKind, StepReport, TrainConfig};
 pub use crate::train::{ExposureMode, Preset, StrategyKind};
 
 use crate::error::Result;
@@ -53,7 +53,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Makes the settings of a resumed run from those of its checkpoint. The argument is `None` if there is no checkpoint.
-pub type Changed<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
+pub type ResumeSettings<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
 
 /// The first step of a run.
 #[allow(clippy::large_enum_variant, reason = "there is one in a run")]
@@ -61,7 +61,7 @@ pub enum Start<'a> {
     /// Step 1. The first checkpoint of this run replaces those of an earlier run in the folder.
     New(Settings),
     /// The newest whole checkpoint in the folder, or step 1 if there is none.
-    Newest(&'a Changed<'a>),
+    Newest(&'a ResumeSettings<'a>),
 }
 
 /// The inputs of a run besides its settings. Checkpoints store them too.
@@ -135,7 +135,7 @@ impl<'a> Request<'a> {
 }
 
 /// Opens the device, at the start and after each loss of the device.
-pub type Open<'a> = dyn Fn() -> Result<Arc<Gpu>> + 'a;
+pub type OpenGpu<'a> = dyn Fn() -> Result<Arc<Gpu>> + 'a;
 
 /// Trains a model. It saves the model also if the observer stops the run or memory runs out.
 ///
@@ -143,12 +143,12 @@ pub type Open<'a> = dyn Fn() -> Result<Arc<Gpu>> + 'a;
 ///
 /// Invalid settings and inputs, before anything is written; too little memory or a lost device; parameters that become
 /// NaN, also in a second try with half the learning rates; outputs that cannot be written.
-pub fn train(request: &Request, open: &Open, observer: &mut dyn Observer) -> Result<Summary> {
+pub fn train(request: &Request, open: &OpenGpu, observer: &mut dyn Observer) -> Result<Summary> {
     recovery::over_losses(request, &mut |is_again| train_once(request, is_again, open, observer))
 }
 
 /// Trains until the end or until the device is lost.
-fn train_once(request: &Request, is_again: bool, open: &Open, observer: &mut dyn Observer) -> Result<Summary> {
+fn train_once(request: &Request, is_again: bool, open: &OpenGpu, observer: &mut dyn Observer) -> Result<Summary> {
     let prepared = prepare::prepare(request, is_again)?;
     phases::take();
     let mut run = prepare::begin(prepared, request, open()?, observer)?;
@@ -217,8 +217,8 @@ impl Run<'_> {
     }
 
     fn ask(&mut self, event: &Event<'_>) -> Result<Flow> {
-        let mut live = Live::new(&mut self.trainer, &mut self.history, &self.dataset, self.names.as_ref());
-        self.observer.on(event, &mut live)
+        let mut live = LiveScene::new(&mut self.trainer, &mut self.history, &self.dataset, self.names.as_ref());
+        self.observer.observe(event, &mut live)
     }
 
     /// Logs a warning and passes it to the observer.

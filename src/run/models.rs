@@ -4,18 +4,18 @@ use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::files::{image, read};
 use crate::formats::{FirstView, LazyModel, ModelRef, ReadModel, Row, read_model, write_model};
-use crate::render::Rendered;
+use crate::render::Render;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colour;
 use crate::scene::{Camera, Gaussians, Overview, Photo};
 use crate::scenes::camera_json;
-use crate::train::between::Between;
+use crate::train::between::StepJob;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Folder for the models of earlier runs.
-const EARLIER: &str = "earlier";
+const EARLIER_FOLDER: &str = "earlier";
 
 /// Returns the path of the model of a step, where viewers of 3DGS look for it.
 pub(crate) fn model_path(out: &Path, step: u32) -> PathBuf {
@@ -112,7 +112,7 @@ impl Models {
         if let Some(step) = earlier.iter().max() {
             let path = model_path(out, *step);
             tracing::warn!(
-                "{} is of an earlier run and moves to {EARLIER} at the first model of this run",
+                "{} is of an earlier run and moves to {EARLIER_FOLDER} at the first model of this run",
                 path.display()
             );
         }
@@ -133,7 +133,7 @@ impl Models {
     /// Moves the models of an earlier run, after that of a step was written.
     pub(crate) fn note_saved(&mut self, step: u32) {
         for old in self.earlier.drain(..).filter(|&old| old != step) {
-            let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER), old));
+            let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER_FOLDER), old));
             let moved = to.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::rename(&from, &to));
             if let Err(error) = moved {
                 tracing::warn!("{}: cannot be moved: {error}", from.display());
@@ -147,7 +147,7 @@ impl Models {
 /// Writes the model in the middle of a run.
 pub(super) struct ModelJob;
 
-impl Between<Run<'_>> for ModelJob {
+impl StepJob<Run<'_>> for ModelJob {
     fn is_due(&self, step: u32, run: &Run) -> bool {
         step < run.settings.train.iterations && run.settings.run.save_at.contains(&step)
     }
@@ -167,7 +167,7 @@ pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()
 }
 
 /// Writes photo, render and (if it was rendered) label map side by side.
-pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Rendered) -> Result<()> {
+pub(crate) fn save_preview(path: &Path, photo: &Photo, rendered: &Render) -> Result<()> {
     let (width, height) = (rendered.width as usize, rendered.height as usize);
     let labels = &rendered.labels;
     let panels = if labels.is_empty() { 2 } else { 3 };

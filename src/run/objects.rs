@@ -30,7 +30,7 @@ pub struct ObjectSummary {
 }
 
 /// Returns the objects of a model, and of the masks that it was scored with.
-pub(super) fn of(model: &Gaussians, names: Option<&LabelTable>, scores: Option<&Scores>) -> Vec<ObjectSummary> {
+pub(super) fn summaries(model: &Gaussians, names: Option<&LabelTable>, scores: Option<&Scores>) -> Vec<ObjectSummary> {
     if model.labels.is_none() {
         return Vec::new();
     }

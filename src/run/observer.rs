@@ -6,9 +6,9 @@ use super::history::Recorder;
 use crate::error::Result;
 use crate::eval::scores::Scores;
 use crate::files::label_table::LabelTable;
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Camera, Dataset, Gaussians};
-use crate::train::{Densified, StepReport, Trainer};
+use crate::train::{DensifyCounts, StepReport, Trainer};
 use std::path::Path;
 
 /// An event in a run.
@@ -36,7 +36,7 @@ pub enum Event<'a> {
         /// Step.
         step: u32,
         /// Counts of the densification.
-        what: Densified,
+        what: DensifyCounts,
         /// Number of Gaussians afterwards.
         gaussians: u32,
     },
@@ -92,25 +92,25 @@ pub enum Flow {
 /// Receives the events of a run.
 pub trait Observer {
     /// Receives an event. An error ends the run.
-    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow>;
+    fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow>;
 }
 
 /// Ignores all events.
 impl Observer for () {
-    fn on(&mut self, _: &Event<'_>, _: &mut Live<'_>) -> Result<Flow> {
+    fn observe(&mut self, _: &Event<'_>, _: &mut LiveScene<'_>) -> Result<Flow> {
         Ok(Flow::Continue)
     }
 }
 
 /// The scene in training, between two steps. Queries do not change the training, bit for bit.
-pub struct Live<'a> {
+pub struct LiveScene<'a> {
     trainer: &'a mut Trainer,
     history: &'a mut Recorder,
     dataset: &'a Dataset,
     names: Option<&'a LabelTable>,
 }
 
-impl<'a> Live<'a> {
+impl<'a> LiveScene<'a> {
     pub(super) fn new(
         trainer: &'a mut Trainer,
         history: &'a mut Recorder,
@@ -170,7 +170,7 @@ impl<'a> Live<'a> {
     }
 
     /// Renders the current scene from any camera, at any size, with the requested parts.
-    pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
+    pub fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Render> {
         self.wait()?;
         let options = RenderOptions { parts, ..self.trainer.render_options() };
         let engine = self.trainer.engine_mut();

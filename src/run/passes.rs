@@ -6,9 +6,9 @@ use crate::train::StepTimes;
 use serde::{Deserialize, Serialize};
 
 /// Most steps that run again for it.
-const STEPS: u32 = 16;
+const TIMED_STEPS_MAX: u32 = 16;
 /// Least steps of the run for each of them: the report costs no more than half a percent of a training.
-const STEPS_EACH: u32 = 200;
+const RUN_STEPS_PER_TIMED_STEP: u32 = 200;
 
 /// Mean time of a pass in a step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ impl Run<'_> {
     /// Times the passes of the last steps, once more. Nothing is noted of a short run, or where the device has no clock.
     pub(super) fn time_passes(&mut self, model: &Gaussians) {
         let has_clock = self.trainer.engine_mut().gpu().limits().timestamp_bits > 0;
-        let count = (self.trainer.steps_done() / STEPS_EACH).min(STEPS);
+        let count = (self.trainer.steps_done() / RUN_STEPS_PER_TIMED_STEP).min(TIMED_STEPS_MAX);
         if !has_clock || count == 0 {
             return;
         }

@@ -1,9 +1,9 @@
 //! Small copies of the worst held-out views, for the report.
 
-use super::info::Pictured;
+use super::info::PicturedView;
 use super::thumbnails::{self, Thumbnails};
 use crate::error::{Error, Result};
-use crate::eval::compared::{Compared, Watch};
+use crate::eval::compared::{PictureObserver, ScoredPicture};
 use crate::eval::metrics::label_iou;
 use crate::files::atomic;
 use crate::report::panels::{Kind, LONGEST, encoded, heat};
@@ -13,43 +13,43 @@ use crate::scene::labels::label_colours;
 use std::path::{Path, PathBuf};
 
 /// Folder of the copies.
-pub(super) const FOLDER: &str = "report";
+pub(super) const PICTURES_FOLDER: &str = "report";
 /// Views that are kept.
-const VIEWS: usize = 6;
+const VIEWS_MAX: usize = 6;
 /// Most bytes of all copies.
 const BYTES_MAX: usize = 6 << 20;
 
 /// File of the map of errors.
-pub(crate) const HEAT: &str = "error.jpg";
+pub(crate) const HEAT_MAP_FILE: &str = "error.jpg";
 
 /// The pictures of a view: name in the page, name of the file.
-pub(crate) const KINDS: [(&str, &str); 5] = [
+pub(crate) const PICTURE_KINDS: [(&str, &str); 5] = [
     ("photo", "photo.jpg"),
     ("render", "render.jpg"),
     ("labels", "labels.png"),
     ("masks", "masks.png"),
-    ("error", HEAT),
+    ("error", HEAT_MAP_FILE),
 ];
 
 /// Returns the path of a picture.
 pub(crate) fn path(out: &Path, number: u32, file: &str) -> PathBuf {
-    out.join(FOLDER).join(format!("{number}-{file}"))
+    out.join(PICTURES_FOLDER).join(format!("{number}-{file}"))
 }
 
 /// The worst views that were seen, and the objects of all.
 #[derive(Default)]
-pub(super) struct Worst {
-    views: Vec<(Pictured, Vec<Option<Vec<u8>>>)>,
+pub(super) struct WorstViews {
+    views: Vec<(PicturedView, Vec<Option<Vec<u8>>>)>,
     objects: Thumbnails,
 }
 
-impl Watch for Worst {
-    fn see(&mut self, picture: &Compared) -> Result<()> {
+impl PictureObserver for WorstViews {
+    fn observe(&mut self, picture: &ScoredPicture) -> Result<()> {
         let Some(psnr) = picture.number("PSNR").filter(|_| picture.object.is_none()) else { return Ok(()) };
-        self.objects.see(picture)?;
-        let worse = |view: &(Pictured, _)| view.0.psnr.is_some_and(|other| other <= psnr);
+        self.objects.observe(picture)?;
+        let worse = |view: &(PicturedView, _)| view.0.psnr.is_some_and(|other| other <= psnr);
         let place = self.views.iter().take_while(|view| worse(view)).count();
-        if place >= VIEWS {
+        if place >= VIEWS_MAX {
             return Ok(());
         }
         let size = (picture.photo.width, picture.photo.height);
@@ -65,15 +65,15 @@ impl Watch for Worst {
         ];
         let iou = picture.labels.zip(picture.truth).and_then(|(found, truth)| label_iou(&found.ids, truth));
         let (view, ssim) = (picture.view.to_owned(), picture.number("SSIM"));
-        self.views.insert(place, (Pictured { view, psnr: Some(psnr), ssim, iou, number: 0 }, files));
-        self.views.truncate(VIEWS);
+        self.views.insert(place, (PicturedView { view, psnr: Some(psnr), ssim, iou, number: 0 }, files));
+        self.views.truncate(VIEWS_MAX);
         Ok(())
     }
 }
 
-impl Worst {
+impl WorstViews {
     /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst first.
-    pub(super) fn write(self, out: &Path) -> Result<Vec<Pictured>> {
+    pub(super) fn write(self, out: &Path) -> Result<Vec<PicturedView>> {
         remove_old(out)?;
         thumbnails::remove_old(out)?;
         self.objects.write(out)?;
@@ -84,12 +84,12 @@ impl Worst {
             if bytes > BYTES_MAX {
                 break;
             }
-            for ((_, file), content) in KINDS.iter().zip(&files) {
+            for ((_, file), content) in PICTURE_KINDS.iter().zip(&files) {
                 if let Some(content) = content {
                     atomic::write(path(out, number, file), |out| out.write_all(content))?;
                 }
             }
-            written.push(Pictured { number, ..view });
+            written.push(PicturedView { number, ..view });
         }
         Ok(written)
     }
@@ -97,8 +97,8 @@ impl Worst {
 
 /// Deletes the pictures of an earlier end of the run.
 fn remove_old(out: &Path) -> Result<()> {
-    for number in 1..=VIEWS as u32 {
-        for (_, file) in KINDS {
+    for number in 1..=VIEWS_MAX as u32 {
+        for (_, file) in PICTURE_KINDS {
             let path = path(out, number, file);
             if path.is_file() {
                 std::fs::remove_file(&path).map_err(Error::write(&path))?;

@@ -6,7 +6,7 @@ use super::every::Every;
 use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
-use super::resume::{self, Record, Resumed};
+use super::resume::{self, ResumePoint, RunState};
 use super::{Inputs, Observer, Request, Run, Settings, Start, depths, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
@@ -21,17 +21,17 @@ use crate::scenes::capture::{self, Sightings};
 use crate::scenes::{self, Lookup};
 use crate::scheduler::SchedulerOptions;
 use crate::train::setup::TrainerOptions;
-use crate::train::shared::{Shared, exposure};
+use crate::train::shared::{SharedSet, exposure};
 use crate::train::{self, ExposureMode, TrainConfig, Trainer};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The state of a run before it opens a device.
-pub(super) struct Prepared {
+pub(super) struct RunSetup {
     lock: Lock,
     settings: Settings,
-    resumed: Option<Resumed>,
+    resumed: Option<ResumePoint>,
     inputs: Inputs,
     models: Models,
     names: Option<LabelTable>,
@@ -43,7 +43,7 @@ pub(super) struct Prepared {
 }
 
 /// Locks the folder, decides the settings and reads the scene. `is_again` continues from the newest checkpoint.
-pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
+pub(super) fn prepare(request: &Request, is_again: bool) -> Result<RunSetup> {
     // Check the settings first, so that bad ones leave no folder behind. List checkpoints only after the lock: another
     // run may be writing its last one.
     if let Start::New(settings) = &request.start {
@@ -85,7 +85,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<Prepared> {
         warn_of_surroundings(&settings, &dataset)?;
     }
     let table = if resumed.is_none() { occluders::table(request, &dataset)? } else { None };
-    Ok(Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
+    Ok(RunSetup { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
 }
 
 /// Says that the objects should be trained alone, if there are masks and the surroundings do not follow the poses.
@@ -108,13 +108,13 @@ fn check_new(settings: &Settings, request: &Request) -> Result<()> {
 
 /// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.
 fn clear(out: &Path, settings: &Settings) -> Result<()> {
-    let checkpoints = out.join(checkpoint_folder::FOLDER);
+    let checkpoints = out.join(checkpoint_folder::CHECKPOINTS_FOLDER);
     if settings.run.checkpoint_every != Every::NEVER {
         std::fs::create_dir_all(&checkpoints).map_err(Error::write(&checkpoints))?;
     }
     // A missing or unreadable folder needs no clearing.
     let models = files::read::folder(&out.join("point_cloud")).unwrap_or_default();
-    let own = [out.to_owned(), checkpoints, out.join("preview"), out.join(pictures::FOLDER)];
+    let own = [out.to_owned(), checkpoints, out.join("preview"), out.join(pictures::PICTURES_FOLDER)];
     for folder in own.into_iter().chain(models) {
         atomic::remove_stale(folder, Duration::ZERO);
     }
@@ -146,12 +146,12 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Op
 
 /// Puts the model on the device: that of the checkpoint, or the initial one.
 pub(super) fn begin<'a>(
-    prepared: Prepared,
+    prepared: RunSetup,
     request: &'a Request,
     gpu: Arc<Gpu>,
     observer: &'a mut dyn Observer,
 ) -> Result<Run<'a>> {
-    let Prepared { lock, settings, resumed, inputs, models, names, dataset, table, first, block } = prepared;
+    let RunSetup { lock, settings, resumed, inputs, models, names, dataset, table, first, block } = prepared;
     let out = request.output.as_path();
     let preview = dataset.test.first().or(dataset.train.first()).cloned();
     let options = SchedulerOptions {
@@ -169,7 +169,7 @@ pub(super) fn begin<'a>(
     facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
     let occlusion = before.or(table.as_ref().map(|table| table.kind.clone()));
-    let record = Record {
+    let record = RunState {
         inputs: inputs.recorded(),
         occlusion: occlusion.clone(),
         read: settings.read.clone(),
@@ -234,7 +234,7 @@ fn start(
         ExposureMode::Auto | ExposureMode::On => sightings.gains()?,
     };
     let config = exposure::decided(&config, &gains);
-    options.shared = Shared::of(&config, &gains, dataset, options.region.as_ref());
+    options.shared = SharedSet::from_config(&config, &gains, dataset, options.region.as_ref());
     let mut trainer = Trainer::new(gpu, config, dataset, &model, options)?;
     if let Some(table) = occluders {
         let without = trainer.set_occluders(&table.views);

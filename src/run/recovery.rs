@@ -8,7 +8,7 @@ use crate::run::Summary;
 use std::time::Duration;
 
 /// Waits between attempts to open a lost device, s.
-const WAITS: [u64; 3] = [1, 4, 16];
+const REOPEN_WAITS_S: [u64; 3] = [1, 4, 16];
 
 /// Runs a training. With [`Request::restart`] it starts again after a lost device, unless no checkpoint was written
 /// since the last loss: the same work would lose it again. `run` receives true if it continues from the newest
@@ -19,7 +19,7 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
     }
     let newest = || Ok(checkpoint_folder::list(&request.output)?.first().map_or(0, |found| found.number));
     let (mut before, mut was_lost) = (newest()?, false);
-    let mut waits = WAITS.iter();
+    let mut waits = REOPEN_WAITS_S.iter();
     loop {
         let error = match run(was_lost) {
             Err(error @ Error::DeviceLost { .. }) => error,
@@ -32,7 +32,7 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
             }
             other => return other,
         };
-        waits = WAITS.iter();
+        waits = REOPEN_WAITS_S.iter();
         let number = newest()?;
         if number <= before {
             return Err(error);

@@ -1,7 +1,7 @@
 //! The checkpoint and the settings that a resumed run continues from.
 
 use super::history::Sums;
-use super::{Changed, Inputs, Request, Settings};
+use super::{Inputs, Request, ResumeSettings, Settings};
 use crate::error::{Error, Result, Setting};
 use crate::records::checkpoint_folder;
 use crate::run::RunOptions;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// The part of a checkpoint about the run. The state of the training is separate.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Record {
+pub(super) struct RunState {
     pub inputs: Inputs,
     /// Source of the occluders at the start.
     pub occlusion: Option<String>,
@@ -23,24 +23,24 @@ pub(super) struct Record {
     pub history: Sums,
 }
 
-impl Record {
+impl RunState {
     /// Reads the part of a checkpoint.
-    pub(super) fn of(state: &TrainState) -> Result<Self> {
+    pub(super) fn from_state(state: &TrainState) -> Result<Self> {
         serde_json::from_value(state.run.clone())
             .map_err(|error| Error::data(&state.path, "contents", format!("of the run: {error}")))
     }
 }
 
 /// A checkpoint to continue from.
-pub(super) struct Resumed {
+pub(super) struct ResumePoint {
     pub state: TrainState,
     pub settings: Settings,
-    pub record: Record,
+    pub record: RunState,
 }
 
 /// Returns the newest whole checkpoint of the folder, with the settings for the resumed run. Returns none without
 /// checkpoints, and an error if all are damaged.
-pub(super) fn find(request: &Request, changed: &Changed) -> Result<Option<Resumed>> {
+pub(super) fn find(request: &Request, changed: &ResumeSettings) -> Result<Option<ResumePoint>> {
     let mut first = None;
     for found in checkpoint_folder::list(&request.output)? {
         match read(&found.path) {
@@ -63,16 +63,16 @@ pub(super) fn find(request: &Request, changed: &Changed) -> Result<Option<Resume
     }
 }
 
-fn read(path: &Path) -> Result<Resumed> {
+fn read(path: &Path) -> Result<ResumePoint> {
     let state = TrainState::read(path)?;
-    let record = Record::of(&state)?;
+    let record = RunState::from_state(&state)?;
     let settings = Settings { read: record.read.clone(), train: state.config.clone(), run: record.run.clone() };
     settings.check().map_err(|error| Error::data(path, "contents", error.to_string()))?;
-    Ok(Resumed { state, settings, record })
+    Ok(ResumePoint { state, settings, record })
 }
 
 /// Applies the requested settings to the checkpoint and logs each change.
-fn decide(request: &Request, changed: &Changed, mut resumed: Resumed) -> Result<Resumed> {
+fn decide(request: &Request, changed: &ResumeSettings, mut resumed: ResumePoint) -> Result<ResumePoint> {
     let then = &resumed.settings;
     let mut wanted = changed(Some(then))?.settled();
     wanted.check()?;

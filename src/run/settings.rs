@@ -8,7 +8,7 @@ use crate::options::parse::as_bytes;
 use crate::options::parse::bytes;
 use crate::options::{Key, Options};
 use crate::scenes::{self, LoadOptions, ReadOptions};
-use crate::train::setup::near_plane::NEAR;
+use crate::train::setup::near_plane::NEAR_DEFAULT;
 use crate::train::{ExposureMode, Preset, TrainConfig};
 use crate::words::did_you_mean;
 use serde::de::{DeserializeOwned, IgnoredAny};
@@ -113,7 +113,7 @@ impl Settings {
     }
 
     /// Reads the settings of the run that a model belongs to. Returns none if the model is not in the folder of a run.
-    pub fn of_model(model: &Path) -> Result<Option<Self>> {
+    pub fn for_model(model: &Path) -> Result<Option<Self>> {
         let file = run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
         let Some(file) = file else { return Ok(None) };
         // Accept keys of other versions of labelgs: they must not make a model unreadable.
@@ -122,7 +122,7 @@ impl Settings {
         let near = &mut settings.train.near;
         // 0 means automatic, which needs a scene.
         if *near == 0.0 {
-            *near = NEAR;
+            *near = NEAR_DEFAULT;
         }
         if !near.is_finite() || *near < 0.0 {
             let problem = format!("is {near}, needs more than 0; correct it or set {}", Setting("near"));

@@ -6,7 +6,7 @@ use super::preview::PreviewJob;
 use super::{Event, Run};
 use crate::error::{Error, Result};
 use crate::phases::{self, Phase};
-use crate::train::between::Between;
+use crate::train::between::StepJob;
 use std::time::Instant;
 
 /// Runs the remaining steps, until the last one or until the observer stops the run.
@@ -36,7 +36,7 @@ pub(super) fn steps(run: &mut Run) -> Result<()> {
 
 /// Writes the files that are due after a step.
 fn work_after(run: &mut Run, step: u32) -> Result<()> {
-    let jobs: [(&mut dyn Between<Run>, Phase); 3] =
+    let jobs: [(&mut dyn StepJob<Run>, Phase); 3] =
         [(&mut ModelJob, Phase::Output), (&mut PreviewJob, Phase::Output), (&mut CheckpointJob, Phase::Checkpoint)];
     for (job, phase) in jobs {
         if job.is_due(step, run) {

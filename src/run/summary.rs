@@ -8,7 +8,7 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Name of the file.
-pub(crate) const FILE: &str = "metrics.json";
+pub(crate) const METRICS_FILE: &str = "metrics.json";
 
 /// The result of a run.
 #[derive(Clone, Debug)]
@@ -52,6 +52,6 @@ impl Summary {
 
     /// Writes `metrics.json` into the folder of the run.
     pub(super) fn write(&self, out: &Path) -> Result<()> {
-        atomic::write_json(&out.join(FILE), &self.to_json())
+        atomic::write_json(&out.join(METRICS_FILE), &self.to_json())
     }
 }

@@ -6,11 +6,11 @@ use crate::error::{Error, Result};
 use crate::gpu::Buffer;
 use crate::scheduler::plan::{Buf, Class, GUARD_BYTES};
 
-const PATTERN: u32 = 0x5AFE_C0DE;
+const GUARD_PATTERN: u32 = 0x5AFE_C0DE;
 
 /// Writes the guard that starts at a byte offset.
 pub(super) fn write(recorder: &Recorder<'_>, buffer: &Buffer, offset: u64) -> Result<()> {
-    recorder.fill(buffer, offset, GUARD_BYTES, PATTERN)
+    recorder.fill(buffer, offset, GUARD_BYTES, GUARD_PATTERN)
 }
 
 impl Scheduler {
@@ -35,7 +35,7 @@ impl Scheduler {
             for frame in 0..copies {
                 let end = self.bytes(buf)?;
                 let words = self.read_words(buf, frame, end, GUARD_BYTES)?;
-                if let Some(position) = words.iter().position(|&word| word != PATTERN) {
+                if let Some(position) = words.iter().position(|&word| word != GUARD_PATTERN) {
                     let (name, value) = (decl.name, words[position]);
                     return Err(Error::Bug(format!(
                         "a pass wrote {value:#010x} at byte {} behind the end of buffer {name} ({end} bytes)",

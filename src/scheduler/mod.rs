@@ -52,7 +52,7 @@ impl SchedulerOptions {
     pub fn limits(&self, gpu: &Gpu) -> Limits {
         let limits = gpu.limits().plan;
         let limits = Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits };
-        if self.as_card { limits.of_card() } else { limits }
+        if self.as_card { limits.for_gpu() } else { limits }
     }
 }
 
@@ -154,7 +154,7 @@ impl Scheduler {
             plans.push(Plan::new(self.table, &self.counts, list, &self.limits, self.options.plan)?);
         }
         let all = self.lists.iter().map(|list| &list.plan).chain(&plans).collect::<Vec<_>>();
-        let total = MemoryReport::of_plans(self.table, &self.counts, &all, &self.limits, self.options.plan)?.total;
+        let total = MemoryReport::from_plans(self.table, &self.counts, &all, &self.limits, self.options.plan)?.total;
         let pages = memory::merge_pages(all.iter().map(|plan| plan.step_pages.as_slice()));
         self.make_room(total)?;
         self.grow_arena(&pages)?;

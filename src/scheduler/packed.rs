@@ -11,7 +11,7 @@ use ash::vk::Handle;
 use std::sync::Arc;
 
 /// Windows of a pass.
-pub(super) struct Bound<'a> {
+pub(super) struct PassWindows<'a> {
     pub(super) cover: Cover<u64>,
     /// A buffer in each window: it has the handle.
     pub(super) buffers: Vec<&'a Buffer>,
@@ -26,7 +26,7 @@ pub(super) fn bound<'a>(
     plan: &Plan,
     pass: &PassDecl,
     frame: usize,
-) -> Result<Bound<'a>> {
+) -> Result<PassWindows<'a>> {
     let own = || pass.shader.bindings.iter().zip(&pass.buffers).filter(|(desc, _)| desc.kind == BindingKind::Storage);
     let (mut spans, mut all) = (Vec::new(), Vec::new());
     for (_, &buf) in own() {
@@ -41,7 +41,7 @@ pub(super) fn bound<'a>(
     let places = starts.zip(own()).map(|(bytes, (desc, _))| (bytes / stride(desc)) as u32).collect();
     let first = |window: usize| cover.window_of.iter().position(|&of| usize::from(of) == window);
     let buffers = (0..cover.windows.len()).filter_map(|window| first(window).map(|index| all[index])).collect();
-    Ok(Bound { cover, buffers, places })
+    Ok(PassWindows { cover, buffers, places })
 }
 
 impl Scheduler {

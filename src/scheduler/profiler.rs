@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 /// On some drivers, the first steps of a list include the compilation of its pipelines.
-const WARM_UP: usize = 2;
+const WARM_UP_STEPS: usize = 2;
 
 /// Times of one pass label.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +40,7 @@ impl Default for Profiler {
 impl Profiler {
     /// Creates an empty profiler.
     pub fn new() -> Self {
-        Self::with_warm_up(WARM_UP)
+        Self::with_warm_up(WARM_UP_STEPS)
     }
 
     /// Creates a profiler that ignores the first `warm_up` steps.

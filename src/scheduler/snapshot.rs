@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Copies of buffers in device memory.
 pub struct Snapshot {
     /// Allocated with the copies: whoever reads needs no further memory of the device. First, since its drop waits for the reads.
-    halves: Halves,
+    halves: StagingHalves,
     /// Copies, in the order in which they were asked for; none for a buffer without words.
     copies: Vec<Option<Buffer>>,
     /// The submit that makes them.
@@ -33,7 +33,7 @@ impl Scheduler {
             let copy = |words: u64| Buffer::new(&self.gpu, "snapshot", words * 4, MemoryKind::Device);
             copies.push((words > 0).then(|| copy(words)).transpose()?);
         }
-        let halves = Halves::new(&self.gpu)?;
+        let halves = StagingHalves::new(&self.gpu)?;
         let made = &copies;
         self.immediately(|recorder, storage, _| {
             for (&(buf, _), copy) in buffers.iter().zip(made) {
@@ -77,7 +77,7 @@ impl Snapshot {
 }
 
 /// Two halves of staging memory: one is filled while the other is read.
-struct Halves {
+struct StagingHalves {
     gpu: Arc<Gpu>,
     staging: [Buffer; 2],
     commands: [CommandBuffer; 2],
@@ -85,7 +85,7 @@ struct Halves {
     submitted: u64,
 }
 
-impl Halves {
+impl StagingHalves {
     fn new(gpu: &Arc<Gpu>) -> Result<Self> {
         let staging = || Buffer::new(gpu, "staging down", memory::STAGING_BYTES / 2, MemoryKind::Download);
         let command = || CommandBuffer::new(gpu, Lane::Transfer);
@@ -123,7 +123,7 @@ impl Halves {
     }
 }
 
-impl Drop for Halves {
+impl Drop for StagingHalves {
     fn drop(&mut self) {
         // Memory in use must not be freed.
         let _ = self.timeline.wait(self.submitted);

@@ -163,17 +163,17 @@ impl Scheduler {
     }
 
     /// Returns the present place of a buffer.
-    fn locate(&self, buf: Buf, frame: usize) -> Result<Place> {
+    fn locate(&self, buf: Buf, frame: usize) -> Result<BufferLocation> {
         let decl = self.decl(buf)?;
         if decl.class != Class::Step {
-            return Ok(Place::Own(buf, copy_of(decl.class, frame)));
+            return Ok(BufferLocation::Own(buf, copy_of(decl.class, frame)));
         }
         let none = || Error::Bug(format!("{} is a scratch buffer, and no prepared list uses it", decl.name));
         let list = self.current.ok_or_else(none)?;
         let place = self.lists[list].plan.placement(buf)?;
         match place.page {
-            crate::scheduler::plan::Page::Step(page) => Ok(Place::Step(page as usize, place.offset)),
-            crate::scheduler::plan::Page::Own(buf) => Ok(Place::Own(buf, 0)),
+            crate::scheduler::plan::Page::Step(page) => Ok(BufferLocation::Step(page as usize, place.offset)),
+            crate::scheduler::plan::Page::Own(buf) => Ok(BufferLocation::Own(buf, 0)),
         }
     }
 
@@ -195,12 +195,12 @@ impl Scheduler {
 
 /// A buffer's place, without a borrow of the scheduler while commands are recorded.
 #[derive(Clone, Copy)]
-enum Place {
+enum BufferLocation {
     Own(Buf, usize),
     Step(usize, u64),
 }
 
-impl Place {
+impl BufferLocation {
     fn find(self, storage: &Storage) -> Result<(&Buffer, u64)> {
         match self {
             Self::Own(buf, copy) => Ok((storage.own(buf, copy)?, 0)),

@@ -13,9 +13,9 @@ use crate::train::{Objective, TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
 /// Steps of each view.
-const STEPS: usize = 100;
+const STEPS_PER_VIEW: usize = 100;
 /// Most Gaussians that stand for the points of the scene.
-const POINTS: usize = 10_000;
+const POINTS_MAX: usize = 10_000;
 
 /// Returns the views with poses refined by a model, which is rendered from `near` on `background`.
 pub fn aligned(
@@ -30,12 +30,12 @@ pub fn aligned(
         return Ok(found);
     }
     let config = TrainConfig {
-        iterations: (STEPS * found.len()) as u32,
+        iterations: (STEPS_PER_VIEW * found.len()) as u32,
         background,
         refine_poses: true,
-        ..TrainConfig::of_finished(model, near)
+        ..TrainConfig::for_finished(model, near)
     };
-    let points = sample(model, POINTS).into_iter().map(|position| Point { position, colour: [0; 3] }).collect();
+    let points = sample(model, POINTS_MAX).into_iter().map(|position| Point { position, colour: [0; 3] }).collect();
     let train = found.iter().map(|view| View { mask: None, ..view.clone() }).collect();
     let dataset = Dataset { train, points, ..Dataset::default() };
     let model = Gaussians { labels: None, label_confidence: None, ..model.clone() };

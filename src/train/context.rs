@@ -7,14 +7,14 @@ use crate::pass::{KernelShape, Variant};
 use crate::scene::{Dataset, Zone};
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
-use crate::train::extension::Joined;
+use crate::train::extension::JoinedExtension;
 use crate::train::input::step_input::{self, SceneScale, StepInput};
 use crate::train::input::views::Views;
 use crate::train::objective::{Loss, Objective};
 use crate::train::setup::{self, TrainerOptions};
-use crate::train::shared::Shared;
+use crate::train::shared::SharedSet;
 use crate::train::shared::poses;
-use crate::train::strategy::{At, Strategy};
+use crate::train::strategy::{StepContext, Strategy};
 use std::sync::Arc;
 
 /// The model on the device, and what it is trained by.
@@ -23,7 +23,7 @@ pub(super) struct Context {
     pub(super) config: TrainConfig,
     pub(super) objective: Objective,
     pub(super) strategy: Box<dyn Strategy>,
-    pub(super) shared: Shared,
+    pub(super) shared: SharedSet,
     pub(super) views: Views,
     /// The photos show objects alone.
     pub(super) objects_only: bool,
@@ -54,7 +54,7 @@ impl Context {
         let grow_zone = region.map(|region| region.zone).or(config.grow_box.map(Zone::along_world));
         let shared = shared.or_of(&config, dataset, region);
         let strategy = strategy.unwrap_or_else(|| objective.strategy(config.strategy));
-        let shape = shape.unwrap_or_else(|| KernelShape::of(gpu.capabilities()));
+        let shape = shape.unwrap_or_else(|| KernelShape::for_device(gpu.capabilities()));
         let views = setup::train_views(dataset, depths, config.mask_border, size.band(&shape))?;
         let views = Views::new(views, &config, scheduler.limits(&gpu).frames);
         let size = size.with_shared_rows(shared.rows(views.len()));
@@ -64,8 +64,8 @@ impl Context {
         let image = engine.size().image;
         let always: Vec<_> = objective.extension().into_iter().chain(shared.extensions()).collect();
         let always_passes = u32::from(!always.is_empty());
-        let passes = strategy.passes(At { step: 1, config: &config, extent: scale.extent }) + always_passes;
-        engine.set_extension(Joined::of(strategy.extension(), always), passes);
+        let passes = strategy.passes(StepContext { step: 1, config: &config, extent: scale.extent }) + always_passes;
+        engine.set_extension(JoinedExtension::join(strategy.extension(), always), passes);
         Ok(Self {
             engine,
             config,
@@ -84,13 +84,13 @@ impl Context {
     }
 
     /// Returns a step as strategies and shared parameters see it.
-    pub(super) fn at(&self, step: u32) -> At<'_> {
-        At { step, config: &self.config, extent: self.scale.extent }
+    pub(super) fn step_context(&self, step: u32) -> StepContext<'_> {
+        StepContext { step, config: &self.config, extent: self.scale.extent }
     }
 
     /// Returns true if the depth of the model is unreliable before `step`.
     pub(super) fn blurs_depth_before(&self, step: u32) -> bool {
-        step > 1 && self.strategy.blurs_depth_after(self.at(step - 1))
+        step > 1 && self.strategy.blurs_depth_after(self.step_context(step - 1))
     }
 
     /// Returns true if Gaussians have labels: in a scene with masks.
@@ -99,7 +99,7 @@ impl Context {
     }
 
     pub(super) fn uniforms(&self, input: &StepInput) -> Result<StepUniforms> {
-        let view = self.views.of(input)?;
+        let view = self.views.step_view(input)?;
         let mut uniforms = step_input::uniforms(input, view, &self.config, self.scale, &self.engine);
         if let Some((camera, near)) = self.views.partner(self.config.seed, input) {
             uniforms = self.engine.with_free_space(uniforms, camera, near);
@@ -107,14 +107,14 @@ impl Context {
         if let Some(zone) = &self.grow_zone {
             uniforms = self.engine.with_grow_box(uniforms, zone);
         }
-        self.strategy.uniforms(self.at(input.step), &mut uniforms);
+        self.strategy.uniforms(self.step_context(input.step), &mut uniforms);
         self.objective.limit_rates(&mut uniforms);
         Ok(uniforms)
     }
 
     pub(super) fn submit(&mut self, input: &StepInput) -> Result<InFlight> {
-        let (key, view, uniforms) = (self.key(input), self.views.of(input)?, self.uniforms(input)?);
-        let shared = self.shared.of_step(self.at(input.step), self.views.index(input))?;
+        let (key, view, uniforms) = (self.key(input), self.views.step_view(input)?, self.uniforms(input)?);
+        let shared = self.shared.step_rows(self.step_context(input.step), self.views.index(input))?;
         let data = step_input::train_input(input, view, &self.config, uniforms, &self.engine);
         let flight = self.engine.submit(key, &TrainInput { shared, ..data })?;
         self.newest = Some(input.clone());
@@ -130,7 +130,7 @@ impl Context {
             counts: self.counts_pairs,
             catch_up: false,
         };
-        match self.strategy.passes(self.at(input.step)) + self.always_passes {
+        match self.strategy.passes(self.step_context(input.step)) + self.always_passes {
             0 => ListKey::Train(variant),
             passes => ListKey::Extended(variant, passes),
         }
@@ -140,7 +140,7 @@ impl Context {
     pub(super) fn lists_ahead(&self) -> Vec<ListKey> {
         let mut keys = Vec::new();
         for step in 1..=self.config.iterations {
-            let update = self.strategy.updates(self.at(step));
+            let update = self.strategy.updates(self.step_context(step));
             let plain = StepInput { step, part: 0, layers: Vec::new(), labels: false, update, updates: step };
             let disagrees =
                 self.has_labels() && self.objective.has(Loss::Disagreement) && self.config.has_disagreement_at(step);
@@ -166,13 +166,13 @@ impl Context {
     pub(super) fn photo_rows(&mut self, owner: &str) -> Result<Vec<Vec<[f32; 4]>>> {
         let Some(range) = self.shared.photo_rows(owner) else { return Ok(Vec::new()) };
         let rows = self.engine.shared()?;
-        let of = |view: usize| rows[self.shared.of_view(view)][range.clone()].to_vec();
+        let of = |view: usize| rows[self.shared.view_range(view)][range.clone()].to_vec();
         Ok((0..self.views.len()).map(of).collect())
     }
 
     /// Takes over the refined poses, for work between steps. Nothing may be in flight.
     pub(super) fn refresh_poses(&mut self) -> Result<()> {
-        let rows = self.photo_rows(poses::NAME)?;
+        let rows = self.photo_rows(poses::POSES_NAME)?;
         self.views.refine(&rows);
         Ok(())
     }

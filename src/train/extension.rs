@@ -5,18 +5,18 @@ use std::sync::Arc;
 
 /// The passes of a strategy, under a number that is one higher, and passes of every step.
 #[derive(Debug)]
-pub(super) struct Joined {
+pub(super) struct JoinedExtension {
     pub(super) strategy: Arc<dyn Extension>,
     pub(super) always: Vec<Arc<dyn Extension>>,
 }
 
-impl Joined {
-    pub(super) fn of(strategy: Arc<dyn Extension>, always: Vec<Arc<dyn Extension>>) -> Arc<dyn Extension> {
+impl JoinedExtension {
+    pub(super) fn join(strategy: Arc<dyn Extension>, always: Vec<Arc<dyn Extension>>) -> Arc<dyn Extension> {
         if always.is_empty() { strategy } else { Arc::new(Self { strategy, always }) }
     }
 }
 
-impl Extension for Joined {
+impl Extension for JoinedExtension {
     fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
         if passes > 1 {
             self.strategy.extend(passes - 1, hook, b);

@@ -39,9 +39,9 @@ pub use setup::TrainerOptions;
 pub use setup::first_model::first_model;
 pub use shared::exposure::Exposure;
 pub use shared::poses::Poses;
-pub use shared::{Place, Shared, SharedLayout, SharedParameters};
+pub use shared::{RowOffsets, SharedLayout, SharedParameters, SharedSet};
 pub use state::TrainState;
-pub use strategy::{At, Densified, Population, Strategy};
+pub use strategy::{DensifyCounts, Population, StepContext, Strategy};
 pub use trainer::{PendingState, Trainer};
 
 pub use alignment::aligned;

@@ -106,7 +106,7 @@ impl Objective {
 
     /// Returns the strategy for the number of Gaussians.
     pub(super) fn strategy(&self, kind: StrategyKind) -> Box<dyn Strategy> {
-        if self.trains(Parameter::Number) { strategy::of(kind) } else { Box::new(()) }
+        if self.trains(Parameter::Number) { strategy::make(kind) } else { Box::new(()) }
     }
 
     /// Returns the passes that it adds to steps.

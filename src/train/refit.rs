@@ -20,7 +20,7 @@ const ALPHA_WEIGHT: f32 = 3.0;
 /// Returns labelled Gaussians, those of whole objects, with opacities for a picture of these objects alone.
 ///
 /// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are those of the scene,
-/// by name of the view ([`by_contour`](crate::label::occlusion::by_contour)). `watch` is told the number of each step. Labels
+/// by name of the view ([`occluders_by_contour`](crate::label::occlusion::occluders_by_contour)). `watch` is told the number of each step. Labels
 /// that no mask has are an error.
 pub fn refitted(
     gpu: &Arc<Gpu>,
@@ -47,7 +47,7 @@ pub fn refitted(
         layer_every: Some(1),
         label_alpha: ALPHA_WEIGHT,
         occlusion: Occlusion::None,
-        ..TrainConfig::of_finished(objects, near)
+        ..TrainConfig::for_finished(objects, near)
     };
     let dataset = Dataset { train, ..Dataset::default() };
     let options = TrainerOptions { objective: Objective::OBJECT_OPACITIES, ..scheduler.into() };

@@ -5,7 +5,7 @@ use crate::edit::change::mix_in;
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::engine::Engine;
 use crate::error::Result;
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::harmonics::sh0_of;
 use crate::scene::{Camera, Gaussians};
 use std::collections::BTreeSet;
@@ -90,7 +90,7 @@ impl Drawing {
 }
 
 impl Source for Drawing {
-    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Render> {
         if self.is_blank {
             return Ok(blank(camera, parts, self.options.background));
         }
@@ -116,10 +116,10 @@ impl Source for Drawing {
 }
 
 /// A picture of nothing.
-fn blank(camera: &Camera, parts: Parts, background: [f32; 3]) -> Rendered {
+fn blank(camera: &Camera, parts: Parts, background: [f32; 3]) -> Render {
     let pixels = camera.width as usize * camera.height as usize;
     let count = |asked: bool| if asked { pixels } else { 0 };
-    Rendered {
+    Render {
         width: camera.width,
         height: camera.height,
         rgb: vec![background; pixels],

@@ -4,7 +4,7 @@ use super::hub::{ClientId, Hub};
 use super::message::Message;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::label::click::{Area, Click, Clicking, Hints, Photos, Progress};
+use crate::label::click::{Area, Click, Hints, ObjectFinder, Photos, Progress};
 use crate::scene::Gaussians;
 use glam::DVec3;
 use std::sync::Arc;
@@ -156,14 +156,14 @@ impl Work {
         &self,
         task: Task,
         photos: &'a Photos,
-        clicking: &mut Option<Clicking<'a>>,
+        clicking: &mut Option<ObjectFinder<'a>>,
         wanted: &mut Wanted,
     ) -> Result<()> {
         match task {
             Task::Model(model) => {
                 // Its memory is free before the next model needs some.
                 *clicking = None;
-                *clicking = Some(Clicking::new(Arc::clone(&self.gpu), &model, photos, self.near)?);
+                *clicking = Some(ObjectFinder::new(Arc::clone(&self.gpu), &model, photos, self.near)?);
             }
             Task::Point(client, pointed) => {
                 wanted.client = client;
@@ -183,13 +183,13 @@ impl Work {
             }
             Task::Drop => {
                 *wanted = Wanted::default();
-                clicking.iter_mut().for_each(Clicking::forget);
+                clicking.iter_mut().for_each(ObjectFinder::forget);
             }
         }
         Ok(())
     }
 
-    fn find(&self, number: u64, photos: &Photos, clicking: &mut Clicking, hints: &Hints) -> Result<()> {
+    fn find(&self, number: u64, photos: &Photos, clicking: &mut ObjectFinder, hints: &Hints) -> Result<()> {
         let flags = hints.flags(photos);
         let found = |rows: &[bool], is_last| News::Found { rows: rows.into(), flags: flags.clone(), is_last };
         let rows = clicking.object(hints, &mut |progress| {
@@ -213,7 +213,7 @@ impl Work {
 }
 
 /// Returns the photo of a spot, and its pixels there.
-fn place(spot: Spot, photos: &Photos, clicking: &mut Clicking) -> Result<(usize, Vec<[u32; 2]>)> {
+fn place(spot: Spot, photos: &Photos, clicking: &mut ObjectFinder) -> Result<(usize, Vec<[u32; 2]>)> {
     match spot {
         Spot::Photo(name, shares) => {
             let view = photos.index(&name)?;

@@ -72,7 +72,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
     let finder = finished.photos.map(|photos| Finder::new(Arc::clone(&gpu), photos, near, Arc::clone(&viewer.hub)));
     let frame_up = frame.up;
     let of_views = views.list.first().map(|first| FirstView { up: frame.up, eye: first.view.camera.centre() });
-    let engine = Engine::of_model(gpu, &finished.model, sizes.chain([(1, 1)]))?;
+    let engine = Engine::for_model(gpu, &finished.model, sizes.chain([(1, 1)]))?;
     let mut session = Session {
         hub,
         painter: Painter::new(Arc::clone(&views), is_cpu),

@@ -9,7 +9,7 @@ use super::views::{Posed, Score, Views};
 use crate::error::{Error, Result};
 use crate::files::resize::bounded_size;
 use crate::render::pictures::depth_range;
-use crate::render::{Parts, Rendered};
+use crate::render::{Parts, Render};
 use crate::scene::{Camera, Pixels, View};
 use crate::scenes::camera_json::camera_of;
 use glam::{DVec2, DVec3};
@@ -27,7 +27,7 @@ pub(super) const SURFACE_PX: u32 = 1024;
 /// What draws.
 pub(super) trait Source {
     /// Renders the drawn model.
-    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered>;
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Render>;
     /// Confidence by row of the drawn model.
     fn confidence(&self) -> Option<&[f32]>;
     /// Returns the row of the whole model of a row of the drawn one.
@@ -172,7 +172,7 @@ impl Painter {
         parts: Parts,
         longest: Option<u32>,
         source: &mut dyn Source,
-    ) -> Result<(Camera, [f64; 2], Rendered)> {
+    ) -> Result<(Camera, [f64; 2], Render)> {
         let (full, _) = camera(&self.views, from)?;
         let (width, height) = bounded_size(fitting(&full, source.largest()), longest);
         let scale = [f64::from(width) / f64::from(full.width), f64::from(height) / f64::from(full.height)];

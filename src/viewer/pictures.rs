@@ -4,7 +4,7 @@ use super::message::Pane;
 use crate::error::Result;
 use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8};
 use crate::render::pictures::{depth_preview, to_word};
-use crate::render::{Parts, Rendered};
+use crate::render::{Parts, Render};
 use crate::scene::colour::{HEAT, HEAT_MAX, on_scale, to_byte};
 use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
@@ -37,7 +37,7 @@ pub(super) fn parts(panes: &[Pane]) -> Parts {
 }
 
 /// Returns the bytes of the picture of a pane. Colour, labels, depth and opacity have the pixels that `render` writes.
-pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: bool) -> Result<Vec<u8>> {
+pub(super) fn encode(pane: Pane, rendered: &Render, beside: Beside, is_lossy: bool) -> Result<Vec<u8>> {
     let size = (rendered.width, rendered.height);
     match pane {
         Pane::Depth => return png_grey16(size, &depth_preview(&rendered.depth)),
@@ -58,7 +58,7 @@ pub(super) fn encode(pane: Pane, rendered: &Rendered, beside: Beside, is_lossy: 
 }
 
 /// Returns the label of each pixel as a PNG: its bytes from the lowest on are red, green and blue.
-pub(super) fn label_map(rendered: &Rendered) -> Result<Vec<u8>> {
+pub(super) fn label_map(rendered: &Render) -> Result<Vec<u8>> {
     let pixels: Vec<[u8; 3]> = rendered.labels.iter().map(|id| [0, 8, 16].map(|shift| (id >> shift) as u8)).collect();
     png_rgb8((rendered.width, rendered.height), &pixels)
 }
@@ -78,7 +78,7 @@ fn confidence(row: i32, known: Option<&[f32]>) -> [u8; 3] {
 
 /// Mean difference of the channels; black where the photo has no pixel. A smaller render takes the pixel of the photo
 /// in the same place.
-fn errors(rendered: &Rendered, photo: Option<&Photo>) -> Vec<[u8; 3]> {
+fn errors(rendered: &Render, photo: Option<&Photo>) -> Vec<[u8; 3]> {
     let Some(photo) = photo else { return vec![[0; 3]; rendered.rgb.len()] };
     let (width, height) = (rendered.width, rendered.height);
     let pixel = |(index, colour): (usize, &[f32; 3])| {

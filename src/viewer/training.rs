@@ -9,8 +9,8 @@ use super::rows::{self, Curve};
 use super::views::{Score, Views, describe_scores};
 use super::{Viewer, Words};
 use crate::error::{Error, Result};
-use crate::render::{Parts, Rendered};
-use crate::run::{Event, Flow, Live, Observer};
+use crate::render::{Parts, Render};
+use crate::run::{Event, Flow, LiveScene, Observer};
 use crate::scene::{Camera, Overview};
 use glam::DVec3;
 use serde_json::json;
@@ -65,9 +65,9 @@ struct Pace {
 }
 
 /// The model between two steps.
-impl Source for Live<'_> {
-    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Rendered> {
-        Live::render(self, camera, parts)
+impl Source for LiveScene<'_> {
+    fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Render> {
+        LiveScene::render(self, camera, parts)
     }
 
     fn confidence(&self) -> Option<&[f32]> {
@@ -80,7 +80,7 @@ impl Source for Live<'_> {
     }
 
     fn step(&self) -> u32 {
-        Live::step(self)
+        LiveScene::step(self)
     }
 }
 
@@ -104,7 +104,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    fn begin(&mut self, live: &mut Live, steps: u32) {
+    fn begin(&mut self, live: &mut LiveScene, steps: u32) {
         let views = Arc::new(Views::new(live.dataset()));
         let nothing = Overview { up: DVec3::NEG_Y, target: DVec3::ZERO, distance: 1.0 };
         let frame = views.frame().unwrap_or(nothing);
@@ -115,7 +115,7 @@ impl<'a> Watched<'a> {
     }
 
     /// Serves the pages after a step, as long as the budget allows.
-    fn after_step(&mut self, live: &mut Live) -> Result<()> {
+    fn after_step(&mut self, live: &mut LiveScene) -> Result<()> {
         let spent = self.pace.last.elapsed();
         self.budget.trained(spent);
         self.hear_all(live)?;
@@ -142,7 +142,7 @@ impl<'a> Watched<'a> {
     }
 
     /// Serves the pages for a while, in a pause.
-    fn in_pause(&mut self, live: &mut Live) -> Result<()> {
+    fn in_pause(&mut self, live: &mut LiveScene) -> Result<()> {
         self.report(live, true)?;
         match self.viewer.hub.next(PAUSED_TURN) {
             Some((id, message)) => self.serve(id, message, live),
@@ -158,14 +158,14 @@ impl<'a> Watched<'a> {
         done
     }
 
-    fn hear_all(&mut self, live: &mut Live) -> Result<()> {
+    fn hear_all(&mut self, live: &mut LiveScene) -> Result<()> {
         while let Some((id, message)) = self.viewer.hub.next_message(self.budget.allows()) {
             self.timed(|watched| watched.serve(id, message, live))?;
         }
         Ok(())
     }
 
-    fn serve(&mut self, id: ClientId, message: Message, live: &mut Live) -> Result<()> {
+    fn serve(&mut self, id: ClientId, message: Message, live: &mut LiveScene) -> Result<()> {
         let hub = &self.viewer.hub;
         match message {
             Message::Look(look) => return self.painter.look(hub, id, &look, live),
@@ -189,7 +189,7 @@ impl<'a> Watched<'a> {
     }
 
     /// Scores the next test view. A run has some rounds over them.
-    fn score_one(&mut self, live: &mut Live) -> Result<()> {
+    fn score_one(&mut self, live: &mut LiveScene) -> Result<()> {
         let (step, views) = (live.step(), Arc::clone(&self.painter.views));
         if self.scored_to >= views.list.len() {
             let [fewest, most] = ROUND_STEPS;
@@ -209,7 +209,7 @@ impl<'a> Watched<'a> {
         Ok(())
     }
 
-    fn report(&mut self, live: &mut Live, is_paused: bool) -> Result<()> {
+    fn report(&mut self, live: &mut LiveScene, is_paused: bool) -> Result<()> {
         let now = Instant::now();
         if self.pace.reported.is_some_and(|last| now - last < REPORT_EVERY) || !self.viewer.hub.is_watched() {
             return Ok(());
@@ -249,7 +249,7 @@ impl<'a> Watched<'a> {
     }
 
     /// Serves what an event is about.
-    fn see(&mut self, event: &Event, live: &mut Live) -> Result<()> {
+    fn see(&mut self, event: &Event, live: &mut LiveScene) -> Result<()> {
         match event {
             Event::Started { steps, .. } => self.begin(live, *steps),
             Event::Step { report, is_last, .. } => {
@@ -288,8 +288,8 @@ impl<'a> Watched<'a> {
 }
 
 impl Observer for Watched<'_> {
-    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
-        let asked = self.inner.on(event, live)?;
+    fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow> {
+        let asked = self.inner.observe(event, live)?;
         match self.see(event, live) {
             // Pictures that do not fit cost the training nothing.
             Err(error) if error.is_out_of_memory() => self.notice(&error.to_string()),

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::eval::metrics::{label_iou, psnr};
 use crate::files::image::{jpeg_rgb8, png_rgb8};
 use crate::files::resize::{bounded_size, shrink_photo};
-use crate::render::Rendered;
+use crate::render::Render;
 use crate::scene::{Camera, Dataset, Overview, Pixels, View};
 use crate::scenes::camera_json::CameraFile;
 use serde_json::{Value, json};
@@ -85,7 +85,7 @@ impl Views {
 
 impl Score {
     /// Scores a render of a view in full size: PSNR, and the mean IoU of the objects of its mask.
-    pub(super) fn new(posed: &Posed, rendered: &Rendered) -> Result<Self> {
+    pub(super) fn new(posed: &Posed, rendered: &Render) -> Result<Self> {
         let photo = posed.view.photo.as_ref().map(Pixels::get).transpose()?;
         // Before the first labels of a training there is nothing to compare.
         let is_labelled = rendered.labels.iter().any(|&id| id != 0);

@@ -11,8 +11,8 @@ use labelgs::edit;
 use labelgs::engine::{Engine, EngineSize, LabelSize};
 use labelgs::formats::{LazyModel, ModelRef, read_model, write_model};
 use labelgs::gpu::Gpu;
-use labelgs::render::large::{Index, Painter, fits};
-use labelgs::render::{Parts, RenderOptions, Rendered, label_map, render};
+use labelgs::render::large::{GaussianIndex, Painter, fits};
+use labelgs::render::{Parts, Render, RenderOptions, label_map, render};
 use labelgs::scene::{Camera, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
 use rand::Rng;
@@ -57,7 +57,7 @@ fn memory_of(gpu: &Gpu, count: u64, image: (u32, u32)) -> u64 {
     high
 }
 
-fn floats(drawn: &Rendered) -> Vec<f64> {
+fn floats(drawn: &Render) -> Vec<f64> {
     let all = drawn.rgb.as_flattened().iter().chain(&drawn.alpha).chain(&drawn.depth).chain(&drawn.top_weight);
     all.map(|&value| f64::from(value)).collect()
 }
@@ -73,15 +73,15 @@ fn views_of_a_large_model_are_those_of_the_whole() {
     let whole = read_model(&path).expect("read").gaussians;
     let stored = LazyModel::open(&path).expect("opened");
     assert!(matches!(stored, LazyModel::Stored(_)));
-    let mut engine = Engine::of_model(turn.gpu(), &whole, [SIZE]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &whole, [SIZE]).expect("an engine");
     let options = RenderOptions::default();
-    let expected: Vec<Rendered> =
+    let expected: Vec<Render> =
         cameras().iter().map(|camera| render(&mut engine, camera, &options).expect("a picture")).collect();
     // A fifth of the model and a third of the picture.
     let little = limited(memory_of(&turn, 800, (SIZE.0, 16)));
     assert!(!fits(&turn, stored.view(), SIZE, little).expect("an answer"));
     for source in [stored.view(), ModelRef::Whole(&whole)] {
-        let (index, notes) = Index::of(source, 0.0, |_, _| true).expect("an index");
+        let (index, notes) = GaussianIndex::new(source, 0.0, |_, _| true).expect("an index");
         assert_eq!(notes, Vec::<String>::new());
         let mut roomy = Painter::new(turn.gpu(), source, index.clone(), SchedulerOptions::default());
         let mut tight = Painter::new(turn.gpu(), source, index, little);
@@ -97,13 +97,12 @@ fn views_of_a_large_model_are_those_of_the_whole() {
     // A control: were reaches a fifth smaller, Gaussians at borders would be lost.
     let mut small = whole.clone();
     small.scales.iter_mut().flatten().for_each(|scale| *scale -= 0.2);
-    let (index, _) = Index::of((&small).into(), 0.0, |_, _| true).expect("an index");
+    let (index, _) = GaussianIndex::new((&small).into(), 0.0, |_, _| true).expect("an index");
     let mut careless = Painter::new(turn.gpu(), (&whole).into(), index, SchedulerOptions::default());
-    let differ =
-        |(camera, expected): (&Camera, &Rendered)| careless.render(camera, &options).expect("one") != *expected;
+    let differ = |(camera, expected): (&Camera, &Render)| careless.render(camera, &options).expect("one") != *expected;
     assert!(cameras().iter().zip(&expected).any(differ));
     // Not even a row of tiles.
-    let (index, _) = Index::of(stored.view(), 0.0, |_, _| true).expect("an index");
+    let (index, _) = GaussianIndex::new(stored.view(), 0.0, |_, _| true).expect("an index");
     let mut painter = Painter::new(turn.gpu(), stored.view(), index, limited(memory_of(&turn, 1, (8, 8))));
     let error = painter.render(&cameras()[0], &options).expect_err("too little memory");
     assert!(error.is_out_of_memory() && error.to_string().contains("that may show"), "{error}");
@@ -115,12 +114,12 @@ fn objects_of_a_large_model_are_drawn_alone() {
     let Some(turn) = device() else { return };
     let mut model = crowd(1500);
     model.label_confidence = Some((0..model.len()).map(|row| (row % 10) as f32 / 10.0).collect());
-    let (index, _) = Index::of((&model).into(), 0.6, |_, _| true).expect("an index");
+    let (index, _) = GaussianIndex::new((&model).into(), 0.6, |_, _| true).expect("an index");
     let mut painter = Painter::new(turn.gpu(), (&model).into(), index, SchedulerOptions::default());
     let (camera, options) = (&cameras()[1], RenderOptions::new(0.2, Parts::COLOUR));
     for label in [2, 7] {
         let part = edit::extract(&model, &[label], 0.6).expect("an object");
-        let mut engine = Engine::of_model(turn.gpu(), &part, [SIZE]).expect("an engine");
+        let mut engine = Engine::for_model(turn.gpu(), &part, [SIZE]).expect("an engine");
         assert!(painter.show(Some(&[label])));
         let found = painter.render(camera, &options).expect("a picture");
         assert!(found == render(&mut engine, camera, &options).expect("a picture"), "label {label}");
@@ -142,13 +141,13 @@ fn large_ids_are_drawn_as_small_ones() {
     let mut large = small.clone();
     large.labels.iter_mut().flatten().for_each(|label| *label = wide(*label));
     let (camera, options) = (&cameras()[0], RenderOptions::default());
-    let mut engine = Engine::of_model(turn.gpu(), &small, [SIZE]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &small, [SIZE]).expect("an engine");
     let expected = render(&mut engine, camera, &options).expect("a picture");
     engine.upload_model(&large).expect("uploaded");
     let found = render(&mut engine, camera, &options).expect("a picture");
     let labels: Vec<u32> = expected.labels.iter().map(|&label| wide(label)).collect();
     assert!(labels.iter().any(|&label| label > 65_535) && found.labels == labels);
-    assert!(Rendered { labels, ..expected.clone() } == found);
+    assert!(Render { labels, ..expected.clone() } == found);
     assert!(engine.labels().expect("labels") == large.labels.clone().expect("labels"));
     assert_eq!(engine.download_model().expect("a model").labels, large.labels);
     let of_main = found.main_label_map(large.labels.as_ref().expect("labels")).expect_err("beyond masks");
@@ -180,9 +179,9 @@ fn more_labels_than_a_device_tells_apart_are_drawn_in_bands() {
         model.sh_rest.extend([[0.0; 3]; 3]);
         model.labels.as_mut().expect("labels").push(WALL);
     }
-    let error = Engine::of_model(turn.gpu(), &model, [SIZE]).err().expect("too many labels").to_string();
+    let error = Engine::for_model(turn.gpu(), &model, [SIZE]).err().expect("too many labels").to_string();
     assert!(error.contains("90001 different labels"), "{error}");
-    let (index, _) = Index::of((&model).into(), 0.0, |_, _| true).expect("an index");
+    let (index, _) = GaussianIndex::new((&model).into(), 0.0, |_, _| true).expect("an index");
     let mut painter = Painter::new(turn.gpu(), (&model).into(), index, SchedulerOptions::default());
     let camera = Camera {
         rotation: DMat3::IDENTITY,

@@ -104,7 +104,7 @@ fn segments_change_no_bit() {
     let start = labelgs::scenes::initial_gaussians(&dataset, 0, 400).expect("points");
     let config = TrainConfig { iterations: 20, label_from: Some(5), ..TrainConfig::default() };
     let run = |segment_length: u32| {
-        let shape = KernelShape { segment_length, ..KernelShape::of(gpu.capabilities()) };
+        let shape = KernelShape { segment_length, ..KernelShape::for_device(gpu.capabilities()) };
         let options = TrainerOptions { shape: Some(shape), ..TrainerOptions::default() };
         let mut trainer = Trainer::new(gpu.clone(), config.clone(), &dataset, &start, options).expect("trainer");
         for _ in 0..config.iterations {
@@ -123,7 +123,7 @@ fn segments_change_no_bit() {
 fn segments_of_narrow_pictures_fit_their_buffer() {
     for (width, height) in [(3, 200), (1, 150), (200, 3)] {
         let Some(turn) = device() else { return };
-        let shape = KernelShape { segment_length: 64, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { segment_length: 64, ..KernelShape::for_device(turn.capabilities()) };
         let made = scene(61, &Shape { gaussians: 400, width, height, scales: (0.3, 1.5), ..Shape::default() });
         // Guards behind the buffers are checked after each run.
         let mut fixture = Fixture::with_options(turn, made, true, shape, readable());

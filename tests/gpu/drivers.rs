@@ -44,9 +44,9 @@ fn drivers() -> Vec<Driver> {
 #[test]
 fn the_selftest_passes_on_other_drivers() {
     // The loss, the walks and the blends of a card on the one that is not Mesa's.
-    let of_card = [("LABELGS_LOSS", "shared"), ("LABELGS_WALK", "group"), ("LABELGS_BLEND", "group")]
+    let for_gpu = [("LABELGS_LOSS", "shared"), ("LABELGS_WALK", "group"), ("LABELGS_BLEND", "group")]
         .map(|(variable, form)| (variable, form.to_owned()));
-    let swiftshader = swiftshader().map(|driver| [&driver[..], &of_card].concat());
+    let swiftshader = swiftshader().map(|driver| [&driver[..], &for_gpu].concat());
     for driver in swiftshader.into_iter().chain(narrow_lavapipe()) {
         let place = Place::on(driver.clone());
         let said = String::from_utf8_lossy(&succeeded_output(&place.labelgs(&["selftest", "--json"]))).into_owned();
@@ -201,7 +201,7 @@ fn every_subgroup_size_agrees_with_the_mirrors() {
         let options = GpuOptions { subgroup_size: Some(size), emulate_subgroups: true, ..options() };
         let Ok(gpu) = Gpu::new(&options) else { return };
         let turn = Turn::with(gpu);
-        let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { texel: false, ..KernelShape::for_device(turn.capabilities()) };
         // The kernels of a card, but for the smallest size.
         let short = GroupBlend { chunk_length: 32, long_list: 64, ..GroupBlend::DEFAULT };
         let loss_tile = if size > 32 { 8 } else { 16 };

@@ -57,7 +57,7 @@ impl Family {
 
     /// A row of the table.
     fn row(&self, of: &Capabilities) -> String {
-        let shape = KernelShape::of(&self.capabilities(of));
+        let shape = KernelShape::for_device(&self.capabilities(of));
         shape.check().expect("a shape");
         let sort = if shape.sweeps() { "look back" } else { "by lanes" };
         let splats = if shape.group_walks { "look back" } else { "by lanes" };

@@ -1,6 +1,6 @@
 //! Kernel shapes: the way of reading changes no bit, and the tile size only the last bits.
 
-use crate::pass::fixture::{Fixture, GRADIENTS};
+use crate::pass::fixture::{Fixture, GRADIENT_PLANES};
 use crate::support::compare::{Band, Tolerance, check, close_with_band, exact};
 use crate::support::device;
 use crate::support::scenes::{Scene, Shape, scene};
@@ -14,7 +14,7 @@ fn crowd() -> Scene {
 /// Runs a step and a render with a changed kernel shape.
 fn with_shape<T>(change: impl Fn(&mut KernelShape), read: impl Fn(&mut Fixture) -> T) -> Option<T> {
     let turn = device()?;
-    let mut shape = KernelShape::of(turn.capabilities());
+    let mut shape = KernelShape::for_device(turn.capabilities());
     change(&mut shape);
     let mut fixture = Fixture::with_shape(turn, crowd(), true, shape);
     Some(read(&mut fixture))
@@ -63,7 +63,7 @@ fn everything(fixture: &mut Fixture) -> Vec<u32> {
     let mut bits = fixture.get::<u32>(Buf::IMAGE, 4 * pixels);
     bits.extend(fixture.get::<u32>(Buf::V_IMAGE, 4 * pixels));
     bits.extend(fixture.get::<u32>(Buf::V_SPLATS, 12 * splats));
-    GRADIENTS[..4].iter().for_each(|&plane| bits.extend(fixture.get::<u32>(plane, 4 * splats)));
+    GRADIENT_PLANES[..4].iter().for_each(|&plane| bits.extend(fixture.get::<u32>(plane, 4 * splats)));
     bits.extend(fixture.get::<u32>(Buf::MEANS, 4 * count));
     bits.extend(fixture.get::<u32>(Buf::SH3, 20 * count));
     bits.extend(fixture.get::<u32>(Buf::LABELS, count));

@@ -3,7 +3,7 @@
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::label::occlusion::draw::picture;
 use labelgs::label::occlusion::mean::distances;
-use labelgs::label::occlusion::{Rule, by_contour, by_mean};
+use labelgs::label::occlusion::{Rule, occluders_by_contour, occluders_by_mean};
 use labelgs::records::OcclusionTable;
 use labelgs::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use labelgs::synth::{Preset, SynthOptions, World, ring_of_cameras};
@@ -84,17 +84,17 @@ fn three_strips_on_a_ramp_by_the_papers_rule() {
     let size = |values: Vec<f32>| DepthMap { width: 6, height: 4, values };
     let metric = distances(&size(metric), DepthKind::Metric);
     let expected = lists(&[(1, &[]), (2, &[1]), (3, &[2])]);
-    assert_eq!(by_mean(&labels, &metric), expected);
+    assert_eq!(occluders_by_mean(&labels, &metric), expected);
     // A ramp: one pixel nearer than strip 1, which then has depth besides the one that becomes 0.
     let ramp: Vec<f32> = [9.0, 8.0, 7.0, 6.0, 5.0, 4.0].repeat(4);
-    assert_eq!(by_mean(&labels, &distances(&size(ramp), DepthKind::Inverse)), expected);
+    assert_eq!(occluders_by_mean(&labels, &distances(&size(ramp), DepthKind::Inverse)), expected);
     for kind in [DepthKind::Metric, DepthKind::Inverse] {
-        let flat = by_mean(&labels, &distances(&size(vec![2.0; 24]), kind));
+        let flat = occluders_by_mean(&labels, &distances(&size(vec![2.0; 24]), kind));
         assert_eq!(flat, lists(&[(1, &[]), (2, &[]), (3, &[])]), "{kind:?}");
     }
     // No margin: any difference decides, and exactly one of two that touch is in front.
     let close: Vec<f32> = [1.0, 1.0, 1.0001, 1.0001, 2.0, 2.0].repeat(4);
-    assert_eq!(by_mean(&labels, &distances(&size(close), DepthKind::Metric)), expected);
+    assert_eq!(occluders_by_mean(&labels, &distances(&size(close), DepthKind::Metric)), expected);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn distances_of_inverse_depth_are_the_papers() {
     // The nearest pixel of the picture is 0 and counts as none: strip 1, made of it alone, hides nothing.
     let (labels, _) = strips(&[1.0, 2.0]);
     let inverse = DepthMap { width: 4, height: 4, values: [9.0, 9.0, 5.0, 4.0].repeat(4) };
-    assert!(by_mean(&labels, &distances(&inverse, DepthKind::Inverse)).values().all(Vec::is_empty));
+    assert!(occluders_by_mean(&labels, &distances(&inverse, DepthKind::Inverse)).values().all(Vec::is_empty));
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn the_papers_rule_equals_its_statement() {
         let metric: Vec<f32> =
             (0..13 * 9).map(|i| if random(i) < 0.1 { hole(i) } else { 1.0 + random(i + seed * 200) as f32 }).collect();
         let distance = distances(&DepthMap { width: 13, height: 9, values: metric }, DepthKind::Metric);
-        assert_eq!(by_mean(&labels, &distance), by_mean_slowly(&labels, &distance), "seed {seed}");
+        assert_eq!(occluders_by_mean(&labels, &distance), by_mean_slowly(&labels, &distance), "seed {seed}");
     }
 }
 
@@ -126,27 +126,31 @@ fn a_vote_needs_the_margin_and_the_majority() {
     let rule = Rule::default();
     let found = |depths: &[f32]| {
         let (labels, depth) = strips(depths);
-        by_contour(&labels, &depth, rule)
+        occluders_by_contour(&labels, &depth, rule)
     };
     let nobody = lists(&[(1, &[]), (2, &[])]);
     assert_eq!(found(&[1.0, 1.1]), lists(&[(1, &[]), (2, &[1])]));
     assert_eq!(found(&[1.1, 1.0]), lists(&[(1, &[2]), (2, &[])]));
     assert_eq!(found(&[1.0, 1.01]), nobody, "1 % is within the margin of 2 %");
     let (labels, depth) = strips(&[1.0, 1.01]);
-    assert_eq!(by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
+    assert_eq!(occluders_by_contour(&labels, &depth, Rule { margin: 0.005, ..rule })[&2], [1]);
     let rule = Rule { share: 0.5, ..rule };
     // Half of the votes is no majority.
     let (labels, mut depth) = strips(&[1.0, 2.0]);
     (2..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[2.0, 2.0, 1.0, 1.0]));
-    assert_eq!(by_contour(&labels, &depth, rule), nobody);
-    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[2]), (2, &[1])]), "each hides a part");
+    assert_eq!(occluders_by_contour(&labels, &depth, rule), nobody);
+    assert_eq!(
+        occluders_by_contour(&labels, &depth, Rule::default()),
+        lists(&[(1, &[2]), (2, &[1])]),
+        "each hides a part"
+    );
     // Pixels of equal depth do not vote. Two rows of four decide; at a higher majority, two against one do not.
     let (labels, mut depth) = strips(&[1.0, 1.0]);
     (0..2).for_each(|row| depth[row * 4..row * 4 + 2].fill(0.5));
-    assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
+    assert_eq!(occluders_by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
     depth[3 * 4 + 2..].fill(0.5);
-    assert_eq!(by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
-    assert_eq!(by_contour(&labels, &depth, Rule { share: 0.7, ..rule }), nobody);
+    assert_eq!(occluders_by_contour(&labels, &depth, rule), lists(&[(1, &[]), (2, &[1])]));
+    assert_eq!(occluders_by_contour(&labels, &depth, Rule { share: 0.7, ..rule }), nobody);
 }
 
 #[test]
@@ -156,9 +160,9 @@ fn a_few_pixels_do_not_make_an_occluder() {
     let mut depth = vec![2.0; 4 * rows];
     depth[1] = 0.1;
     let wide: Vec<f64> = depth.iter().map(|&z| f64::from(z)).collect();
-    assert_eq!(by_mean(&labels, &wide)[&2], [1], "the mean has no choice");
-    assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
-    assert_eq!(by_contour(&labels, &depth, Rule { least: 0.0, ..Rule::default() })[&2], [1]);
+    assert_eq!(occluders_by_mean(&labels, &wide)[&2], [1], "the mean has no choice");
+    assert!(occluders_by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
+    assert_eq!(occluders_by_contour(&labels, &depth, Rule { least: 0.0, ..Rule::default() })[&2], [1]);
 }
 
 #[test]
@@ -167,12 +171,12 @@ fn holes_do_not_vote() {
     for hole in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         // Only the last row remains.
         (0..3).for_each(|row| depth[row * 4..row * 4 + 4].fill(hole));
-        assert_eq!(by_contour(&labels, &depth, Rule::default())[&2], [1], "{hole}");
-        assert!(by_contour(&labels, &[hole; 16], Rule::default()).values().all(Vec::is_empty), "{hole}");
+        assert_eq!(occluders_by_contour(&labels, &depth, Rule::default())[&2], [1], "{hole}");
+        assert!(occluders_by_contour(&labels, &[hole; 16], Rule::default()).values().all(Vec::is_empty), "{hole}");
     }
     // Depth on one side only is no comparison.
     (0..4).for_each(|row| depth[row * 4..row * 4 + 4].copy_from_slice(&[f32::NAN, f32::NAN, 2.0, 2.0]));
-    assert!(by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
+    assert!(occluders_by_contour(&labels, &depth, Rule::default()).values().all(Vec::is_empty));
 }
 
 /// A thing without a label stands before an object that has ground and wall, without labels too, around the rest of it.
@@ -185,7 +189,7 @@ fn what_has_no_label_may_hide_too() {
             .map(|at| if at % 6 < 2 && at / 6 < near { 1.0 } else { [3.0, 2.0][usize::from(at % 6 / 2 == 1)] })
             .collect()
     };
-    let found = |near: usize, rule: Rule| by_contour(&labels, &depth(near), rule);
+    let found = |near: usize, rule: Rule| occluders_by_contour(&labels, &depth(near), rule);
     let (hidden, free) = (lists(&[(1, &[0])]), lists(&[(1, &[])]));
     // Half and a tenth of the contour.
     assert_eq!(found(rows, Rule::default()), hidden);
@@ -193,7 +197,7 @@ fn what_has_no_label_may_hide_too() {
     assert_eq!(found(2, Rule { share: 0.05, least: 0.05, ..Rule::default() }), hidden);
     assert_eq!(found(rows, Rule { unlabelled: false, ..Rule::default() }), free);
     let mean: Vec<f64> = depth(rows).iter().map(|&z| f64::from(z)).collect();
-    assert_eq!(by_mean(&labels, &mean), free, "the rule of the paper");
+    assert_eq!(occluders_by_mean(&labels, &mean), free, "the rule of the paper");
 }
 
 /// Wall 3 around table 2 around cup 1, the table's depth that at its outer and at its inner contour.
@@ -201,7 +205,7 @@ fn nested(wall: f32, table: (f32, f32), cup: f32) -> Occluders {
     let ring = |i: usize| (i % 9).min(8 - i % 9).min((i / 9).min(8 - i / 9));
     let labels: Vec<u16> = (0..81).map(|i| [3, 2, 2, 1, 1][ring(i)]).collect();
     let depth: Vec<f32> = (0..81).map(|i| [wall, table.0, table.1, cup, cup][ring(i)]).collect();
-    by_contour(&map(9, &labels), &depth, Rule::default())
+    occluders_by_contour(&map(9, &labels), &depth, Rule::default())
 }
 
 #[test]
@@ -212,15 +216,15 @@ fn occluders_come_in_chains() {
     assert_eq!(nested(3.0, (2.0, 5.0), 4.0), lists(&[(1, &[]), (2, &[1]), (3, &[2])]));
     // A chain must not leave the object: of strips, each is hidden by its neighbour alone.
     let (labels, depth) = strips(&[1.0, 2.0, 3.0, 4.0]);
-    let found = by_contour(&labels, &depth, Rule::default());
+    let found = occluders_by_contour(&labels, &depth, Rule::default());
     assert_eq!(found, lists(&[(1, &[]), (2, &[1]), (3, &[2]), (4, &[3])]));
     // 2 is in front of both neighbours; they do not hide each other.
     let (labels, depth) = strips(&[3.0, 1.0, 4.0]);
-    assert_eq!(by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[2]), (2, &[]), (3, &[2])]));
+    assert_eq!(occluders_by_contour(&labels, &depth, Rule::default()), lists(&[(1, &[2]), (2, &[]), (3, &[2])]));
     // 1 and 2 hide each other's neighbour in a ring; nothing may come to hide itself.
     let labels = map(4, &[1, 1, 2, 2, 1, 1, 2, 2, 1, 3, 3, 2, 3, 3, 3, 3]);
     let depth = [5.0, 5.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0, 3.0, 4.0, 0.5, 3.0, 4.0, 4.0, 4.0, 4.0];
-    for (label, by) in by_contour(&labels, &depth, Rule::default()) {
+    for (label, by) in occluders_by_contour(&labels, &depth, Rule::default()) {
         assert!(!by.contains(&label), "{label} hides itself");
     }
 }
@@ -254,9 +258,9 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
             found.iter().flat_map(|(&label, by)| by.iter().map(move |&other| (label, other))).collect()
         };
         let truth: BTreeSet<(u16, u16)> = hidden.into_keys().collect();
-        let vote = pairs(&by_contour(&labels, &made.depth, Rule::default()));
+        let vote = pairs(&occluders_by_contour(&labels, &made.depth, Rule::default()));
         let wide: Vec<f64> = made.depth.iter().map(|&z| f64::from(z)).collect();
-        let mean = pairs(&by_mean(&labels, &wide));
+        let mean = pairs(&occluders_by_mean(&labels, &wide));
         both += vote.intersection(&truth).count();
         found_pairs += vote.len();
         mean_both += mean.intersection(&truth).count();

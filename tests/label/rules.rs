@@ -1,9 +1,9 @@
 //! Label rules on the mirrors: weights and thresholds, the lift, densification, the label loss, object layers.
 
-use crate::reference::blend::{Blended, Contribution, Trace, blend_backward, blend_forward, shade};
+use crate::reference::blend::{BlendedImage, Contribution, Trace, blend_backward, blend_forward, shade};
 use crate::reference::densify::{Origin, Population, accumulate, densify, mark};
 use crate::reference::lift::{Masks, lift, lift_resolve, pixel_of, vote_key};
-use crate::reference::loss::{BORDER, ObjectPixel, Photo, label_loss};
+use crate::reference::loss::{CONTOUR_BIT, ObjectPixel, Photo, label_loss};
 use crate::reference::model::flatten;
 use crate::reference::project::{project_all, project_backward};
 use crate::reference::splat::Splat;
@@ -21,13 +21,13 @@ fn on_ray(gaussian: usize, opacity: f64) -> Splat {
     Splat { gaussian, depth, mean2d: [0.5, 0.5], conic: [1.0, 0.0, 1.0], opacity, colour: [1.0; 3] }
 }
 
-fn one_pixel(opacities: &[f64]) -> Blended {
+fn one_pixel(opacities: &[f64]) -> BlendedImage {
     let splats: Vec<Splat> = opacities.iter().enumerate().map(|(i, &o)| on_ray(i, o)).collect();
     blend_forward(&Rules::default(), &splats, (1, 1), BLACK)
 }
 
 /// Labels after lifting label 7 from a one-pixel image.
-fn lifted(image: &Blended, gaussians: usize) -> Vec<u32> {
+fn lifted(image: &BlendedImage, gaussians: usize) -> Vec<u32> {
     let masks = Masks { label_map: &[7], sampled: &[7], gpf: true };
     let mut labels = vec![0; gaussians];
     lift_resolve(&lift(&Rules::default(), image, &vec![Some([0.5, 0.5]); gaussians], &masks), &mut labels);
@@ -83,7 +83,7 @@ fn a_pixel_without_a_splat_has_no_main_gaussian() {
 }
 
 /// A row of 48 px: mask 1 left, mask 2 right. The wide splat 1 has its centre in mask 1, but there splat 0 hides it.
-fn spanning() -> (Blended, Vec<Option<[f64; 2]>>, Vec<u32>) {
+fn spanning() -> (BlendedImage, Vec<Option<[f64; 2]>>, Vec<u32>) {
     let splat = |gaussian, x, sigma: f64, opacity| Splat {
         mean2d: [x, 0.5],
         conic: [sigma.powi(-2), 0.0, sigma.powi(-2)],
@@ -224,7 +224,7 @@ fn pixels_near_a_contour_are_ignored_and_weights_scale() {
         let slot = ObjectPixel { label: 1, occluders: Vec::new(), weight };
         label_loss(&Rules::default(), (&[[0.8; 3]; 4], &[0.8; 4]), &photo, map, &slot)
     };
-    let (all, without) = (loss(&[1, 0, 1, 0], 1.0), loss(&[1, BORDER, 1 | BORDER, 0], 1.0));
+    let (all, without) = (loss(&[1, 0, 1, 0], 1.0), loss(&[1, CONTOUR_BIT, 1 | CONTOUR_BIT, 0], 1.0));
     assert!((all.value - 2.0 * without.value).abs() < 1e-12 && without.value > 0.0);
     assert_eq!(without.v_image[1..3], [BLACK, BLACK]);
     assert!((loss(&[1, 0, 1, 0], 2.5).value - 2.5 * all.value).abs() < 1e-12);

@@ -9,7 +9,7 @@ use labelgs::verify::selftest::antialias::{around, fine, sizes, step};
 use labelgs::verify::selftest::fixture::Fixture;
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
-    Fixture::new(turn.gpu(), scene, false, KernelShape::of(turn.capabilities()), readable())
+    Fixture::new(turn.gpu(), scene, false, KernelShape::for_device(turn.capabilities()), readable())
 }
 
 #[test]

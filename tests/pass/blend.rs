@@ -136,7 +136,7 @@ fn blend_backward_and_gather_equal_their_mirrors_of(form: Option<GroupBlend>) {
 fn v_image(fixture: &mut Fixture) -> Upstream {
     let pixels = fixture.pixels();
     let rows = fixture.get::<[f32; 4]>(Buf::V_IMAGE, pixels);
-    Upstream::of_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>())
+    Upstream::from_colours(&rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect::<Vec<_>>())
 }
 
 /// Gradient of every layer: the scene's from the device, the objects' from their mirror (a sign of each difference),
@@ -197,7 +197,7 @@ fn no_tile_misses_a_visible_splat() {
     fixture.train();
     let (splats, (width, height), shape) = (fixture.splats(), fixture.size(), *fixture.engine.shape());
     let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats.len());
-    let touched = DepthOrder::of(&mut fixture).expect("an order").sorted(&touched);
+    let touched = DepthOrder::read(&mut fixture).expect("an order").sorted(&touched);
     let grid = tile::TileGrid { size: (width, height), tile: (shape.tile_width as usize, shape.tile_height as usize) };
     let rules = Rules::default();
     for (splat, &touched) in splats.iter().zip(&touched) {

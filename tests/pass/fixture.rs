@@ -16,7 +16,7 @@ use labelgs::verify::selftest::fixture;
 use labelgs::verify::selftest::order::DepthOrder;
 use std::ops::{Deref, DerefMut};
 
-pub use fixture::{GRADIENTS, MOMENTS_1, MOMENTS_2, PARAMETERS, VOTE_COLUMNS, readable};
+pub use fixture::{GRADIENT_PLANES, MOMENTS_1, MOMENTS_2, PARAMETER_PLANES, VOTE_COLUMNS, readable};
 
 /// A scene, an engine with its model, and the step that is run.
 pub struct Fixture {
@@ -46,7 +46,7 @@ pub const BLENDS: [Option<GroupBlend>; 2] =
 impl Fixture {
     /// The scene on the shared device, with or without labels, with the device's kernel shape.
     pub fn new(turn: Turn, scene: Scene, labels: bool) -> Self {
-        let shape = KernelShape::of(turn.capabilities());
+        let shape = KernelShape::for_device(turn.capabilities());
         Self::with_shape(turn, scene, labels, shape)
     }
 
@@ -57,7 +57,7 @@ impl Fixture {
 
     /// As `new`, with blends of one form or the other.
     pub fn blending(turn: Turn, scene: Scene, labels: bool, form: Option<GroupBlend>) -> Self {
-        let shape = KernelShape::of(turn.capabilities());
+        let shape = KernelShape::for_device(turn.capabilities());
         let shape = form.map_or(KernelShape { group_blend: None, ..shape }, |form| shape.with_group_blend_of(form));
         Self::with_shape(turn, scene, labels, shape)
     }
@@ -117,7 +117,7 @@ impl Fixture {
 
     /// Sums of the gradient records of each splat, by depth.
     pub fn splat_records(&mut self) -> Vec<[f32; 12]> {
-        let order = DepthOrder::of(self).expect("an order");
+        let order = DepthOrder::read(self).expect("an order");
         let records = self.get(Buf::V_SPLATS, order.splats.len());
         order.sorted(&records)
     }

@@ -32,7 +32,7 @@ struct Step {
 /// A step, with the chunks of lists that were walked in parts, and the lists that came next.
 fn step(of: Scene, form: GroupBlend, with: With) -> Option<(Step, [u32; 2])> {
     let turn = device()?;
-    let shape = KernelShape::of(turn.capabilities()).with_group_blend_of(form);
+    let shape = KernelShape::for_device(turn.capabilities()).with_group_blend_of(form);
     let mut fixture =
         Fixture::with_shape(turn, of, matches!(with, With::Disagreement | With::Layers | With::Lift), shape);
     if with != With::Lift {

@@ -32,7 +32,7 @@ fn mapped(
     shape: impl Fn(KernelShape) -> KernelShape,
 ) -> Option<(Fixture, Vec<u16>, [u32; 2])> {
     let turn = device()?;
-    let shape = shape(KernelShape::of(turn.capabilities()));
+    let shape = shape(KernelShape::for_device(turn.capabilities()));
     let mut fixture = Fixture::with_options(turn, haze(objects), true, shape, readable());
     let undecided = [1, walks].map(|walks| fixture.train_as(ListKey::LabelMap(walks)).counters.undecided_tiles);
     println!("{objects} objects, {shape:?}: undecided tiles {undecided:?}");
@@ -97,7 +97,7 @@ fn a_model_without_labels_has_a_map_of_zeros_and_no_memory_for_it() {
     let s = haze(3);
     let size = (s.camera.width, s.camera.height);
     let bare = Gaussians { labels: None, ..s.gaussians.clone() };
-    let mut engine = Engine::of_model(turn.gpu(), &bare, [size]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &bare, [size]).expect("an engine");
     let rendered = render(&mut engine, &s.camera, &RenderOptions::new(0.2, Parts::ALL)).expect("a picture");
     assert!(rendered.labels.len() == rendered.rgb.len() && rendered.labels.iter().all(|&label| label == 0));
     let memory = |engine: &Engine| -> u64 {
@@ -110,6 +110,6 @@ fn a_model_without_labels_has_a_map_of_zeros_and_no_memory_for_it() {
     let options = RenderOptions::new(0.2, Parts::ALL);
     let grown = render(&mut engine, &s.camera, &options).expect("a picture");
     assert!(memory(&engine) > 0 && grown.labels.iter().any(|&label| label > 0) && grown.rgb == rendered.rgb);
-    let mut made = Engine::of_model(turn.gpu(), &s.gaussians, [size]).expect("an engine");
+    let mut made = Engine::for_model(turn.gpu(), &s.gaussians, [size]).expect("an engine");
     assert!(render(&mut made, &s.camera, &options).expect("a picture") == grown);
 }

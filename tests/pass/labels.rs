@@ -37,7 +37,7 @@ fn label_loss_of_a_step_equals_its_mirror() {
     assert!(target.slots.iter().any(|slot| !slot.occluders.is_empty()));
     let actual = step_input::label_loss(
         &fixture.input,
-        fixture.view.of_step(&fixture.scene),
+        fixture.view.step_view(&fixture.scene),
         &fixture.config,
         counters.loss_label,
     );
@@ -196,7 +196,7 @@ fn label_loss_of_an_empty_object_is_its_masked_photo_without_gradient() {
     assert_eq!((counters.loss_label, counters.layer_tile_count), (0.0, 0));
     let loss = step_input::label_loss(
         &fixture.input,
-        fixture.view.of_step(&fixture.scene),
+        fixture.view.step_view(&fixture.scene),
         &fixture.config,
         counters.loss_label,
     );
@@ -221,7 +221,7 @@ fn label_loss_of_a_correct_object_is_0() {
     let counters = fixture.train().counters;
     let loss = step_input::label_loss(
         &fixture.input,
-        fixture.view.of_step(&fixture.scene),
+        fixture.view.step_view(&fixture.scene),
         &fixture.config,
         counters.loss_label,
     );

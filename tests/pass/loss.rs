@@ -27,7 +27,7 @@ const KINK: f64 = 1e-6;
 fn photo_loss_equals_its_mirror() {
     for (seed, width, height, loss_tile) in [(91, 61, 45, 0), (92, 70, 133, 0), (91, 61, 45, 16), (92, 70, 133, 8)] {
         let Some(turn) = device() else { return };
-        let kernels = KernelShape { loss_tile, ..KernelShape::of(turn.capabilities()) };
+        let kernels = KernelShape { loss_tile, ..KernelShape::for_device(turn.capabilities()) };
         let shape = Shape { gaussians: 150, width, height, ..Shape::default() };
         let mut fixture = Fixture::with_shape(turn, scene(seed, &shape), false, kernels);
         let counters = fixture.train().counters;

@@ -17,7 +17,7 @@ const BEARING: [&str; 5] = ["adam_beta1", "adam_beta2", "moment_ratio", "moment_
 fn packed_moments_of_every_attribute_equal_their_mirror() {
     for texel in [false, true] {
         let Some(turn) = device() else { return };
-        let shape = KernelShape { texel, update: Update::Split, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { texel, update: Update::Split, ..KernelShape::for_device(turn.capabilities()) };
         let judge = packed(&mut Fixture::with_moments(turn, away(106), true, shape, true), None).expect("it runs");
         prove("packed moments", &BEARING, judge);
     }
@@ -29,7 +29,7 @@ fn packed_moments_of_one_kernel_and_of_late_gaussians_equal_their_mirror() {
     for (labels, texel) in [(true, true), (false, false)] {
         let Some(turn) = device() else { return };
         let gpu = turn.gpu();
-        let shape = KernelShape { group_walks: true, texel, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { group_walks: true, texel, ..KernelShape::for_device(turn.capabilities()) };
         let lazy = KernelShape { update: Update::Lazy, ..shape };
         let mut split = fixture::Fixture::new(gpu, away(107), labels, shape, readable()).expect("it starts");
         let mut late = Fixture::with_moments(turn, away(107), labels, lazy, true);
@@ -45,7 +45,7 @@ fn densification_relocation_and_reset_keep_packed_moments() {
     for texel in [false, true] {
         let Some(turn) = device() else { return };
         let rig = |scene| {
-            let shape = KernelShape { texel, ..KernelShape::of(turn.capabilities()) };
+            let shape = KernelShape { texel, ..KernelShape::for_device(turn.capabilities()) };
             let with = |room: EngineSize| room.with_half_moments(true);
             fixture::Fixture::with_room(turn.gpu(), scene, true, (shape, readable()), with).expect("it starts")
         };

@@ -1,6 +1,6 @@
 //! The optimiser, densification and the opacity reset.
 
-use super::fixture::{Fixture, PARAMETERS, prove};
+use super::fixture::{Fixture, PARAMETER_PLANES, prove};
 use crate::reference::Rules;
 use crate::reference::densify::absolute_gradient2d;
 use crate::reference::random::normal_draw;
@@ -19,7 +19,7 @@ fn adam_of_every_attribute_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let scene = Scene { frozen: 20, ..scene(101, &Shape { gaussians: 60, ..Shape::default() }) };
     let mut fixture = Fixture::new(turn, scene, true);
-    let frozen = |fixture: &mut Fixture| fixture.rows(PARAMETERS, 60)[40..].to_vec();
+    let frozen = |fixture: &mut Fixture| fixture.rows(PARAMETER_PLANES, 60)[40..].to_vec();
     let stays = frozen(&mut fixture);
     fixture.fixed = SceneScale { extent: 4.0 };
     let judge = adam(&mut fixture, 5).expect("it runs");

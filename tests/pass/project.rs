@@ -1,6 +1,6 @@
 //! Culling, compaction, order, projection, and the projection's gradient.
 
-use super::fixture::{Fixture, GRADIENTS, prove};
+use super::fixture::{Fixture, GRADIENT_PLANES, prove};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::project::{near_margin, project_backward, project_forward, sigmoid};
 use crate::reference::scan::compact;
@@ -40,14 +40,14 @@ fn visible_gaussians_come_in_depth_order() {
 /// With projections of a processor, or with those of a card, which look back.
 fn projecting(scene: Scene, looks_back: bool) -> Option<Fixture> {
     let turn = device()?;
-    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::for_device(turn.capabilities()) };
     Some(Fixture::with_shape(turn, scene, false, shape))
 }
 
 fn come_in_depth_order(mut fixture: Fixture) {
     let report = fixture.train();
     let count = fixture.scene.gaussians.len();
-    let found = DepthOrder::of(&mut fixture).expect("an order");
+    let found = DepthOrder::read(&mut fixture).expect("an order");
     let mut keys = vec![KEY_INVISIBLE; count];
     found.gaussians.iter().zip(&found.keys).for_each(|(&gaussian, &key)| keys[gaussian as usize] = key);
     let (model, camera, size) = (fixture.model(), fixture.scene.camera.clone(), fixture.size());
@@ -124,7 +124,7 @@ fn project_backward_of_each_degree_equals_its_mirror() {
         fixture.train();
         let (splats, model, camera) = (fixture.splats(), fixture.model(), fixture.scene.camera.clone());
         let v_splats: Vec<SplatGradient> = fixture.splat_gradients(&splats);
-        let actual = fixture.rows(GRADIENTS, splats.len());
+        let actual = fixture.rows(GRADIENT_PLANES, splats.len());
         assert!(actual.iter().filter(|row| row.floats() != [0.0; ROW_FLOATS]).count() > 60);
         let mut bearing = vec!["dilation", "jacobian_margin", "sh_c0", "sh_c1"];
         bearing.extend(&["sh_c2", "sh_c3"][..sh_degree as usize - 1]);

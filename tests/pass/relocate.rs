@@ -13,7 +13,7 @@ use labelgs::verify::selftest::fixture::Fixture;
 use labelgs::verify::selftest::relocation::{exploration, relocation};
 
 fn rig(turn: &Turn, scene: Scene) -> labelgs::Result<Fixture> {
-    Fixture::new(turn.gpu(), scene, true, KernelShape::of(turn.capabilities()), readable())
+    Fixture::new(turn.gpu(), scene, true, KernelShape::for_device(turn.capabilities()), readable())
 }
 
 #[test]

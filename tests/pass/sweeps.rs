@@ -54,7 +54,7 @@ fn each_size(items: usize, mut test: impl FnMut(&mut Engine)) {
 }
 
 fn engine(turn: &Turn, items: usize) -> Engine {
-    let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(ITEMS);
+    let shape = KernelShape { texel: false, ..KernelShape::for_device(turn.capabilities()) }.with_sweeps_of(ITEMS);
     let size = EngineSize::new(items as u64, (64, 64));
     Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts")
 }
@@ -288,7 +288,7 @@ fn ten_million_keys_are_sorted() {
     const KEYS: usize = 10_000_000;
     let Ok(gpu) = Gpu::new(&options()) else { return };
     let turn = Turn::with(gpu);
-    let shape = KernelShape { texel: false, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(16);
+    let shape = KernelShape { texel: false, ..KernelShape::for_device(turn.capabilities()) }.with_sweeps_of(16);
     let size = EngineSize::new(1, (64, 64));
     let mut engine =
         Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");

@@ -20,14 +20,15 @@ const SLACK: f64 = 0.02;
 fn tile_lists_equal_their_mirror() {
     for looks_back in [false, true] {
         let Some(turn) = device() else { return };
-        let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+        let shape =
+            KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::for_device(turn.capabilities()) };
         lists_equal_their_mirror(Fixture::with_shape(turn, opaque_scene(81), true, shape));
     }
 }
 
 fn lists_equal_their_mirror(mut fixture: Fixture) {
     let counters = fixture.train().counters;
-    let order = DepthOrder::of(&mut fixture).expect("an order");
+    let order = DepthOrder::read(&mut fixture).expect("an order");
     let (splats, pairs) = (fixture.splats(), counters.instance_count as usize);
     let (uniforms, shape, labels) = (fixture.uniforms(), *fixture.engine.shape(), fixture.model().labels);
     let grid = TileGrid { size: fixture.size(), tile: (shape.tile_width as usize, shape.tile_height as usize) };
@@ -75,7 +76,7 @@ fn lists_equal_their_mirror(mut fixture: Fixture) {
 fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
     for (layers, narrow) in [(63, true), (64, false)] {
         let Some(turn) = device().filter(|turn| turn.capabilities().has_narrow_storage()) else { return };
-        let own = KernelShape { narrow_keys: true, ..KernelShape::of(turn.capabilities()) }.with_sweeps_of(4);
+        let own = KernelShape { narrow_keys: true, ..KernelShape::for_device(turn.capabilities()) }.with_sweeps_of(4);
         let (width, height) = (32 * own.tile_width, 32 * own.tile_height);
         let size = Shape {
             gaussians: 40,
@@ -97,7 +98,7 @@ fn lists_of_narrow_keys_equal_their_mirror_up_to_the_last_tile() {
         let (keys, slots) = fixture.sorted_pairs(pairs);
         assert_eq!(keys.last().map(|&key| u64::from(key)), Some(tiles - 1));
         let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, pairs);
-        let order = DepthOrder::of(&mut fixture).expect("an order");
+        let order = DepthOrder::read(&mut fixture).expect("an order");
         lists(&mut fixture, &keys, &slots, &owners, &order);
         let splats = fixture.sorted_splats(pairs);
         let of_scene = keys.iter().zip(&splats).filter(|(key, _)| **key < 1024);

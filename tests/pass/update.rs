@@ -1,6 +1,6 @@
 //! The update of a step in one kernel against the passes that it replaces, and Gaussians that are late.
 
-use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETERS, prove, readable};
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETER_PLANES, prove, readable};
 use super::walks::{WALKERS, tall_scene};
 use crate::reference::Row;
 use crate::support::device;
@@ -30,7 +30,7 @@ fn steps(update: Update, (labels, antialiased, texel): (bool, bool, bool), count
     let shape = Shape { gaussians: COUNT, ..Shape::default() };
     let mut scene = Scene { frozen: FROZEN as u32, ..scene(103, &shape) };
     scene.gaussians.antialiased = antialiased;
-    let kernels = KernelShape { group_walks: true, update, texel, ..KernelShape::of(turn.capabilities()) };
+    let kernels = KernelShape { group_walks: true, update, texel, ..KernelShape::for_device(turn.capabilities()) };
     let mut fixture = Fixture::with_update(turn, scene, labels, kernels);
     fixture.input.update = true;
     let cx = fixture.scene.camera.cx;
@@ -46,7 +46,7 @@ fn steps(update: Update, (labels, antialiased, texel): (bool, bool, bool), count
         }
         let trained = COUNT - FROZEN;
         let planes =
-            [fixture.rows(PARAMETERS, COUNT), fixture.rows(MOMENTS_1, trained), fixture.rows(MOMENTS_2, trained)];
+            [fixture.rows(PARAMETER_PLANES, COUNT), fixture.rows(MOMENTS_1, trained), fixture.rows(MOMENTS_2, trained)];
         all.push(After {
             planes,
             stats: fixture.get(Buf::DENSIFY_STATS, trained),
@@ -73,7 +73,8 @@ fn differences(a: &After, b: &After) -> [f64; 3] {
 }
 
 fn lazy(turn: Turn, seed: u64) -> Fixture {
-    let shape = KernelShape::of(turn.capabilities()).with_lazy_updates(turn.capabilities()).expect("few buffers");
+    let shape =
+        KernelShape::for_device(turn.capabilities()).with_lazy_updates(turn.capabilities()).expect("few buffers");
     Fixture::with_update(turn, partly_frozen(seed), true, shape)
 }
 
@@ -81,7 +82,7 @@ fn lazy(turn: Turn, seed: u64) -> Fixture {
 fn an_update_in_one_kernel_equals_its_mirror() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
-    let shape = KernelShape::of(turn.capabilities());
+    let shape = KernelShape::for_device(turn.capabilities());
     let mut fused = lazy(turn, 104);
     let mut split = fixture::Fixture::new(gpu, partly_frozen(104), true, shape, readable()).expect("it starts");
     let judge = step(&mut fused, &mut split).expect("it runs");
@@ -142,7 +143,7 @@ fn late_gaussians_catch_up_to_those_of_every_step() {
 fn large_splats_are_summed_by_a_workgroup() {
     let run = |update| {
         let turn = device()?;
-        let shape = KernelShape { group_walks: true, update, ..KernelShape::of(turn.capabilities()) };
+        let shape = KernelShape { group_walks: true, update, ..KernelShape::for_device(turn.capabilities()) };
         let scene = tall_scene();
         let count = scene.gaussians.len();
         let mut fixture = Fixture::with_update(turn, scene, true, shape);

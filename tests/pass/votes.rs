@@ -1,6 +1,6 @@
 //! Votes for labels: the sums of a sweep against the mirror, for any number of columns and walks.
 
-use super::fixture::{Fixture, PARAMETERS, VOTE_COLUMNS, prove};
+use super::fixture::{Fixture, PARAMETER_PLANES, VOTE_COLUMNS, prove};
 use crate::reference::Rules;
 use crate::reference::lift::{vote, vote_alone};
 use crate::support::compare::{Tolerance, check, close};
@@ -142,7 +142,7 @@ fn one_sweep_of_many_labels_equals_many_sweeps() {
     let how = Sweep::new(0.2, 0);
     let [few, many] = [3, 400].map(|columns| {
         let mut engine = vote_engine(turn.gpu(), &scene.gaussians, &[&view], columns).expect("the engine starts");
-        sweep(&mut engine, &[Voter::of(&view, &mask.clone().into())], how).expect("votes")
+        sweep(&mut engine, &[Voter::for_view(&view, &mask.clone().into())], how).expect("votes")
     });
     assert!(many.labels.len() > 150, "{} labels", many.labels.len());
     assert!((0..many.len()).any(|row| many.row(row).len() > 64), "a Gaussian meets many labels");
@@ -155,7 +155,7 @@ fn a_training_has_memory_for_votes_only_while_it_counts_them() {
     let Some(turn) = device() else { return };
     let gpu = turn.gpu();
     let mut fixture = Fixture::new(turn, patches(145), true);
-    let state = |fixture: &mut Fixture| fixture.rows(PARAMETERS, 50);
+    let state = |fixture: &mut Fixture| fixture.rows(PARAMETER_PLANES, 50);
     fixture.train();
     let (before, capacity) = (state(&mut fixture), *fixture.engine.capacity());
     let votes = |fixture: &Fixture| fixture.engine.raw().memory().iter().any(|(name, _)| name.starts_with("votes_"));

@@ -34,14 +34,14 @@ struct Walked {
 
 fn walk(options: &GpuOptions, group_walks: bool) -> Option<Walked> {
     let turn = Turn::with(Gpu::new(options).ok()?);
-    let shape = KernelShape { sweep_items: 0, group_walks, ..KernelShape::of(turn.capabilities()) };
+    let shape = KernelShape { sweep_items: 0, group_walks, ..KernelShape::for_device(turn.capabilities()) };
     // Keys are counted for sorts that look back, as on a card, and are not.
     let sweeps = group_walks && shape.subgroup > 8;
     let shape = if sweeps { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
     let mut fixture = Fixture::with_shape(turn, tall_scene(), true, shape);
     let counters = fixture.train().counters;
     let (splats, pairs) = (counters.visible_count as usize, counters.instance_count as usize);
-    let order = DepthOrder::of(&mut fixture).expect("an order");
+    let order = DepthOrder::read(&mut fixture).expect("an order");
     let touched = fixture.get::<u32>(Buf::TILES_TOUCHED, splats);
     let touched: Vec<u32> = order.splats.iter().map(|&splat| touched[splat as usize]).collect();
     gathered(&mut fixture, &order, &touched);
@@ -124,7 +124,7 @@ fn a_workgroup_walks_splats_as_invocations_do() {
 /// Lists of splats and pairs over many partitions, where partition `held` tells nothing.
 fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32>) -> Option<[Vec<u32>; 5]> {
     let turn = Turn::with(Gpu::new(options).ok()?);
-    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::of(turn.capabilities()) };
+    let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::for_device(turn.capabilities()) };
     let shape = if looks_back { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
     let mut fixture = Fixture::with_shape(turn, scene, false, shape);
     fixture.render();
@@ -139,7 +139,7 @@ fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32
     fixture.engine.raw_mut().run(id, 0).expect("run");
     fixture.engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
     let counters = fixture.get::<Counters>(Buf::COUNTERS, 1)[0];
-    let order = DepthOrder::of(&mut fixture).expect("an order");
+    let order = DepthOrder::read(&mut fixture).expect("an order");
     let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, counters.visible_count as usize);
     let (keys, places) = fixture.sorted_pairs(counters.instance_count as usize);
     let owners = fixture.get::<u32>(Buf::SPLAT_FROM_INSTANCE, places.len());

@@ -41,7 +41,7 @@ fn a_device_saves_what_it_compiled_and_takes_it_back() {
     let with = || GpuOptions { pipelines: Some(Arc::clone(&store)), ..options() };
     let use_it = || {
         let gpu = Gpu::new(&with()).expect("a device");
-        let shape = KernelShape::of(gpu.capabilities());
+        let shape = KernelShape::for_device(gpu.capabilities());
         let device = gpu.capabilities().uuid_text();
         let messages = gpu.message_log();
         let room = labelgs::engine::EngineSize::new(10, (16, 16));

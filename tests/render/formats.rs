@@ -21,7 +21,7 @@ fn pictures_of_every_format_are_those_of_the_ply() {
     let options = labelgs_synth::SynthOptions { views: 5, width: 96, height: 64, ..Default::default() };
     let camera = labelgs_synth::ring_of_cameras(&options)[1].clone();
     let draw = |model: &Gaussians| {
-        let mut engine = Engine::of_model(turn.gpu(), model, [(96, 64)]).expect("an engine");
+        let mut engine = Engine::for_model(turn.gpu(), model, [(96, 64)]).expect("an engine");
         render(&mut engine, &camera, &RenderOptions::default()).expect("a picture").rgb
     };
     let expected = draw(&before);

@@ -1,7 +1,7 @@
 //! Pictures of a view as files.
 
 use exr::prelude::read_first_flat_layer_from_file;
-use labelgs::render::{Format, Rendered, What, write_pictures};
+use labelgs::render::{Format, PictureKind, Render, write_pictures};
 use std::path::Path;
 
 /// All samples of an EXR, channels by name.
@@ -14,7 +14,7 @@ fn exr(path: &Path) -> Vec<(String, Vec<f32>)> {
 #[test]
 fn each_kind_of_picture_has_its_file() {
     let folder = tempfile::tempdir().expect("folder");
-    let rendered = Rendered {
+    let rendered = Render {
         width: 2,
         height: 1,
         rgb: vec![[0.0, 0.5, 1.5], [-1.0, 0.25, f32::NAN]],
@@ -24,7 +24,14 @@ fn each_kind_of_picture_has_its_file() {
         top_id: vec![16_777_215, -1],
         top_weight: vec![0.75, 0.0],
     };
-    let all = [What::TopWeight, What::Rgb, What::Depth, What::Alpha, What::Labels, What::TopId];
+    let all = [
+        PictureKind::TopWeight,
+        PictureKind::Rgb,
+        PictureKind::Depth,
+        PictureKind::Alpha,
+        PictureKind::Labels,
+        PictureKind::TopId,
+    ];
     let names = |format| {
         let written = write_pictures(folder.path(), "left_00", &rendered, &all, (format, false)).expect("written");
         let name = |path: &std::path::PathBuf| path.file_name().expect("name").to_string_lossy().into_owned();
@@ -51,9 +58,10 @@ fn each_kind_of_picture_has_its_file() {
 fn large_ids_and_rows_are_whole_numbers_of_32_bits() {
     let folder = tempfile::tempdir().expect("folder");
     let (labels, rows) = ([2_147_483_647, 16_777_217, 0], [16_777_217, -1, 2_147_483_647]);
-    let rendered =
-        Rendered { width: 3, height: 1, labels: labels.to_vec(), top_id: rows.to_vec(), ..Rendered::default() };
-    let write = |format| write_pictures(folder.path(), "a", &rendered, &[What::Labels, What::TopId], (format, true));
+    let rendered = Render { width: 3, height: 1, labels: labels.to_vec(), top_id: rows.to_vec(), ..Render::default() };
+    let write = |format| {
+        write_pictures(folder.path(), "a", &rendered, &[PictureKind::Labels, PictureKind::TopId], (format, true))
+    };
     let error = write(Format::Png).expect_err("16 bits").to_string();
     assert!(error.contains("above 65535") && error.contains("exr"), "{error}");
     write(Format::Exr).expect("written");
@@ -71,6 +79,6 @@ fn large_ids_and_rows_are_whole_numbers_of_32_bits() {
 #[test]
 fn a_picture_of_another_size_is_refused() {
     let folder = tempfile::tempdir().expect("folder");
-    let rendered = Rendered { width: 2, height: 2, alpha: vec![1.0], ..Rendered::default() };
-    assert!(write_pictures(folder.path(), "a", &rendered, &[What::Alpha], (Format::Png, false)).is_err());
+    let rendered = Render { width: 2, height: 2, alpha: vec![1.0], ..Render::default() };
+    assert!(write_pictures(folder.path(), "a", &rendered, &[PictureKind::Alpha], (Format::Png, false)).is_err());
 }

@@ -4,7 +4,7 @@ use crate::support::runs::Place;
 use crate::support::{device, device::Turn};
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::render::Parts;
-use labelgs::run::{Event, Flow, Live, Observer, Request, Settings, Start, Summary};
+use labelgs::run::{Event, Flow, LiveScene, Observer, Request, Settings, Start, Summary};
 use labelgs::scene::Camera;
 use labelgs::{Result, run};
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ struct Watcher {
 }
 
 impl Observer for Watcher {
-    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
+    fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow> {
         let name = match event {
             Event::Started { after, .. } => {
                 assert_eq!(*after, live.step());
@@ -132,7 +132,7 @@ fn a_stopped_run_goes_on_to_the_same_bits() {
 fn an_error_of_the_observer_ends_the_run() {
     struct Angry;
     impl Observer for Angry {
-        fn on(&mut self, event: &Event<'_>, _: &mut Live<'_>) -> Result<Flow> {
+        fn observe(&mut self, event: &Event<'_>, _: &mut LiveScene<'_>) -> Result<Flow> {
             match event {
                 Event::Step { step: 3, .. } => Err(labelgs::Error::Interrupted),
                 _ => Ok(Flow::Continue),

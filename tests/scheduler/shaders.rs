@@ -157,7 +157,7 @@ fn nothing_is_left_when_the_device_is_dropped() {
 fn the_lists_of_the_engine_can_be_prepared() {
     let Some(gpu) = device() else { return };
     for texel in [false, true] {
-        let shape = labelgs::pass::KernelShape::of(gpu.capabilities());
+        let shape = labelgs::pass::KernelShape::for_device(gpu.capabilities());
         let (capacity, lists) = crate::scheduler::plan::engine_lists(labelgs::pass::KernelShape { texel, ..shape });
         let with = SchedulerOptions { timestamps: true, poison_step: true, ..SchedulerOptions::default() };
         let mut scheduler = Scheduler::new(gpu.gpu(), labelgs::pass::buffers::TABLE, capacity.counts(), with).unwrap();

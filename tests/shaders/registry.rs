@@ -8,7 +8,7 @@ use labelgs::run::StrategyKind;
 use labelgs::scheduler::plan::{Buf, Grid, Limits, PassList, Plan, PlanOptions, Work};
 use labelgs::train::shared::exposure::Exposure;
 use labelgs::train::shared::poses::Poses;
-use labelgs::train::shared::{Place, SharedParameters};
+use labelgs::train::shared::{RowOffsets, SharedParameters};
 use labelgs::train::strategy;
 use labelgs::{pass, shaders};
 use std::collections::BTreeSet;
@@ -78,17 +78,17 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::label_view(&shape, &capacity, 2));
             add(pass::vote_view(&shape, &capacity, 2, false));
             let variant = Variant::plain(size);
-            let extension = strategy::of(StrategyKind::Mcmc).extension();
+            let extension = strategy::make(StrategyKind::Mcmc).extension();
             let all_passes = 15;
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
-            let place = Place::default();
+            let place = RowOffsets::default();
             for shared in [Exposure::default().extension(place), Poses::default().extension(place)] {
                 for supervision in [Supervision::Photo, Supervision::Layers { lift: false }] {
                     add(pass::extended_step(&shape, &capacity, Variant { supervision, ..variant }, (&*shared, 1)));
                 }
             }
             if shape.update != Update::Split {
-                let fog = (&*extension, strategy::passes::FREE_SPACE);
+                let fog = (&*extension, strategy::passes::FREE_SPACE_BIT);
                 add(pass::extended_step(&shape, &capacity, Variant { catch_up: true, ..variant }, fog));
                 add(pass::catch_up(&shape, &capacity, 3));
             }

@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 use labelgs::formats::read_model;
-use labelgs::records::checkpoint_folder::{self, Found};
+use labelgs::records::checkpoint_folder::{self, CheckpointFile};
 use labelgs::train::state::TrainState;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ impl Place {
     }
 
     /// Checkpoints, the newest first.
-    pub fn checkpoints(&self, out: &str) -> Vec<Found> {
+    pub fn checkpoints(&self, out: &str) -> Vec<CheckpointFile> {
         checkpoint_folder::list(&self.path(out)).expect("a list")
     }
 

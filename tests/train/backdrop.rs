@@ -47,7 +47,7 @@ fn with_black_things(mut model: Gaussians) -> Gaussians {
 /// Mean opacity of the model where the photos have none.
 fn left_outside(trainer: &mut Trainer, scene: &Dataset, turn: &Turn) -> f64 {
     let model = trainer.model().expect("a model");
-    let mut engine = Engine::of_model(turn.gpu(), &model, [(64, 48)]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &model, [(64, 48)]).expect("an engine");
     let (mut sum, mut count) = (0.0, 0);
     for view in &scene.test {
         let drawn = render(&mut engine, &view.camera, &RenderOptions::default()).expect("a picture");

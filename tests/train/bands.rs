@@ -15,7 +15,7 @@ use labelgs::train::state::TrainState;
 
 /// Rows of tiles in a band; `None` trains on whole photos.
 fn options(turn: &Turn, tile_rows: Option<u32>, dataset: &Dataset) -> TrainerOptions {
-    let shape = KernelShape::of(turn.capabilities());
+    let shape = KernelShape::for_device(turn.capabilities());
     // Each tile counts twice where a step may have object layers.
     let times = if dataset.train[0].mask.is_some() { 2 } else { 1 };
     let loop_rounds = tile_rows.map(|rows| times * rows * (shape.tiles(dataset.train[0].camera.width, 1).0 + 1));

@@ -3,7 +3,7 @@
 use crate::support::device;
 use glam::{DMat3, DVec3};
 use labelgs::engine::Engine;
-use labelgs::render::{NEAR, Parts, RenderOptions, Rendered, render};
+use labelgs::render::{NEAR_DEFAULT, Parts, Render, RenderOptions, render};
 use labelgs::run::TrainConfig;
 use labelgs::scene::{Camera, Dataset, Gaussians, Photo, Point, View};
 use labelgs::scenes::init;
@@ -69,12 +69,12 @@ fn joined(mut model: Gaussians, other: Gaussians) -> Gaussians {
     model
 }
 
-fn draw(engine: &mut Engine, camera: &Camera) -> Rendered {
-    let options = RenderOptions { parts: Parts::DEPTH, ..RenderOptions::of_main(NEAR) };
+fn draw(engine: &mut Engine, camera: &Camera) -> Render {
+    let options = RenderOptions { parts: Parts::DEPTH, ..RenderOptions::for_main(NEAR_DEFAULT) };
     render(engine, camera, &options).expect("a picture")
 }
 
-fn photo(picture: &Rendered) -> Photo {
+fn photo(picture: &Render) -> Photo {
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let rgba = picture.rgb.iter().map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect();
     Photo { width: SIZE.0, height: SIZE.1, rgba }
@@ -84,7 +84,7 @@ fn photo(picture: &Rendered) -> Photo {
 fn a_thing_at_a_third_of_the_median_depth_is_drawn() {
     let Some(turn) = device() else { return };
     let truth = joined(wall(), ball());
-    let engine = |model: &Gaussians| Engine::of_model(turn.gpu(), model, [SIZE]).expect("an engine");
+    let engine = |model: &Gaussians| Engine::for_model(turn.gpu(), model, [SIZE]).expect("an engine");
     let mut of_truth = engine(&truth);
     let places = (0..9).map(|i| (0.25 * f64::from(i % 3 - 1), 0.2 * f64::from(i / 3 - 1)));
     let train: Vec<View> = (places.enumerate())

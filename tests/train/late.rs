@@ -40,7 +40,7 @@ pub(super) fn settings(iterations: u32) -> TrainConfig {
 }
 
 pub(super) fn options(turn: &Turn, update: Update, scheduler: SchedulerOptions) -> TrainerOptions {
-    let shape = KernelShape { update, group_walks: true, ..KernelShape::of(turn.capabilities()) };
+    let shape = KernelShape { update, group_walks: true, ..KernelShape::for_device(turn.capabilities()) };
     TrainerOptions { shape: Some(shape), scheduler, ..TrainerOptions::default() }
 }
 
@@ -213,7 +213,7 @@ fn a_late_training_goes_on_to_the_same_bits() {
         let (options, camera) = (looked.render_options(), looked.views()[1].camera.clone());
         let picture = render(looked.engine_mut(), &camera, &options).expect("a picture");
         let model = looked.model().expect("a model");
-        let mut other = Engine::of_model(turn.gpu(), &model, [(camera.width, camera.height)]).expect("it fits");
+        let mut other = Engine::for_model(turn.gpu(), &model, [(camera.width, camera.height)]).expect("it fits");
         let expected = render(&mut other, &camera, &options).expect("a picture");
         let off = |(a, b): (&[f32; 3], &[f32; 3])| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         let most = picture.rgb.iter().zip(&expected.rgb).map(off).fold(0.0, f32::max);

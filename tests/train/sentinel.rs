@@ -1,6 +1,6 @@
 //! NaN and overflow in a training: they are counted, named and dropped, and too many end it.
 
-use crate::pass::fixture::{Fixture, PARAMETERS};
+use crate::pass::fixture::{Fixture, PARAMETER_PLANES};
 use crate::reference::Rules;
 use crate::reference::step::step;
 use crate::support::device;
@@ -38,11 +38,11 @@ fn only_the_gradient_that_overflows_is_dropped() {
     let (model, camera) = (fixture.model(), fixture.scene.camera.clone());
     let mut target = fixture.scene.target.clone();
     target.slots.clear();
-    let before = fixture.rows(PARAMETERS, count);
+    let before = fixture.rows(PARAMETER_PLANES, count);
     let counters = fixture.train().counters;
     assert_eq!((counters.nonfinite_count, counters.nonfinite_first), (1, row as u32));
     assert_eq!((counters.broken_count, counters.unprojected_count), (0, 0));
-    let (after, gradients) = (fixture.rows(PARAMETERS, count), fixture.gradient_rows());
+    let (after, gradients) = (fixture.rows(PARAMETER_PLANES, count), fixture.gradient_rows());
     assert_eq!(before[row], after[row], "without moments, a gradient of 0 moves nothing");
     assert!(gradients[row].floats().iter().all(|value| *value == 0.0));
     let expected = step(&Rules::default(), &camera, &model, &target);

@@ -19,9 +19,9 @@ use labelgs::scheduler::plan::{Buf, Domain, Grid, Limits, MemoryReport, PassDecl
 use labelgs::shaders::ShaderDesc;
 use labelgs::train::Trainer;
 use labelgs::train::setup::TrainerOptions;
-use labelgs::train::shared::{Place, SharedLayout, SharedParameters};
+use labelgs::train::shared::{RowOffsets, SharedLayout, SharedParameters};
 use labelgs::train::state::TrainState;
-use labelgs::train::strategy::At;
+use labelgs::train::strategy::StepContext;
 use std::sync::Arc;
 
 /// Views of the scene.
@@ -143,12 +143,12 @@ impl SharedParameters for Pulled {
         vec![view.map_or([0.25; 4], |view| [view as f32, 0.0, 2.0, 3.1])]
     }
 
-    fn rates(&self, at: At) -> Vec<[f32; 4]> {
+    fn rates(&self, at: StepContext) -> Vec<[f32; 4]> {
         // The row of the scene is skipped in every fourth step.
         vec![if at.step.is_multiple_of(4) { [0.0; 4] } else { RATES[0] }, RATES[1]]
     }
 
-    fn extension(&self, _place: Place) -> Arc<dyn Extension> {
+    fn extension(&self, _place: RowOffsets) -> Arc<dyn Extension> {
         Arc::new(Self)
     }
 }
@@ -166,11 +166,11 @@ impl SharedParameters for Brightness {
         vec![[0.0; 4]]
     }
 
-    fn rates(&self, _at: At) -> Vec<[f32; 4]> {
+    fn rates(&self, _at: StepContext) -> Vec<[f32; 4]> {
         vec![[0.0; 4], [0.01, 0.01, 0.01, 0.0]]
     }
 
-    fn extension(&self, _place: Place) -> Arc<dyn Extension> {
+    fn extension(&self, _place: RowOffsets) -> Arc<dyn Extension> {
         Arc::new(Self)
     }
 }

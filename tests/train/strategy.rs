@@ -5,7 +5,7 @@ use crate::support::device;
 use crate::support::device::Turn;
 use labelgs::Result;
 use labelgs::pass::{Builder, Extension, Hook};
-use labelgs::run::{Densified, LabelRule, StrategyKind, TrainConfig};
+use labelgs::run::{DensifyCounts, LabelRule, StrategyKind, TrainConfig};
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scenes::initial_gaussians;
 use labelgs::scheduler::SchedulerOptions;
@@ -14,7 +14,7 @@ use labelgs::shaders::structs::StepUniforms;
 use labelgs::train::setup::TrainerOptions;
 use labelgs::train::state::TrainState;
 use labelgs::train::strategy::population::Population;
-use labelgs::train::strategy::{At, Strategy};
+use labelgs::train::strategy::{StepContext, Strategy};
 use labelgs::train::{Loss, Objective, Parameter, Trainer};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -46,11 +46,11 @@ impl Strategy for Thinning {
         "thinning"
     }
 
-    fn acts_after(&self, at: At) -> bool {
+    fn acts_after(&self, at: StepContext) -> bool {
         at.step.is_multiple_of(7)
     }
 
-    fn act(&mut self, _at: At, population: &mut Population) -> Result<()> {
+    fn act(&mut self, _at: StepContext, population: &mut Population) -> Result<()> {
         self.rounds += 1;
         let prune_opacity = 0.02 * self.rounds as f32 + 0.05;
         let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity, ..population.uniforms() };
@@ -59,7 +59,7 @@ impl Strategy for Thinning {
         Ok(())
     }
 
-    fn uniforms(&self, _at: At, to: &mut StepUniforms) {
+    fn uniforms(&self, _at: StepContext, to: &mut StepUniforms) {
         to.rate_sh0 = 0.0;
     }
 
@@ -67,7 +67,7 @@ impl Strategy for Thinning {
         Arc::new(Forgetful)
     }
 
-    fn passes(&self, at: At) -> u32 {
+    fn passes(&self, at: StepContext) -> u32 {
         u32::from(at.step.is_multiple_of(2))
     }
 
@@ -211,7 +211,7 @@ fn gaussians_across_contours_split_in_place_of_others() {
     let masked = small();
     let (before, plain, left) = exchanged(0.0, &masked);
     let pruned = (0.3 * f64::from(before)) as u32;
-    assert_eq!((plain, left), (Densified { cloned: 0, split: 0, pruned }, before - pruned));
+    assert_eq!((plain, left), (DensifyCounts { cloned: 0, split: 0, pruned }, before - pruned));
     let (same, split, as_many) = exchanged(0.05, &masked);
     assert_eq!((same, as_many), (before, left), "the numbers of Gaussians do not change");
     assert!(split.split > 0 && f64::from(split.split) <= 0.05 * 0.7 * f64::from(before), "{split:?} of {before}");

@@ -1,6 +1,6 @@
 //! Updates without gradients, all at once, against the same one by one.
 
-use crate::reference::adam::{Optimised, Rates, adam, adam_value};
+use crate::reference::adam::{AdamState, Rates, adam, adam_value};
 use crate::reference::lazy::{caught_up, corrected, one_by_one};
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::{Row, Rules};
@@ -23,7 +23,7 @@ fn gradient(random: &mut rand_pcg::Pcg32) -> Option<Row> {
 }
 
 /// Largest distance of parameters, and of moments relative to themselves.
-fn distance(a: &Optimised, b: &Optimised) -> [f64; 2] {
+fn distance(a: &AdamState, b: &AdamState) -> [f64; 2] {
     let most = |a: &Row, b: &Row, scale: &dyn Fn(f64) -> f64| {
         a.floats().iter().zip(b.floats()).map(|(&a, b)| (a - b).abs() / scale(b)).fold(0.0, f64::max)
     };
@@ -38,7 +38,7 @@ fn late_updates_equal_those_of_every_step() {
     let mut random = generator(77);
     let mut longest = 0;
     for _ in 0..8 {
-        let (mut every, mut late, mut last) = (Optimised::default(), Optimised::default(), 0);
+        let (mut every, mut late, mut last) = (AdamState::default(), AdamState::default(), 0);
         for step in 1..=STEPS {
             let found = gradient(&mut random).filter(|_| !(40..=400).contains(&step));
             every = adam(&rules, &rates(step), step, &every, &found.unwrap_or_default());
@@ -68,7 +68,7 @@ fn gradient_of_one(rules: &Rules, more: usize) -> [f64; 3] {
 #[test]
 fn without_moments_nothing_moves() {
     let rules = Rules::default();
-    let state = Optimised { row: Row::from_floats(&[0.7; ROW_FLOATS]), ..Optimised::default() };
+    let state = AdamState { row: Row::from_floats(&[0.7; ROW_FLOATS]), ..AdamState::default() };
     let missed: Vec<Rates> = (1..100).map(|step| corrected(&rules, &rates(step), step)).collect();
     assert_eq!(caught_up(&rules, &missed, &state), state);
 }

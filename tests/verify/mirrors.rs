@@ -1,6 +1,6 @@
 //! The mirrors against identities, closed forms and brute force.
 
-use crate::reference::adam::{Optimised, Rates, adam};
+use crate::reference::adam::{AdamState, Rates, adam};
 use crate::reference::blend::{blend_forward, centre, shade, trace};
 use crate::reference::loss::{Photo, blur, photo_loss, ssim, ssim_backward, window};
 use crate::reference::project::{normalised, project_all, project_forward, rotation};
@@ -281,7 +281,7 @@ fn invalid_pixels_stay_out_of_the_photo_loss() {
 fn adam_takes_known_steps() {
     let (rules, rates) = (Rules::default(), Rates([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]));
     let gradient = Row { mean: [3.0, -1e-6, 0.0], opacity: -2.0, ..Row::default() };
-    let first = adam(&rules, &rates, 1, &Optimised::default(), &gradient);
+    let first = adam(&rules, &rates, 1, &AdamState::default(), &gradient);
     check("first step", close(&first.row.mean, &[-0.1, 0.1, 0.0], Tolerance { absolute: 1e-8, relative: 0.0 }));
     assert!((first.row.opacity - 0.4).abs() < 1e-9);
     let second = adam(&rules, &rates, 2, &first, &Row::default());

@@ -1,6 +1,6 @@
 //! Every constant matters: with one constant changed, the checks of the mirrors fail.
 
-use crate::reference::adam::{Optimised, Rates, adam};
+use crate::reference::adam::{AdamState, Rates, adam};
 use crate::reference::densify::{densify, is_near, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, label_map, lift};
 use crate::reference::model::ROW_FLOATS;
@@ -39,7 +39,7 @@ fn outcome(family: Family, rules: &Rules, (s, model): &(Scene, Model)) -> Vec<f6
         }
         Family::Adam => {
             let gradient = Row { mean: [1.0, 1e-6, 1e-9], ..Row::default() };
-            let first = adam(rules, &Rates([1.0; 8]), 3, &Optimised::default(), &gradient);
+            let first = adam(rules, &Rates([1.0; 8]), 3, &AdamState::default(), &gradient);
             all(&[first.row, adam(rules, &Rates([1.0; 8]), 4, &first, &Row::default()).row])
         }
         Family::Moments => vec![f64::from(pack(rules, (1.5e-4, 1e-7), 0x7fff_7fff))],

@@ -4,9 +4,9 @@
 use crate::{device, measure::table};
 use labelgs::engine::Engine;
 use labelgs::formats::read_model;
-use labelgs::label::click::{Click, Clicking, Hints, Photos, Progress};
+use labelgs::label::click::{Click, Hints, ObjectFinder, Photos, Progress};
 use labelgs::label::vote_engine;
-use labelgs::render::{NEAR, label_map};
+use labelgs::render::{NEAR_DEFAULT, label_map};
 use labelgs::run::model_file;
 use labelgs::scene::{LabelMap, View};
 use labelgs::scenes::{LoadOptions, open};
@@ -69,7 +69,7 @@ pub fn run(options: &Options) -> Result<()> {
     let gpu = device::open()?;
     let mut shown =
         vote_engine(Arc::clone(&gpu), &model, &truths.iter().map(|truth| truth.view).collect::<Vec<_>>(), 2)?;
-    let mut clicking = Clicking::new(gpu, &model, &photos, NEAR)?;
+    let mut clicking = ObjectFinder::new(gpu, &model, &photos, NEAR_DEFAULT)?;
     let objects: BTreeSet<u16> = truths.iter().flat_map(|truth| truth.mask.objects()).collect();
     let mut rows = vec![["object", "click", "IoU", "first answer, s", "last, s"].map(str::to_owned).to_vec()];
     for id in objects {
@@ -125,7 +125,7 @@ fn where_differ(mask: &LabelMap, id: u16, map: Option<&LabelMap>) -> LabelMap {
 /// Draws an object in each view.
 fn maps(engine: &mut Engine, truths: &[Truth], rows: &[bool]) -> Result<Vec<LabelMap>> {
     engine.set_labels(&rows.iter().map(|is_in| u32::from(*is_in)).collect::<Vec<_>>())?;
-    truths.iter().map(|truth| label_map(engine, &truth.view.camera, NEAR)).collect()
+    truths.iter().map(|truth| label_map(engine, &truth.view.camera, NEAR_DEFAULT)).collect()
 }
 
 /// Intersection over union of all pixels of held-out views.

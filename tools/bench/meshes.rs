@@ -4,7 +4,7 @@ use crate::{device, measure::table};
 use glam::DVec3;
 use labelgs::Result;
 use labelgs::formats::read_model;
-use labelgs::render::mesh::{CELLS, object_mesh};
+use labelgs::render::mesh::{CELLS_DEFAULT, object_mesh};
 use labelgs::run::model_file;
 use labelgs::scenes::camera_json::views_of_model;
 use labelgs::synth::{Preset, World};
@@ -19,7 +19,7 @@ pub struct Options {
     #[arg(long, value_enum, default_value = "default")]
     preset: Preset,
     /// Cells along the longest side of an object.
-    #[arg(long, default_value_t = CELLS)]
+    #[arg(long, default_value_t = CELLS_DEFAULT)]
     cells: u32,
 }
 

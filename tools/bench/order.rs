@@ -75,7 +75,7 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// Runs a step of a view.
 fn look(gpu: &Arc<Gpu>, model: &Gaussians, camera: &Camera) -> Result<Seen> {
-    let shape = KernelShape { antialiased: model.antialiased, ..KernelShape::of(gpu.capabilities()) };
+    let shape = KernelShape { antialiased: model.antialiased, ..KernelShape::for_device(gpu.capabilities()) };
     let camera = Camera { translation: camera.translation + camera.rotation * model.origin, ..camera.clone() };
     let (size, pixels) = ((camera.width as usize, camera.height as usize), (camera.width * camera.height) as usize);
     let tiles = shape.tiles(camera.width, camera.height);

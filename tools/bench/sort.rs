@@ -37,7 +37,7 @@ pub fn run(common: &Common) -> Result<()> {
         (false, true) => (&[20_000, 450_000], 10),
         (false, false) => (&[20_000, 450_000, 2_000_000, 10_000_000], 10),
     };
-    let own = KernelShape::of(gpu.capabilities());
+    let own = KernelShape::for_device(gpu.capabilities());
     let lanes =
         KernelShape { sweep_items: 0, digit_bits: KernelShape::new(own.subgroup, gpu.is_cpu()).digit_bits, ..own };
     let sweep = own.with_sweeps(gpu.capabilities());

@@ -8,7 +8,7 @@ use super::{Common, device};
 use labelgs::Result;
 use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
-use labelgs::render::{NEAR, RenderOptions, render};
+use labelgs::render::{NEAR_DEFAULT, RenderOptions, render};
 use labelgs::scene::{Dataset, Gaussians};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{self, SynthOptions};
@@ -99,7 +99,7 @@ fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize)
     engine.upload_model(model)?;
     let mut dataset = dataset.clone();
     for view in &mut dataset.train {
-        let seen = render(&mut engine, &view.camera, &RenderOptions::of_main(NEAR))?;
+        let seen = render(&mut engine, &view.camera, &RenderOptions::for_main(NEAR_DEFAULT))?;
         view.mask = Some(seen.main_label_map(&labels)?.into());
     }
     Ok(dataset)

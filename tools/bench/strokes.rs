@@ -5,8 +5,8 @@ use crate::{device, measure::table};
 use labelgs::edit::strokes::{Cutting, Stroke};
 use labelgs::formats::read_model;
 use labelgs::label::strokes::seeds;
-use labelgs::label::{Counting, columns_of, label_by_votes, vote_engine};
-use labelgs::render::{NEAR, label_map};
+use labelgs::label::{VoteOptions, columns_of, label_by_votes, vote_engine};
+use labelgs::render::{NEAR_DEFAULT, label_map};
 use labelgs::run::model_file;
 use labelgs::scene::{LabelMap, View};
 use labelgs::scenes::{LoadOptions, open};
@@ -45,7 +45,7 @@ pub fn run(options: &Options) -> Result<()> {
     let drawn = draw(&train)?;
     let strokes: Vec<(&Stroke, &View)> = drawn.iter().map(|(stroke, view)| (stroke, *view)).collect();
     let start = Instant::now();
-    let hit = seeds(device::open()?, &model, &strokes, NEAR, Path::new("the rule"))?;
+    let hit = seeds(device::open()?, &model, &strokes, NEAR_DEFAULT, Path::new("the rule"))?;
     let shown = start.elapsed();
     let start = Instant::now();
     let mut cutting = Cutting::new(&model)?;
@@ -62,13 +62,13 @@ pub fn run(options: &Options) -> Result<()> {
         &mut engine,
         &mut voted,
         &all,
-        &Counting { near: NEAR, mask_border: 0, min_confidence: 0.0 },
+        &VoteOptions { near: NEAR_DEFAULT, mask_border: 0, min_confidence: 0.0 },
         &mut |_| (),
     )?;
     let voted = voted.labels.unwrap_or_default();
     let mut maps = |labels: &[u32]| -> Result<Vec<LabelMap>> {
         engine.set_labels(labels)?;
-        test.iter().map(|view| label_map(&mut engine, &view.camera, NEAR)).collect()
+        test.iter().map(|view| label_map(&mut engine, &view.camera, NEAR_DEFAULT)).collect()
     };
     let (by_strokes, by_masks) = (maps(&found)?, maps(&voted)?);
     let truths: Vec<Arc<LabelMap>> =

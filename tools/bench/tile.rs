@@ -28,7 +28,7 @@ pub fn run(common: &Common) -> Result<()> {
         true => ([([1, 1], 64), ([1, 1], 256), ([4, 3], 30)], 2),
         false => ([([1, 1], 1_024), ([1, 1], 8_192), (even_tiles, 300)], 20),
     };
-    let shape = KernelShape::of(gpu.capabilities());
+    let shape = KernelShape::for_device(gpu.capabilities());
     println!("{}: the blends of made splats, degree 0, without labels", gpu.capabilities().name);
     let head = ["px", "Gaussians", "longest list", "M pairs", "forward ms", "backward ms", "G pairs/s", "backward"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];

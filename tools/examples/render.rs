@@ -24,7 +24,7 @@ fn main() -> labelgs::Result<()> {
     let camera = &scene.all().into_iter().find(|found| found.stem() == *view).ok_or_else(missing)?.camera;
 
     let size = (camera.width, camera.height);
-    let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &model, [size])?;
+    let mut engine = Engine::for_model(Gpu::new(&GpuOptions::default())?, &model, [size])?;
     let rendered = render(&mut engine, camera, &RenderOptions { parts: Parts::LABELS, ..RenderOptions::default() })?;
     write_rgb(Path::new(out), size, &rendered.rgb, Format::Png)?;
 

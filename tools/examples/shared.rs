@@ -7,7 +7,8 @@
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::scenes::{self, LoadOptions};
 use labelgs::train::{
-    At, Exposure, Extension, Place, SharedLayout, SharedParameters, TrainConfig, Trainer, TrainerOptions, first_model,
+    Exposure, Extension, RowOffsets, SharedLayout, SharedParameters, StepContext, TrainConfig, Trainer, TrainerOptions,
+    first_model,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -29,12 +30,12 @@ impl SharedParameters for EarlyExposure {
         self.0.start(view)
     }
 
-    fn rates(&self, at: At) -> Vec<[f32; 4]> {
+    fn rates(&self, at: StepContext) -> Vec<[f32; 4]> {
         let rates = self.0.rates(at);
         if at.step > at.config.iterations / 2 { vec![[0.0; 4]; rates.len()] } else { rates }
     }
 
-    fn extension(&self, place: Place) -> Arc<dyn Extension> {
+    fn extension(&self, place: RowOffsets) -> Arc<dyn Extension> {
         self.0.extension(place)
     }
 }

@@ -8,8 +8,8 @@ use labelgs::formats;
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::scenes::{self, LoadOptions};
 use labelgs::train::{
-    At, Buf, Builder, Extension, Hook, Population, StepUniforms, Strategy, TrainConfig, Trainer, TrainerOptions,
-    first_model,
+    Buf, Builder, Extension, Hook, Population, StepContext, StepUniforms, Strategy, TrainConfig, Trainer,
+    TrainerOptions, first_model,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -23,11 +23,11 @@ impl Strategy for Thinning {
         "thinning"
     }
 
-    fn acts_after(&self, at: At) -> bool {
+    fn acts_after(&self, at: StepContext) -> bool {
         !at.is_last() && at.step.is_multiple_of(100)
     }
 
-    fn act(&mut self, at: At, population: &mut Population) -> labelgs::Result<()> {
+    fn act(&mut self, at: StepContext, population: &mut Population) -> labelgs::Result<()> {
         // Without a threshold nothing grows.
         let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity: 0.02, ..population.uniforms() };
         let counts = population.densify(uniforms, u64::MAX)?;
@@ -40,7 +40,7 @@ impl Strategy for Thinning {
     }
 
     /// Each number is a variant of the step with its own recording; 0 has no passes of the extension.
-    fn passes(&self, at: At) -> u32 {
+    fn passes(&self, at: StepContext) -> u32 {
         u32::from(at.step > at.config.iterations / 2)
     }
 }

@@ -6,7 +6,7 @@
 
 use labelgs::gpu::{Gpu, GpuOptions};
 use labelgs::render::{Format, Parts, write_rgb};
-use labelgs::run::{self, Event, Flow, Live, Observer, Request};
+use labelgs::run::{self, Event, Flow, LiveScene, Observer, Request};
 use labelgs::scene::Camera;
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ struct Watcher {
 }
 
 impl Observer for Watcher {
-    fn on(&mut self, event: &Event, live: &mut Live) -> labelgs::Result<Flow> {
+    fn observe(&mut self, event: &Event, live: &mut LiveScene) -> labelgs::Result<Flow> {
         if let Event::Step { step, report: Some(report), .. } = event {
             if step % 10 == 0 {
                 println!("step {step}: loss {:.4}, {} Gaussians", report.loss, live.gaussian_count());

@@ -6,7 +6,7 @@ use crate::cli::support::{Context, EditArgs, Edited, TableArg, WriteArgs, open_g
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
 use crate::formats::{Mesh, export_model, write_meshes};
-use crate::render::mesh::{CELLS, CELLS_MAX, CELLS_MIN, object_mesh};
+use crate::render::mesh::{CELLS_DEFAULT, CELLS_MAX, CELLS_MIN, object_mesh};
 use crate::scene::{Gaussians, UNLABELLED};
 use crate::scenes::camera_json::views_of_model;
 use crate::words::counted;
@@ -41,7 +41,7 @@ pub struct ConvertArgs {
     /// With --mesh, cells of the grid along the longest side of an object.
     #[arg(
         long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(i64::from(CELLS_MIN)..=i64::from(CELLS_MAX)),
-        default_value_t = CELLS, help_heading = "Output", requires = "mesh"
+        default_value_t = CELLS_DEFAULT, help_heading = "Output", requires = "mesh"
     )]
     pub mesh_cells: u32,
     #[command(flatten)]

@@ -1,7 +1,7 @@
 //! `labelgs devices`.
 
 use crate::cli::support::Context;
-use crate::gpu::{self, Capabilities, Need};
+use crate::gpu::{self, Capabilities, Requirement};
 use crate::pass::KernelShape;
 use crate::{Error, Result};
 use serde_json::{Value, json};
@@ -64,7 +64,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
     text += &needs_text(device);
     if device.missing().is_empty() {
-        text += &format!("   kernels {}\n", shape_text(&KernelShape::of(device)));
+        text += &format!("   kernels {}\n", shape_text(&KernelShape::for_device(device)));
     } else {
         text += "   cannot be used\n";
     }
@@ -73,7 +73,7 @@ fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
 
 /// Returns the required and optional features of a device, a row each.
 pub(crate) fn needs_text(device: &Capabilities) -> String {
-    let row = |need: &Need| {
+    let row = |need: &Requirement| {
         let (what, found) = (need.what, &need.found);
         let needed = if need.is_required { format!("needs {}", need.needed) } else { need.needed.clone() };
         let what = format!("{what} ({needed})");
@@ -86,7 +86,7 @@ pub(crate) fn needs_text(device: &Capabilities) -> String {
 
 /// Returns the same features as JSON.
 pub(crate) fn needs_json(device: &Capabilities) -> Vec<Value> {
-    let row = |need: &Need| {
+    let row = |need: &Requirement| {
         json!({
             "what": need.what, "required": need.is_required, "needed": need.needed, "found": need.found,
             "met": need.is_met, "reason": need.reason,
@@ -111,7 +111,7 @@ pub(crate) fn to_json(device: &Capabilities, picked: Option<usize>) -> Value {
         "needs": needs_json(device),
         "usable": usable,
         "picked": picked == Some(device.index),
-        "kernels": usable.then(|| shape_json(&KernelShape::of(device))),
+        "kernels": usable.then(|| shape_json(&KernelShape::for_device(device))),
     })
 }
 
@@ -119,7 +119,7 @@ fn kind(device: &Capabilities) -> String {
     format!("{:?}", device.kind).to_lowercase()
 }
 
-fn state(need: &Need) -> &'static str {
+fn state(need: &Requirement) -> &'static str {
     match (need.is_met, need.is_required) {
         (true, _) => "ok",
         (false, true) => "MISSING",

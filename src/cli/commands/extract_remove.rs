@@ -180,6 +180,6 @@ pub(super) fn scene_sights(
         ));
     }
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = Engine::of_model(open_gpu(context)?, model, sizes)?;
+    let mut engine = Engine::for_model(open_gpu(context)?, model, sizes)?;
     sights(&mut engine, &views, near)
 }

@@ -74,7 +74,7 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let how = if args.compat { Between::Translations } else { Between::Centres };
     let stops = video(&cameras, args.between, how);
     let gpu = open_gpu(context)?;
-    let mut engine = Engine::of_model(gpu, &model, std::iter::once(size))?;
+    let mut engine = Engine::for_model(gpu, &model, std::iter::once(size))?;
     let options = RenderOptions { background: args.background, ..RenderOptions::new(near, Parts::COLOUR) };
     let mut progress = Progress::new(stops.len() as u64, "frames", &context.global);
     let mut written = Vec::new();

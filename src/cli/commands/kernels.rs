@@ -2,7 +2,7 @@
 
 use crate::cli::support::Context;
 use crate::gpu::{Gpu, GpuOptions};
-use crate::pass::{CompiledKernel, FIGURES, compiled_kernels};
+use crate::pass::{CompiledKernel, STATISTIC_NAMES, compiled_kernels};
 use crate::{Error, Result};
 use serde_json::{Map, Value, json};
 
@@ -46,10 +46,10 @@ pub(crate) fn kernels_json(kernels: &[CompiledKernel]) -> Vec<Value> {
 /// A row for each kernel and subgroup size.
 fn to_text(kernels: &[CompiledKernel]) -> String {
     let mut text = format!("{:<46} {:>8}", "kernel", "subgroup");
-    FIGURES.iter().for_each(|(name, _)| text += &format!(" {name:>12}"));
+    STATISTIC_NAMES.iter().for_each(|(name, _)| text += &format!(" {name:>12}"));
     for kernel in kernels {
         text += &format!("\n{:<46} {:>8}", kernel.name, kernel.subgroup);
-        for (_, names) in FIGURES {
+        for (_, names) in STATISTIC_NAMES {
             text += &format!(" {:>12}", kernel.figure(names).map_or("-".to_owned(), |value| value.to_string()));
         }
     }

@@ -5,7 +5,7 @@ use crate::cli::support::{Context, Progress, ReadArgs, near_plane, open_gpu, ope
 use crate::engine::Engine;
 use crate::files::image::write_png_rgb8;
 use crate::gpu::Gpu;
-use crate::label::occlusion::{Rule, by_contour, from_depths, picture};
+use crate::label::occlusion::{Rule, from_depths, occluders_by_contour, picture};
 use crate::records::occlusion_table::OcclusionTable;
 use crate::render::{Parts, RenderOptions, render};
 use crate::scene::{DepthKind, Gaussians, LabelMap, Occluders, View, stems};
@@ -89,12 +89,12 @@ pub(crate) fn from_model(
     views: &[&View],
     context: &Context,
 ) -> Result<BTreeMap<String, Occluders>> {
-    let mut engine = Engine::of_model(gpu, model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
+    let mut engine = Engine::for_model(gpu, model, views.iter().map(|view| (view.camera.width, view.camera.height)))?;
     let mut progress = Progress::new(views.len() as u64, "views", &context.global);
     let mut found = BTreeMap::new();
     for view in views {
         let rendered = render(&mut engine, &view.camera, &RenderOptions::new(near, Parts::DEPTH))?;
-        found.insert(view.name.clone(), by_contour(&*mask(view)?, &rendered.mean_depth()?, Rule::default()));
+        found.insert(view.name.clone(), occluders_by_contour(&*mask(view)?, &rendered.mean_depth()?, Rule::default()));
         progress.set(found.len() as u64, String::new);
     }
     Ok(found)

@@ -113,7 +113,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     match gpu::devices(&options) {
         Ok((devices, Ok(picked))) => {
             let device = &devices[picked];
-            Ok((Some(device.name.clone()), KernelShape::of(device), device.limits.plan))
+            Ok((Some(device.name.clone()), KernelShape::for_device(device), device.limits.plan))
         }
         Ok((_, Err(error))) | Err(error) if options.device.is_some() => Err(error),
         Ok((_, Err(_))) | Err(Error::NoDevice(_)) => {

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::cli::support::Context;
 use crate::cli::support::parsers::page_file;
-use crate::run::report::{FILE, write};
+use crate::run::report::{REPORT_FILE, write};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ pub struct ReportArgs {
 /// Writes the page and prints its path.
 pub(crate) fn run(args: &ReportArgs, context: &Context) -> Result<()> {
     let usual = match args.runs.as_slice() {
-        [run] => run.join(FILE),
-        _ => Path::new(FILE).to_owned(),
+        [run] => run.join(REPORT_FILE),
+        _ => Path::new(REPORT_FILE).to_owned(),
     };
     let path = write(&args.runs, args.output.as_ref().unwrap_or(&usual))?;
     let path = path.display().to_string();

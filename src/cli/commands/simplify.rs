@@ -6,7 +6,7 @@ use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::edit::simplify::Simplifier;
 use crate::engine::{Engine, EngineSize};
 use crate::eval::evaluate::{Rendering, evaluate};
-use crate::eval::subject::Whole;
+use crate::eval::subject::WholeModel;
 use crate::render::RenderOptions;
 use crate::scene::{Gaussians, View};
 use crate::scheduler::SchedulerOptions;
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
     }
     let gpu = open_gpu(context)?;
     let sizes = dataset.all().into_iter().map(|view| (view.camera.width, view.camera.height));
-    let size = EngineSize::of_model(&model, sizes).for_training();
+    let size = EngineSize::for_model(&model, sizes).for_training();
     let mut engine = Engine::new(gpu, size, SchedulerOptions::default())?;
     engine.upload_model(&model)?;
     let weights = weights(&mut engine, dataset.train.iter().map(|view| (&view.camera, near)))?;
@@ -166,7 +166,7 @@ impl Row {
 
 impl Scorer<'_> {
     fn score(&mut self, model: &Gaussians) -> Result<Row> {
-        let mut whole = Whole { engine: &mut self.engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
+        let mut whole = WholeModel { engine: &mut self.engine, model, min_confidence: MIN_LABEL_CONFIDENCE };
         let mean = evaluate(&mut whole, &self.views, Rendering::new(self.options), &(), &mut ())?.mean;
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
         Ok(Row {

@@ -90,7 +90,7 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// Returns these arguments; values that were not typed come from the run of `model`, if it has one.
     pub fn of_run(&self, model: &Path) -> Result<Self> {
-        let Some(run) = Settings::of_model(model)? else { return Ok(self.clone()) };
+        let Some(run) = Settings::for_model(model)? else { return Ok(self.clone()) };
         let ReadOptions { max_resolution, test_every, poses, masked_only } = run.read;
         let longest = (max_resolution > 0).then_some(max_resolution);
         Ok(Self {

@@ -32,7 +32,7 @@ impl Context {
     pub(crate) fn gpu_options(&self) -> Result<GpuOptions> {
         let options = GpuOptions::from_env()?;
         let device = self.global.device.clone().or(options.device);
-        Ok(GpuOptions { device, locks: Some(PipelineFolder::of_locks()), ..options })
+        Ok(GpuOptions { device, locks: Some(PipelineFolder::locks_folder()), ..options })
     }
 
     /// Prints the result of a command.

@@ -47,7 +47,7 @@ impl SheetArgs {
         let up = Overview::of(cameras.iter().copied()).map_or_else(of_file, |all| Ok(Some(all.up)))?;
         let up = up.unwrap_or_else(|| likely_up((0..model.len()).map(|row| model.world(row))));
         let near = near_plane(path, None)?;
-        let mut engine = Engine::of_model(open_gpu(to)?, &model, std::iter::once((SIDE, SIDE)))?;
+        let mut engine = Engine::for_model(open_gpu(to)?, &model, std::iter::once((SIDE, SIDE)))?;
         let stage = Stage::new("drawing labels", labels.len());
         let mut tile = |row: &&LabelSummary| -> Result<Tile> {
             let pixels = portrait(&mut engine, (&model, row.label), (&cameras, up), (SIDE, near))?;

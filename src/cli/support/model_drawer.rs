@@ -5,8 +5,8 @@ use crate::cli::support::parsers::bytes;
 use crate::engine::{Engine, EngineSize, tell_apart};
 use crate::formats::ModelRef;
 use crate::gpu::Gpu;
-use crate::render::large::{Index, Painter, fits};
-use crate::render::{Parts, RenderOptions, Rendered, label_map, render};
+use crate::render::large::{GaussianIndex, Painter, fits};
+use crate::render::{Parts, Render, RenderOptions, label_map, render};
 use crate::scene::{Camera, LabelMap};
 use crate::scheduler::SchedulerOptions;
 use clap::Args;
@@ -53,16 +53,16 @@ impl<'a> Drawer<'a> {
             let whole = model.read()?;
             let labels = || whole.labels.iter().flatten().copied();
             if tell_apart(labels()).is_none() {
-                let mut engine = Engine::new(gpu, EngineSize::of_model(&whole, std::iter::once(image)), options)?;
+                let mut engine = Engine::new(gpu, EngineSize::for_model(&whole, std::iter::once(image)), options)?;
                 engine.upload_model(&whole)?;
                 return Ok(Self::Whole(Box::new(engine), labels().max()));
             }
         }
-        Ok(Self::parts(gpu, model, Index::of(model, 0.0, |_, _| true)?.0, options))
+        Ok(Self::parts(gpu, model, GaussianIndex::new(model, 0.0, |_, _| true)?.0, options))
     }
 
     /// Makes one that draws the Gaussians of an index in parts.
-    pub(crate) fn parts(gpu: Arc<Gpu>, model: ModelRef<'a>, index: Index, options: SchedulerOptions) -> Self {
+    pub(crate) fn parts(gpu: Arc<Gpu>, model: ModelRef<'a>, index: GaussianIndex, options: SchedulerOptions) -> Self {
         tracing::info!("the model does not fit on the device at once: each picture takes what it may show");
         Self::Parts(Box::new(Painter::new(gpu, model, index, options)))
     }
@@ -76,7 +76,7 @@ impl<'a> Drawer<'a> {
     }
 
     /// Draws a picture.
-    pub(crate) fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+    pub(crate) fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         match self {
             Self::Whole(engine, _) => render(engine, camera, options),
             Self::Parts(painter) => painter.render(camera, options),

@@ -90,7 +90,7 @@ pub(crate) fn choose_objects(
     let nested: Vec<Option<NestedMasks>> = views.iter().zip(&names).map(of_view).collect::<Result<_>>()?;
     drop(stage);
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let mut engine = Engine::of_model(Arc::clone(gpu), model, sizes)?;
+    let mut engine = Engine::for_model(Arc::clone(gpu), model, sizes)?;
     let stage = Stage::new("choosing objects", views.len());
     let pairs: Vec<(&View, Option<&NestedMasks>)> =
         views.iter().zip(&nested).map(|(view, masks)| (view, masks.as_ref())).collect();

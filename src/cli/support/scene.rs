@@ -11,7 +11,7 @@ use crate::run::Settings;
 use crate::scene::{Dataset, Gaussians, View};
 use crate::scenes::{self, LoadOptions};
 use crate::segment::Network;
-use crate::train::setup::near_plane::NEAR;
+use crate::train::setup::near_plane::NEAR_DEFAULT;
 use crate::words::{counted, did_you_mean};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Once};
@@ -21,13 +21,13 @@ use std::sync::{Arc, Once};
 pub fn near_plane(model: &Path, typed: Option<f32>) -> Result<f32> {
     match typed {
         Some(near) => Ok(near),
-        None => Ok(Settings::of_model(model)?.map_or(NEAR, |settings| settings.train.near)),
+        None => Ok(Settings::for_model(model)?.map_or(NEAR_DEFAULT, |settings| settings.train.near)),
     }
 }
 
 /// Opens the chosen device.
 pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
-    let pipelines = PipelineFolder::of_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
+    let pipelines = PipelineFolder::for_user().map(|folder| Arc::new(folder) as Arc<dyn PipelineStore>);
     let gpu = Gpu::new(&GpuOptions { pipelines, ..context.gpu_options()? })?;
     context.listen(&gpu);
     let found = gpu.capabilities();

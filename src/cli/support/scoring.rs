@@ -8,7 +8,7 @@ use crate::cli::support::model_drawer::MemoryArg;
 use crate::cli::support::model_edit::MinConfidenceArg;
 use crate::cli::support::parsers::near;
 use crate::cli::support::tables::Parts;
-use crate::eval::compared::{Compared, Watch};
+use crate::eval::compared::{PictureObserver, ScoredPicture};
 use crate::eval::page::Page;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -67,10 +67,10 @@ impl Watcher {
     }
 }
 
-impl Watch for Watcher {
-    fn see(&mut self, picture: &Compared) -> Result<()> {
+impl PictureObserver for Watcher {
+    fn observe(&mut self, picture: &ScoredPicture) -> Result<()> {
         self.skip()?;
-        self.page.as_mut().map_or(Ok(()), |page| page.see(picture))
+        self.page.as_mut().map_or(Ok(()), |page| page.observe(picture))
     }
 
     fn skip(&mut self) -> Result<()> {

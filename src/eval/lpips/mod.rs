@@ -14,14 +14,14 @@ pub use weights::Weights;
 
 /// Indices of the convolutions of each stage in torchvision's `features`. Each stage after the first starts with a
 /// pooling.
-pub const STAGES: [&[usize]; 5] = [&[0, 2], &[5, 7], &[10, 12, 14], &[17, 19, 21], &[24, 26, 28]];
+pub const STAGE_CONVOLUTIONS: [&[usize]; 5] = [&[0, 2], &[5, 7], &[10, 12, 14], &[17, 19, 21], &[24, 26, 28]];
 /// Number of output channels of each stage.
-pub const CHANNELS: [usize; 5] = [64, 128, 256, 512, 512];
+pub const STAGE_CHANNELS: [usize; 5] = [64, 128, 256, 512, 512];
 /// Smallest side of a picture, px: four poolings leave one pixel.
 const SIDE_MIN: usize = 16;
 /// Mean and standard deviation of each input channel, for values from -1 to 1.
-const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
-const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
+const CHANNEL_MEANS: [f32; 3] = [-0.030, -0.088, -0.188];
+const CHANNEL_DEVIATIONS: [f32; 3] = [0.458, 0.448, 0.450];
 /// Added to the length of a feature vector, against division by zero.
 const EPSILON: f32 = 1e-10;
 
@@ -33,11 +33,11 @@ impl Distance for Weights {
         }
         let (mut a, mut b) = (input(a, width, height), input(b, width, height));
         let mut total = 0.0;
-        for stage in 0..STAGES.len() {
+        for stage in 0..STAGE_CONVOLUTIONS.len() {
             if stage > 0 {
                 (a, b) = (halve(&a), halve(&b));
             }
-            for &number in STAGES[stage] {
+            for &number in STAGE_CONVOLUTIONS[stage] {
                 let layer = self.layer(number)?;
                 (a, b) = (convolve(&a, layer), convolve(&b, layer));
             }
@@ -49,7 +49,8 @@ impl Distance for Weights {
 
 /// Converts colours from 0 to 1 to the input of VGG16.
 fn input(colours: &[[f32; 3]], width: usize, height: usize) -> Planes {
-    let channel = |c: usize| colours.iter().map(move |colour| (2.0 * colour[c] - 1.0 - SHIFT[c]) / SCALE[c]);
+    let channel =
+        |c: usize| colours.iter().map(move |colour| (2.0 * colour[c] - 1.0 - CHANNEL_MEANS[c]) / CHANNEL_DEVIATIONS[c]);
     Planes { channels: 3, width, height, values: (0..3).flat_map(channel).collect() }
 }
 

@@ -6,7 +6,7 @@
 //! 256, 512, 512 channels. Other tensors are ignored.
 
 use super::convolution::Layer;
-use super::{CHANNELS, STAGES};
+use super::{STAGE_CHANNELS, STAGE_CONVOLUTIONS};
 use crate::error::{Error, Result};
 use crate::files::read;
 use safetensors::{Dtype, SafeTensors};
@@ -23,8 +23,11 @@ pub struct Weights {
 impl Weights {
     /// Reads the file. Every tensor must exist with its shape.
     pub fn read(path: &Path) -> Result<Self> {
-        let numbers: Vec<(usize, usize)> =
-            STAGES.iter().zip(CHANNELS).flat_map(|(stage, outputs)| stage.iter().map(move |&n| (n, outputs))).collect();
+        let numbers: Vec<(usize, usize)> = STAGE_CONVOLUTIONS
+            .iter()
+            .zip(STAGE_CHANNELS)
+            .flat_map(|(stage, outputs)| stage.iter().map(move |&n| (n, outputs)))
+            .collect();
         let mut wanted = Vec::new();
         let mut inputs = 3;
         for &(number, outputs) in &numbers {
@@ -32,7 +35,7 @@ impl Weights {
             wanted.push((format!("features.{number}.bias"), vec![outputs]));
             inputs = outputs;
         }
-        let linear = CHANNELS.iter().enumerate();
+        let linear = STAGE_CHANNELS.iter().enumerate();
         wanted.extend(linear.map(|(index, &count)| (format!("lin{index}.model.1.weight"), vec![1, count, 1, 1])));
 
         let mut read = read_tensors(path, &wanted)?.into_iter();

@@ -2,12 +2,12 @@
 //!
 //! As in SPIn-NeRF, the first frame is the prompt and has no score.
 
-use super::{Ask, Layout, Truth, folders, is_png, stem, tasks};
+use super::{Layout, LayoutInput, TruthFile, folders, is_png, stem, tasks};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
-    let mut objects: BTreeMap<String, Vec<Truth>> = BTreeMap::new();
+pub(super) fn layout(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, String> {
+    let mut objects: BTreeMap<String, Vec<TruthFile>> = BTreeMap::new();
     let mut left_out = Vec::new();
     for file in files.iter().filter(|file| is_png(file)) {
         let object = match &folders(file)[..] {
@@ -18,7 +18,7 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
                 continue;
             }
         };
-        objects.entry(object).or_default().push(Truth { frame: stem(file), file: file.clone() });
+        objects.entry(object).or_default().push(TruthFile { frame: stem(file), file: file.clone() });
     }
     if objects.is_empty() {
         return Err("holds no mask; expected FRAME.png, or OBJECT/FRAME.png".into());

@@ -41,7 +41,7 @@ pub enum Protocol {
 /// The way to choose the labels of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum By {
+pub enum SelectBy {
     /// Labels with more than half of their pixels under a mask in one view.
     Prompt,
     /// The label with the object's name in labels.json.
@@ -50,7 +50,7 @@ pub enum By {
 
 /// A ground-truth mask.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Truth {
+pub struct TruthFile {
     /// Name of the frame, without extension.
     pub frame: String,
     /// File, relative to the folder of the ground truth.
@@ -61,7 +61,7 @@ pub struct Truth {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Prompt {
     /// A mask in one frame.
-    Mask(Truth),
+    Mask(TruthFile),
     /// Strokes on the object and beside it, in one frame.
     Scribbles {
         /// Name of the frame, without extension.
@@ -83,7 +83,7 @@ pub struct Task {
     /// Its prompt.
     pub prompt: Prompt,
     /// Masks to score against, sorted by frame.
-    pub truths: Vec<Truth>,
+    pub truths: Vec<TruthFile>,
 }
 
 /// The objects and masks of a benchmark.
@@ -97,13 +97,13 @@ pub struct Layout {
 
 /// The inputs of a layout besides the files.
 #[derive(Clone, Copy, Debug)]
-pub struct Ask<'a> {
+pub struct LayoutInput<'a> {
     /// Folder of the ground truth, from [`Protocol::root`].
     pub truth: &'a Path,
     /// Name of the scene's folder.
     pub scene: &'a str,
     /// The way to choose labels.
-    pub by: By,
+    pub by: SelectBy,
 }
 
 impl Protocol {
@@ -130,10 +130,10 @@ impl Protocol {
     }
 
     /// Returns the way in which this benchmark chooses labels.
-    pub fn chooses_by(self) -> By {
+    pub fn chooses_by(self) -> SelectBy {
         match self {
-            Self::Labelgs | Self::Nvos | Self::Binary => By::Prompt,
-            Self::LerfMask | Self::ThreeDOvs => By::Name,
+            Self::Labelgs | Self::Nvos | Self::Binary => SelectBy::Prompt,
+            Self::LerfMask | Self::ThreeDOvs => SelectBy::Name,
         }
     }
 
@@ -149,7 +149,7 @@ impl Protocol {
 
     /// Sorts `files` (relative to the ground truth) into objects. `classes` is the content of classes.txt, if it
     /// exists.
-    pub fn layout(self, files: &[PathBuf], classes: Option<&str>, ask: Ask) -> Result<Layout> {
+    pub fn layout(self, files: &[PathBuf], classes: Option<&str>, ask: LayoutInput) -> Result<Layout> {
         let layout = match self {
             Self::Labelgs => by_frame::labelgs(files, ask),
             Self::LerfMask => by_frame::lerf_mask(files, ask),
@@ -184,12 +184,12 @@ fn folders(path: &Path) -> Vec<String> {
 
 /// Makes one task per object: by name in all frames, or by the mask in the first frame in all others. An object that is
 /// not in the first frame then has no prompt and is left out.
-fn tasks(objects: BTreeMap<String, Vec<Truth>>, left_out: Vec<String>, ask: Ask) -> Layout {
+fn tasks(objects: BTreeMap<String, Vec<TruthFile>>, left_out: Vec<String>, ask: LayoutInput) -> Layout {
     let first = objects.values().flatten().map(|truth| truth.frame.clone()).min().unwrap_or_default();
     let mut layout = Layout::default();
     for (object, mut truths) in objects {
         truths.sort_by(|a, b| a.frame.cmp(&b.frame));
-        if ask.by == By::Name {
+        if ask.by == SelectBy::Name {
             layout.tasks.push(Task { object, prompt: Prompt::Name, truths });
             continue;
         }

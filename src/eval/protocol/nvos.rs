@@ -5,14 +5,14 @@
 //! `reference_image/SCENE/FRAME_mask.png` of the reference view, which many later papers derive from the strokes, it
 //! replaces the strokes.
 
-use super::{Ask, By, Layout, Prompt, Task, Truth, folders, is_png, stem};
+use super::{Layout, LayoutInput, Prompt, SelectBy, Task, TruthFile, folders, is_png, stem};
 use crate::Setting;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-const MASK: &str = "_mask";
+const MASK_SUFFIX: &str = "_mask";
 
-pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
+pub(super) fn layout(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, String> {
     let at = |kind: &str, scene: &str| -> Vec<PathBuf> {
         files.iter().filter(|file| folders(file) == [kind, scene]).cloned().collect()
     };
@@ -42,18 +42,18 @@ pub(super) fn layout(files: &[PathBuf], ask: Ask) -> Result<Layout, String> {
         let masks = at("masks", scene);
         let truths = masks.into_iter().filter_map(truth).collect();
         let prompt = match ask.by {
-            By::Name => Prompt::Name,
-            By::Prompt => prompt(scene, &at("reference_image", scene), &at("scribbles", scene))?,
+            SelectBy::Name => Prompt::Name,
+            SelectBy::Prompt => prompt(scene, &at("reference_image", scene), &at("scribbles", scene))?,
         };
         layout.tasks.push(Task { object: scene.clone(), prompt, truths });
     }
     Ok(layout)
 }
 
-fn truth(file: PathBuf) -> Option<Truth> {
+fn truth(file: PathBuf) -> Option<TruthFile> {
     is_png(&file).then_some(())?;
-    let frame = stem(&file).strip_suffix(MASK)?.to_owned();
-    Some(Truth { frame, file })
+    let frame = stem(&file).strip_suffix(MASK_SUFFIX)?.to_owned();
+    Some(TruthFile { frame, file })
 }
 
 fn prompt(scene: &str, references: &[PathBuf], scribbles: &[PathBuf]) -> Result<Prompt, String> {

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// A missing prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Absent {
+pub struct MissingPrediction {
     /// Name of the object.
     pub object: String,
     /// Name of the frame; `None` stands for every frame of the object.
@@ -78,27 +78,27 @@ pub struct Report {
     /// Scores by frame and object.
     pub views: BTreeMap<String, BTreeMap<String, PairScores>>,
     /// Missing predictions.
-    pub missing: Vec<Absent>,
+    pub missing: Vec<MissingPrediction>,
     /// Prompts that select nothing.
-    pub empty: Vec<Absent>,
+    pub empty: Vec<MissingPrediction>,
     /// Ground-truth masks that the rules leave out, with reasons.
     pub left_out: Vec<String>,
 }
 
-const STRICT: [&str; 4] = [
+const STRICT_RULES: [&str; 4] = [
     "a missing prediction and an empty selection count as 0 (LPIPS as 1)",
     "iou, boundary_iou and accuracy: opacity above 0.5; iou_colour: any channel above 0.01",
     "psnr: clamped to 0..1, one error over all channels and pixels of the frame, object on black against photo x mask",
     "ssim: 11x11 Gaussian window over the whole frame",
 ];
-const LABELGS_COMPAT: [&str; 5] = [
+const LABELGS_COMPAT_RULES: [&str; 5] = [
     "prompts choose by the label of the Gaussian with the largest weight in a pixel",
     "an empty selection renders the whole scene",
     "iou: any channel above 0.01 is the published one, here iou_colour",
     "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
     "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",
 ];
-const LERF_MASK_COMPAT: [&str; 4] = [
+const LERF_MASK_COMPAT_RULES: [&str; 4] = [
     "prompts choose by the label of the Gaussian with the largest weight in a pixel",
     "a missing prediction and an empty selection are left out of the averages",
     "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
@@ -108,9 +108,9 @@ const LERF_MASK_COMPAT: [&str; 4] = [
 impl Report {
     pub(super) fn new(protocol: Protocol, compat: bool, lpips: bool) -> Self {
         let rules = match (protocol, compat) {
-            (Protocol::Labelgs, true) => LABELGS_COMPAT.to_vec(),
-            (Protocol::LerfMask, true) => LERF_MASK_COMPAT.to_vec(),
-            _ => STRICT.to_vec(),
+            (Protocol::Labelgs, true) => LABELGS_COMPAT_RULES.to_vec(),
+            (Protocol::LerfMask, true) => LERF_MASK_COMPAT_RULES.to_vec(),
+            _ => STRICT_RULES.to_vec(),
         };
         let lpips = if lpips { "VGG16, v0.1" } else { "no weights" };
         Self { schema_version: 1, protocol: protocol.name(), compat, rules, lpips, ..Self::default() }

@@ -1,12 +1,12 @@
 //! Runs a benchmark on a model: chooses labels, renders, scores.
 
 use super::bench::Bench;
-use super::report::{Absent, Report};
+use super::report::{MissingPrediction, Report};
 use super::score::{PairScores, score};
 use super::select::{Choice, choose};
-use super::{Layout, Protocol, Task, Truth};
+use super::{Layout, Protocol, Task, TruthFile};
 use crate::error::Result;
-use crate::eval::compared::{Compared, Watch};
+use crate::eval::compared::{PictureObserver, ScoredPicture};
 use crate::eval::metrics::covered;
 use crate::eval::subject::Subject;
 use crate::files::resize::shrink_photo;
@@ -20,14 +20,19 @@ pub(crate) fn picture_count(layout: &Layout) -> u64 {
 }
 
 /// Runs a benchmark. `watch` receives every picture.
-pub fn run(layout: &Layout, bench: &Bench, subject: &mut dyn Subject, watch: &mut dyn Watch) -> Result<Report> {
+pub fn run(
+    layout: &Layout,
+    bench: &Bench,
+    subject: &mut dyn Subject,
+    watch: &mut dyn PictureObserver,
+) -> Result<Report> {
     let mut report = Report::new(bench.protocol, bench.compat, bench.lpips.is_some());
     report.left_out.clone_from(&layout.left_out);
     // Choose all labels first: prompts need the whole model.
     subject.show(None)?;
     let choices: Vec<Choice> = layout.tasks.iter().map(|task| choose(task, bench, subject)).collect::<Result<_>>()?;
     for (task, choice) in layout.tasks.iter().zip(choices) {
-        let absent = |frame, reason| Absent { object: task.object.clone(), frame, reason };
+        let absent = |frame, reason| MissingPrediction { object: task.object.clone(), frame, reason };
         let (labels, reason) = match choice {
             Choice::Labels(labels) => (labels, None),
             Choice::Empty(reason) => {
@@ -66,7 +71,7 @@ pub fn run(layout: &Layout, bench: &Bench, subject: &mut dyn Subject, watch: &mu
 }
 
 /// Adds a missing prediction. It counts as 0; the scorer of Gaussian Grouping leaves it out.
-fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &Truth) {
+fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &TruthFile) {
     if bench.compat && bench.protocol == Protocol::LerfMask {
         report.left_out.push(format!("{} in {} has no prediction and is not counted", task.object, truth.frame));
     } else {
@@ -77,12 +82,12 @@ fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &Truth) {
 /// Scores what is shown in a frame, or nothing for a reason.
 fn score_one(
     task: &Task,
-    truth: &Truth,
+    truth: &TruthFile,
     view: &View,
     reason: Option<&str>,
     bench: &Bench,
     subject: &mut dyn Subject,
-    watch: &mut dyn Watch,
+    watch: &mut dyn PictureObserver,
 ) -> Result<PairScores> {
     let mask = (bench.truth)(&truth.file, view)?;
     let photo = shrink_photo(&*view.photo()?, mask.width, mask.height);
@@ -95,12 +100,12 @@ fn score_one(
         let scores = score(&rendered, &mask, &photo, bench.compat, bench.lpips)?;
         (scores, covered(&rendered.alpha), rendered.rgb)
     };
-    watch.see(&Compared {
+    watch.observe(&ScoredPicture {
         object: Some(task.object.clone()),
         masks: Some((&found, &mask.inside)),
         numbers: scores.named(),
         note: reason.unwrap_or_default().to_owned(),
-        ..Compared::new(&truth.frame, &photo, &rgb)
+        ..ScoredPicture::new(&truth.frame, &photo, &rgb)
     })?;
     Ok(scores)
 }

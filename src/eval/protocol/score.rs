@@ -1,10 +1,10 @@
 //! Scores of one object in one frame.
 
 use crate::eval::boundary::boundary_iou;
-use crate::eval::metrics::{Overlap, PAPER_COVERED, covered, mean, paper_score, psnr, scores};
+use crate::eval::metrics::{Overlap, PAPER_COVERED_VALUE_MIN, covered, mean, paper_score, psnr, scores};
 use crate::eval::ssim::ssim;
 use crate::eval::ssim8::{ssim8, to_bytes};
-use crate::render::Rendered;
+use crate::render::Render;
 use crate::scene::Photo;
 use crate::scenes::truth::TruthMask;
 
@@ -47,7 +47,7 @@ impl PairScores {
 /// uses the PSNR and SSIM of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels,
 /// SSIM of 8-bit pictures with a uniform window.
 pub(crate) fn score(
-    drawn: &Rendered,
+    drawn: &Render,
     truth: &TruthMask,
     photo: &Photo,
     compat: bool,
@@ -60,7 +60,7 @@ pub(crate) fn score(
     let (width, height) = (truth.width as usize, truth.height as usize);
     let covered = covered(&drawn.alpha);
     let coloured: Vec<bool> =
-        drawn.rgb.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED)).collect();
+        drawn.rgb.iter().map(|colour| colour.iter().any(|&value| value > PAPER_COVERED_VALUE_MIN)).collect();
     let counts = |index: usize| compat || photo.rgba[index][3] > 0;
     let agrees = |index: usize| if covered[index] == truth.inside[index] { 1.0 } else { 0.0 };
     let target = times_mask(photo, &truth.inside);

@@ -20,11 +20,11 @@ pub(super) enum Choice {
 }
 
 /// Least share of the strokes on an object for a label, against strokes that slip onto a neighbour.
-const STROKES: f64 = 0.05;
+const STROKE_SHARE_MIN: f64 = 0.05;
 
 pub(super) fn choose(task: &Task, bench: &Bench, subject: &mut dyn Subject) -> Result<Choice> {
     match &task.prompt {
-        Prompt::Name => Ok(by_name(&task.object, bench)),
+        Prompt::Name => Ok(select_by_name(&task.object, bench)),
         Prompt::Mask(prompt) => {
             let Some(view) = bench.view(&prompt.frame) else { return Ok(no_view(&prompt.frame)) };
             let mask = (bench.truth)(&prompt.file, view)?;
@@ -47,7 +47,7 @@ fn no_view(frame: &str) -> Choice {
 }
 
 /// Chooses by a name in the table, or an id.
-fn by_name(object: &str, bench: &Bench) -> Choice {
+fn select_by_name(object: &str, bench: &Bench) -> Choice {
     let named = bench.names.and_then(|names| names.by_name(object));
     let Some(id) = named.or_else(|| object.parse().ok()) else {
         return Choice::Missing(format!("labels.json has no label called {object}"));
@@ -87,7 +87,7 @@ fn under_strokes(
         }
     }
     let all: u64 = counts.values().map(|&(yes, _)| yes).sum();
-    let enough = |&(yes, no): &(u64, u64)| yes > no && yes as f64 >= STROKES * all as f64;
+    let enough = |&(yes, no): &(u64, u64)| yes > no && yes as f64 >= STROKE_SHARE_MIN * all as f64;
     let labels: Vec<u32> = counts.iter().filter(|(_, count)| enough(count)).map(|(&label, _)| label).collect();
     Ok(if labels.is_empty() {
         Choice::Empty("no label has more pixels under the strokes on the object than under the others".into())

@@ -4,15 +4,15 @@ mod score;
 
 pub use score::{HoleScores, ObjectRemoval, RemovalScores, RuleScores};
 
-use super::compared::{Compared, Watch};
+use super::compared::{PictureObserver, ScoredPicture};
 use crate::edit::fill::{Filled, Light, SIGHT_SIDE, Sight, fill};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::label::vote::ballot::{Ballot, Sweep, Voter, sweep};
 use crate::label::vote::model::{label_by_lift, objects_of};
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Gaussians, Photo, View};
-use score::{Holes, Place, Tally};
+use score::{HoleSums, RemovalSite, RemovalSums};
 use std::collections::BTreeMap;
 
 /// Photos of the scene without an object.
@@ -54,7 +54,7 @@ pub fn removals(
     train: &[&View],
     options: RenderOptions,
     truth: &dyn RemovalTruth,
-    watch: &mut dyn Watch,
+    watch: &mut dyn PictureObserver,
 ) -> Result<RemovalScores> {
     engine.upload_model(model)?;
     let own = model.labels.clone().unwrap_or_else(|| vec![0; model.len()]);
@@ -62,24 +62,28 @@ pub fn removals(
     let light = Light::of(model, &sights)?;
     let mut paper = model.clone();
     label_by_lift(engine, &mut paper, train, options.near)?;
-    let ballot = sweep(engine, &Voter::of_views(views), Sweep::new(options.near, 0))?;
+    let ballot = sweep(engine, &Voter::for_views(views), Sweep::new(options.near, 0))?;
     let mut objects = BTreeMap::new();
     for id in objects_of(views) {
-        let places = views.iter().map(|view| Place::new(id, view, truth).transpose());
-        let places: Vec<Place> = places.flatten().collect::<Result<_>>()?;
+        let places = views.iter().map(|view| RemovalSite::new(id, view, truth).transpose());
+        let places: Vec<RemovalSite> = places.flatten().collect::<Result<_>>()?;
         let id = u32::from(id);
         let votes_left = |labels: &[u32]| weight_left(&ballot, id, labels);
         let rest = |labels: &[u32]| model.filtered(|row| labels[row] != id);
-        let (mut plain, mut filled, mut main) = (Tally::default(), Tally::default(), Tally::default());
-        let mut draw = |part: &Gaussians, tally: &mut Tally, what: &'static str, watch: &mut dyn Watch| {
+        let (mut plain, mut filled, mut main) =
+            (RemovalSums::default(), RemovalSums::default(), RemovalSums::default());
+        let mut draw = |part: &Gaussians,
+                        tally: &mut RemovalSums,
+                        what: &'static str,
+                        watch: &mut dyn PictureObserver| {
             for place in &places {
                 let rendered = drawn(engine, part, place.view, options)?;
                 tally.add(place, &rendered);
-                let Some(without) = place.truths[0].as_ref().filter(|_| what != MAIN) else { continue };
-                watch.see(&Compared {
+                let Some(without) = place.truths[0].as_ref().filter(|_| what != MAIN_RULE_PICTURE) else { continue };
+                watch.observe(&ScoredPicture {
                     object: Some(format!("{id} {what}")),
                     numbers: vec![("PSNR", place.psnr(&rendered))],
-                    ..Compared::new(&place.view.name, without, &rendered.rgb)
+                    ..ScoredPicture::new(&place.view.name, without, &rendered.rgb)
                 })?;
             }
             Ok::<(), crate::Error>(())
@@ -94,10 +98,10 @@ pub fn removals(
         let added: u64 = closed.as_ref().map_or(0, |closed| closed.added.values().sum());
         draw(closed.as_ref().map_or(&without, |closed| &closed.model), &mut filled, "filled", watch)?;
         let labels = paper.labels.as_deref().unwrap_or(&own);
-        draw(&rest(labels), &mut main, MAIN, watch)?;
+        draw(&rest(labels), &mut main, MAIN_RULE_PICTURE, watch)?;
         let holes = match closed.filter(|_| added > 0) {
             Some(closed) => holes(engine, &closed, &places, options)?,
-            None => Holes::default(),
+            None => HoleSums::default(),
         };
         let scores = ObjectRemoval {
             votes: plain.scores(votes_left(&own)),
@@ -125,10 +129,10 @@ fn weight_left(ballot: &Ballot, id: u32, labels: &[u32]) -> Option<f64> {
 }
 
 /// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
-fn holes(engine: &mut Engine, closed: &Filled, places: &[Place], options: RenderOptions) -> Result<Holes> {
+fn holes(engine: &mut Engine, closed: &Filled, places: &[RemovalSite], options: RenderOptions) -> Result<HoleSums> {
     let old = closed.model.len() as u64 - closed.added.values().sum::<u64>();
     let bare = closed.model.filtered(|row| (row as u64) < old);
-    let mut holes = Holes::default();
+    let mut holes = HoleSums::default();
     for place in places {
         let bare = drawn(engine, &bare, place.view, options)?;
         let rendered = drawn(engine, &closed.model, place.view, options)?;
@@ -138,10 +142,10 @@ fn holes(engine: &mut Engine, closed: &Filled, places: &[Place], options: Render
 }
 
 /// Name of the picture by the rule of the paper.
-const MAIN: &str = "removed by main Gaussians";
+const MAIN_RULE_PICTURE: &str = "removed by main Gaussians";
 
 /// Renders a part of the model, which may be empty.
-fn drawn(engine: &mut Engine, part: &Gaussians, view: &View, options: RenderOptions) -> Result<Rendered> {
+fn drawn(engine: &mut Engine, part: &Gaussians, view: &View, options: RenderOptions) -> Result<Render> {
     engine.upload_model(part)?;
     render(engine, &view.camera, &RenderOptions { parts: Parts::COLOUR, ..options })
 }

@@ -3,20 +3,20 @@
 use super::RemovalTruth;
 use crate::error::Result;
 use crate::eval::metrics::{clamped, colour_of, mean, psnr_of, scores, square};
-use crate::render::Rendered;
+use crate::render::Render;
 use crate::scene::{LabelMap, Photo, View};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Width of the band around the mask that counts as the object's place, px: its pixels are partly the object's.
-const BAND: u32 = 2;
+const BAND_WIDTH_PX: u32 = 2;
 /// Width of the ring around that place, px, whose mean colour is the simplest way to close a hole.
-const RING: u32 = 4;
+const RING_WIDTH_PX: u32 = 4;
 /// Opacity below which a pixel is a hole.
-const HOLE: f32 = 0.5;
+const HOLE_OPACITY_MAX: f32 = 0.5;
 /// Distance of two colours (r, g, b, 0 to 1) from which photo and truth differ enough to tell whose colour is shown.
-const DIFFERENT: f64 = 0.1;
+const COLOUR_DISTANCE_MIN: f64 = 0.1;
 
 scores! {
     /// What one way of removing an object leaves; `None` where there is nothing to compare with.
@@ -100,20 +100,20 @@ impl RemovalScores {
 }
 
 /// Where a view shows an object, with the photos to compare a removal with.
-pub(super) struct Place<'a> {
+pub(super) struct RemovalSite<'a> {
     pub(super) view: &'a View,
     photo: Arc<Photo>,
     /// The photo without the object, and the same with its shadow, if there are such.
     pub(super) truths: [Option<Photo>; 2],
     /// Its pixels in the mask.
     inside: Vec<usize>,
-    /// These and those within `BAND` of them.
+    /// These and those within `BAND_WIDTH_PX` of them.
     around: Vec<usize>,
-    /// Those within `RING` of these.
+    /// Those within `RING_WIDTH_PX` of these.
     ring: Vec<usize>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> RemovalSite<'a> {
     /// Finds the valid pixels of object `id`; `None` without any.
     pub(super) fn new(id: u16, view: &'a View, truth: &dyn RemovalTruth) -> Result<Option<Self>> {
         // Masks are asked for their pixels only where they show the object.
@@ -123,7 +123,7 @@ impl<'a> Place<'a> {
         }
         let (mask, photo) = (mask.get()?, photo.get()?);
         let own = LabelMap { ids: mask.ids.iter().map(|&found| u16::from(found == id)).collect(), ..*mask };
-        let (near, far) = (own.near_contour(BAND), own.near_contour(BAND + RING));
+        let (near, far) = (own.near_contour(BAND_WIDTH_PX), own.near_contour(BAND_WIDTH_PX + RING_WIDTH_PX));
         let pick = |counts: &dyn Fn(usize) -> bool| -> Vec<usize> {
             (0..own.ids.len()).filter(|&index| photo.rgba[index][3] > 0 && counts(index)).collect()
         };
@@ -138,13 +138,13 @@ impl<'a> Place<'a> {
     }
 
     /// Returns the mean colour of a picture in the ring around the object.
-    fn mean_colour(&self, rendered: &Rendered) -> [f64; 3] {
+    fn mean_colour(&self, rendered: &Render) -> [f64; 3] {
         let shown = |channel: usize| self.ring.iter().map(move |&index| clamped(rendered.rgb[index])[channel]);
         [0, 1, 2].map(|channel| mean(shown(channel)).unwrap_or(0.0))
     }
 
     /// Returns the PSNR of a picture without the object, dB.
-    pub(super) fn psnr(&self, rendered: &Rendered) -> Option<f64> {
+    pub(super) fn psnr(&self, rendered: &Render) -> Option<f64> {
         let truth = self.truths[0].as_ref()?;
         let error = |&index: &usize| square(clamped(rendered.rgb[index]), colour_of(truth.rgba[index]));
         mean(self.around.iter().map(error)).map(psnr_of)
@@ -153,10 +153,10 @@ impl<'a> Place<'a> {
 
 /// Sums of squared errors, and their numbers, against both truths.
 #[derive(Clone, Copy, Debug, Default)]
-struct Squares([(f64, u64); 2]);
+struct SquaredErrors([(f64, u64); 2]);
 
-impl Squares {
-    fn add(&mut self, shown: [f64; 3], place: &Place, index: usize) {
+impl SquaredErrors {
+    fn add(&mut self, shown: [f64; 3], place: &RemovalSite, index: usize) {
         for ((sum, count), truth) in self.0.iter_mut().zip(&place.truths) {
             if let Some(truth) = truth {
                 *sum += square(shown, colour_of(truth.rgba[index]));
@@ -177,19 +177,19 @@ fn share(part: u64, all: u64) -> Option<f64> {
 
 /// Sums over the views of an object.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct RemovalSums {
     pixels: u64,
     holes: u64,
     /// As rendered, and with holes painted in the mean colour around the object.
-    rendered: Squares,
-    painted: Squares,
+    rendered: SquaredErrors,
+    painted: SquaredErrors,
     different: u64,
     leftover: u64,
 }
 
-impl Tally {
+impl RemovalSums {
     /// Adds a picture of what is left.
-    pub(super) fn add(&mut self, place: &Place, rendered: &Rendered) {
+    pub(super) fn add(&mut self, place: &RemovalSite, rendered: &Render) {
         self.pixels += place.around.len() as u64;
         let colour = place.mean_colour(rendered);
         for &index in &place.around {
@@ -205,7 +205,7 @@ impl Tally {
         for &index in place.inside.iter().filter(|&&index| !is_hole(rendered, index)) {
             let shown = clamped(rendered.rgb[index]);
             let (with, goal) = (colour_of(place.photo.rgba[index]), colour_of(truth.rgba[index]));
-            if 3.0 * square(with, goal) > DIFFERENT * DIFFERENT {
+            if 3.0 * square(with, goal) > COLOUR_DISTANCE_MIN * COLOUR_DISTANCE_MIN {
                 self.different += 1;
                 self.leftover += u64::from(square(shown, with) < square(shown, goal));
             }
@@ -230,16 +230,16 @@ impl Tally {
 
 /// Sums over the holes of an object in all views.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Holes {
+pub(super) struct HoleSums {
     pixels: u64,
     holes: u64,
-    filled: Squares,
-    mean_colour: Squares,
+    filled: SquaredErrors,
+    mean_colour: SquaredErrors,
 }
 
-impl Holes {
+impl HoleSums {
     /// Adds a picture of the filled model, and of that without its new Gaussians.
-    pub(super) fn add(&mut self, place: &Place, bare: &Rendered, filled: &Rendered) {
+    pub(super) fn add(&mut self, place: &RemovalSite, bare: &Render, filled: &Render) {
         let colour = place.mean_colour(bare);
         self.pixels += place.around.len() as u64;
         for &index in place.around.iter().filter(|&&index| is_hole(bare, index)) {
@@ -256,6 +256,6 @@ impl Holes {
     }
 }
 
-fn is_hole(rendered: &Rendered, index: usize) -> bool {
-    rendered.alpha[index] < HOLE
+fn is_hole(rendered: &Render, index: usize) -> bool {
+    rendered.alpha[index] < HOLE_OPACITY_MAX
 }

@@ -12,7 +12,7 @@ use crate::gpu::Gpu;
 use crate::label::vote::ballot::{Sweep, Voter, sweep};
 use crate::label::vote::decide::decide;
 use crate::label::vote::model::vote_engine;
-use crate::render::{Parts, RenderOptions, Rendered, render};
+use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use crate::segment::{Place, Prepared, Prompt};
 use glam::{DVec2, DVec3};
@@ -26,7 +26,7 @@ use std::time::Duration;
 /// Difference of depths, as a share, up to which a view sees the point and not something in front of it.
 const DEPTH_SHARE_MAX: f64 = 0.04;
 /// The object, in masks and labels of this work.
-const OBJECT: u16 = 1;
+const OBJECT_ID: u16 = 1;
 
 /// A click in a photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,15 +95,15 @@ pub enum Progress<'a> {
 }
 
 /// Who hears of the progress. An error ends the work.
-pub type Observe<'a> = &'a mut dyn FnMut(Progress) -> Result<()>;
+pub type ProgressObserver<'a> = &'a mut dyn FnMut(Progress) -> Result<()>;
 
 /// Finds objects in a model. What was worked out of a view is kept for the next question.
-pub struct Clicking<'a> {
+pub struct ObjectFinder<'a> {
     engine: Engine,
     means: Vec<[f32; 3]>,
     photos: &'a Photos,
     near: f32,
-    known: Vec<Known>,
+    known: Vec<ViewCache>,
     /// Views whose photos the network has to look at first, and the time and number of those that it has looked at.
     unseen: BTreeSet<usize>,
     looked: (Duration, u32),
@@ -129,16 +129,16 @@ fn pixel_of([x, y]: Place, view: &View) -> usize {
 
 /// What was worked out of a view.
 #[derive(Default)]
-struct Known {
-    shown: Option<Rendered>,
+struct ViewCache {
+    shown: Option<Render>,
     prepared: Option<Prepared>,
 }
 
-impl<'a> Clicking<'a> {
+impl<'a> ObjectFinder<'a> {
     /// Puts a model on the device.
     pub fn new(gpu: Arc<Gpu>, model: &Gaussians, photos: &'a Photos, near: f32) -> Result<Self> {
         let engine = vote_engine(gpu, model, &photos.views.iter().collect::<Vec<_>>(), 2)?;
-        let known = photos.views.iter().map(|_| Known::default()).collect();
+        let known = photos.views.iter().map(|_| ViewCache::default()).collect();
         let (unseen, looked) = (BTreeSet::new(), (Duration::ZERO, 0));
         Ok(Self { engine, means: model.means.clone(), photos, near, known, unseen, looked, answers: Vec::new() })
     }
@@ -152,7 +152,7 @@ impl<'a> Clicking<'a> {
     /// Returns the view that looks at points most as from `eye` and sees most of them, and where it sees them.
     pub fn nearest(&mut self, points: &[DVec3], eye: DVec3) -> Result<Option<(usize, Vec<[u32; 2]>)>> {
         let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-        for view in self.by_direction(eye, middle) {
+        for view in self.views_by_direction(eye, middle) {
             let mut seen = Vec::new();
             for &point in points {
                 seen.extend(self.place_of(view, point)?.map(|place| self.photos.pixel(view, place)));
@@ -167,7 +167,7 @@ impl<'a> Clicking<'a> {
     /// Returns which Gaussians belong to the object: what the box means, or the first click on it, and what other clicks on it add
     /// or clicks beside it take away, where they are not answered so already. Clicks on it come first, in whatever order the two
     /// kinds were made.
-    pub fn object(&mut self, hints: &Hints, observe: Observe) -> Result<Vec<bool>> {
+    pub fn object(&mut self, hints: &Hints, observe: ProgressObserver) -> Result<Vec<bool>> {
         hints.first()?;
         let mut spots = Vec::new();
         for click in &hints.clicks {
@@ -242,7 +242,7 @@ impl<'a> Clicking<'a> {
     }
 
     /// Returns the views by the angle at the point between them and an eye.
-    fn by_direction(&self, eye: DVec3, point: DVec3) -> Vec<usize> {
+    fn views_by_direction(&self, eye: DVec3, point: DVec3) -> Vec<usize> {
         let toward = |from: DVec3| (from - point).normalize_or_zero();
         let near = |view: usize| toward(self.photos.views[view].camera.centre()).dot(toward(eye));
         let mut order: Vec<usize> = (0..self.photos.views.len()).collect();
@@ -251,7 +251,7 @@ impl<'a> Clicking<'a> {
     }
 
     /// Asks views, several at a time.
-    fn ask_all(&mut self, prompts: &[(usize, Prompt)], observe: Observe) -> Result<Vec<Masks>> {
+    fn ask_all(&mut self, prompts: &[(usize, Prompt)], observe: ProgressObserver) -> Result<Vec<Masks>> {
         let mut answers = Vec::new();
         for some in prompts.chunks(rayon::current_num_threads()) {
             for &(view, _) in some {
@@ -292,9 +292,9 @@ impl<'a> Clicking<'a> {
         let views: &'a [View] = &self.photos.views;
         let voters: Vec<Voter> =
             // Photos have another size than the masks.
-            masks.iter().zip(&pixels).map(|((view, _), mask)| Voter { photo: None, ..Voter::of(&views[*view], mask) }).collect();
+            masks.iter().zip(&pixels).map(|((view, _), mask)| Voter { photo: None, ..Voter::for_view(&views[*view], mask) }).collect();
         let decision = decide(&sweep(&mut self.engine, &voters, Sweep::new(self.near, 0))?, &self.means)?;
         self.engine.set_labels(&decision.labels)?;
-        Ok(decision.labels.iter().map(|&label| label == u32::from(OBJECT)).collect())
+        Ok(decision.labels.iter().map(|&label| label == u32::from(OBJECT_ID)).collect())
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Longest side of the views in which an object is drawn and compared, px.
-const DRAWN_PX: u32 = 512;
+const DRAWN_SIDE_MAX_PX: u32 = 512;
 
 /// The photos of a scene, and the network that is asked about them.
 pub struct Photos {
@@ -37,7 +37,7 @@ impl Photos {
         };
         let typed = views.iter().map(size).collect::<Result<_>>()?;
         for view in &mut views {
-            let (width, height) = bounded_size(view.camera.size(), Some(DRAWN_PX));
+            let (width, height) = bounded_size(view.camera.size(), Some(DRAWN_SIDE_MAX_PX));
             view.camera = view.camera.resized(width, height);
         }
         let cache = FeatureCache::new(folder, &network);

@@ -2,8 +2,8 @@
 //! their Gaussians, and asked again of what the model shows then.
 
 use super::photos::Masks;
-use super::shapes::{Asked, agreeing, iou, places, prompt_of, without};
-use super::{Area, Clicking, Observe, Progress, nothing};
+use super::shapes::{ViewMasks, agreeing, iou, places, prompt_of, without};
+use super::{Area, ObjectFinder, Progress, ProgressObserver, nothing};
 use crate::error::Result;
 use crate::render::label_map;
 use crate::scene::LabelMap;
@@ -11,8 +11,8 @@ use crate::segment::{Place, Prompt};
 use glam::DVec3;
 
 /// Views that are asked for a first answer, and at most.
-const FIRST_VIEWS: usize = 12;
-const ALL_VIEWS: usize = 24;
+const FIRST_VIEWS_MAX: usize = 12;
+const VIEWS_MAX: usize = 24;
 /// IoU of a mask with what the model shows of the object above which it counts in the second round.
 const CONFIRMING_IOU_MIN: f64 = 0.6;
 
@@ -66,9 +66,9 @@ impl Question {
     }
 }
 
-impl Clicking<'_> {
+impl ObjectFinder<'_> {
     /// Returns what a click means. If that has Gaussians at `others`, it is asked again so that it has not.
-    pub(super) fn meant(&mut self, spot: Spot, others: &[Spot], observe: Observe) -> Result<Vec<bool>> {
+    pub(super) fn meant(&mut self, spot: Spot, others: &[Spot], observe: ProgressObserver) -> Result<Vec<bool>> {
         let question = Question { target: Target::Click(spot), others: Vec::new() };
         let found = self.remembered(question.clone(), observe)?;
         let wrong: Vec<Spot> = others.iter().filter(|other| found[other.gaussian]).copied().collect();
@@ -76,7 +76,7 @@ impl Clicking<'_> {
     }
 
     /// Returns the answer to a question, also to one that was asked before.
-    pub(super) fn remembered(&mut self, question: Question, observe: Observe) -> Result<Vec<bool>> {
+    pub(super) fn remembered(&mut self, question: Question, observe: ProgressObserver) -> Result<Vec<bool>> {
         if let Some((_, rows)) = self.answers.iter().find(|(other, _)| *other == question) {
             return Ok(rows.clone());
         }
@@ -86,36 +86,36 @@ impl Clicking<'_> {
     }
 
     /// Asks for what lies at one click or in a box.
-    fn answer(&mut self, question: &Question, observe: Observe) -> Result<Vec<bool>> {
+    fn answer(&mut self, question: &Question, observe: ProgressObserver) -> Result<Vec<bool>> {
         let anchors = self.anchors(question)?;
         let Some(target) = question.point().or(anchors.first().copied()) else {
             return Err(nothing(question.area().is_some()));
         };
         let first = question.first();
-        let mut order = self.by_direction(self.photos.views[first].camera.centre(), target);
+        let mut order = self.views_by_direction(self.photos.views[first].camera.centre(), target);
         order.sort_by_key(|&view| view != first);
         let mut prompts = Vec::new();
         for &view in &order {
-            if prompts.len() == FIRST_VIEWS {
+            if prompts.len() == FIRST_VIEWS_MAX {
                 break;
             }
             prompts.extend(self.prompt(view, question, &anchors)?.map(|prompt| (view, prompt)));
             observe(Progress::Asked { done: 0, all: prompts.len(), left: None })?;
         }
-        for view in prompts.iter().map(|(view, _)| *view).chain(order.iter().copied().take(ALL_VIEWS)) {
+        for view in prompts.iter().map(|(view, _)| *view).chain(order.iter().copied().take(VIEWS_MAX)) {
             if self.known[view].prepared.is_none() && self.photos.is_new(view)? {
                 self.unseen.insert(view);
             }
         }
         let answers = self.ask_without(prompts, &question.others, observe)?;
-        let asked = |(view, masks): (usize, Masks)| Asked::new(view, masks, self.known[view].shown.as_ref());
-        let asked: Vec<Asked> = answers.into_iter().map(asked).collect();
+        let asked = |(view, masks): (usize, Masks)| ViewMasks::new(view, masks, self.known[view].shown.as_ref());
+        let asked: Vec<ViewMasks> = answers.into_iter().map(asked).collect();
         let rows = self.vote(&agreeing(&asked))?;
         if !rows.contains(&true) {
             return Err(nothing(question.area().is_some()));
         }
         observe(Progress::First(&rows))?;
-        let confirmed = self.confirmed(&order[..order.len().min(ALL_VIEWS)], question, observe)?;
+        let confirmed = self.confirmed(&order[..order.len().min(VIEWS_MAX)], question, observe)?;
         // Where no view confirms, the first answer stands.
         if confirmed.is_empty() { Ok(rows) } else { self.vote(&confirmed) }
     }
@@ -125,7 +125,7 @@ impl Clicking<'_> {
         &mut self,
         prompts: Vec<(usize, Prompt)>,
         others: &[Spot],
-        observe: Observe,
+        observe: ProgressObserver,
     ) -> Result<Vec<(usize, Masks)>> {
         let answers = self.ask_all(&prompts, observe)?;
         let mut found = Vec::new();
@@ -153,7 +153,12 @@ impl Clicking<'_> {
     }
 
     /// Asks views for what the model shows now, and returns their masks where they confirm it.
-    fn confirmed(&mut self, views: &[usize], question: &Question, observe: Observe) -> Result<Vec<(usize, LabelMap)>> {
+    fn confirmed(
+        &mut self,
+        views: &[usize],
+        question: &Question,
+        observe: ProgressObserver,
+    ) -> Result<Vec<(usize, LabelMap)>> {
         let (mut maps, mut prompts) = (Vec::new(), Vec::new());
         for &view in views {
             observe(Progress::Asked { done: 0, all: prompts.len(), left: None })?;

@@ -1,9 +1,9 @@
 //! Masks of an object in single views: which of several views agree, how much two overlap, and where one is thickest.
 
-use super::OBJECT;
+use super::OBJECT_ID;
 use super::photos::Masks;
-use crate::label::masks::nested::{NestedMasks, sight::Sight};
-use crate::render::Rendered;
+use crate::label::masks::nested::{NestedMasks, sight::ViewSight};
+use crate::render::Render;
 use crate::scene::LabelMap;
 use crate::segment::{Place, Prompt};
 
@@ -15,29 +15,29 @@ const CLOSE_MIN: f64 = 0.9;
 const PLACES_MAX: usize = 64;
 
 /// The masks of a view that was asked.
-pub(super) struct Asked {
+pub(super) struct ViewMasks {
     view: usize,
     /// Masks at the size of the view.
     masks: Vec<LabelMap>,
     qualities: Vec<f64>,
-    sight: Sight,
+    sight: ViewSight,
 }
 
-impl Asked {
-    pub(super) fn new(view: usize, (masks, qualities): Masks, shown: Option<&Rendered>) -> Self {
+impl ViewMasks {
+    pub(super) fn new(view: usize, (masks, qualities): Masks, shown: Option<&Render>) -> Self {
         let layer = |(mask, number): (&LabelMap, u16)| LabelMap {
             ids: mask.ids.iter().map(|id| id * number).collect(),
             ..mask.clone()
         };
         let nested = NestedMasks { layers: masks.iter().zip(1..).map(layer).collect(), qualities };
-        let sight = shown.map_or_else(Sight::default, |shown| Sight::new(&shown.top_id, &nested));
+        let sight = shown.map_or_else(ViewSight::default, |shown| ViewSight::new(&shown.top_id, &nested));
         Self { view, masks, qualities: nested.qualities, sight }
     }
 }
 
 /// Chooses among the masks of the first view, which show a part, the object or more, the one on which the other views agree
 /// most, and returns it with theirs. Of masks on which they agree almost as much, it is the smallest.
-pub(super) fn agreeing(asked: &[Asked]) -> Vec<(usize, LabelMap)> {
+pub(super) fn agreeing(asked: &[ViewMasks]) -> Vec<(usize, LabelMap)> {
     let Some((first, others)) = asked.split_first() else { return Vec::new() };
     let overlaps: Vec<_> = others.iter().map(|other| first.sight.overlaps(&other.sight)).collect();
     let mut levels = Vec::new();
@@ -75,7 +75,7 @@ pub(super) fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
 
 /// Returns the box around the pixels of the object and the one of them that is farthest from their border.
 pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
-    let depths = map.depths(OBJECT);
+    let depths = map.depths(OBJECT_ID);
     let deepest = (0..).zip(&depths).max_by_key(|(at, depth)| (**depth, *at));
     let (at, _) = deepest.filter(|(_, depth)| **depth > 1)?;
     let [left, top, right, bottom] = map.bounds()?.map(|side| side as f32);
@@ -84,7 +84,7 @@ pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
 
 /// Returns places all over a mask, from the one that is farthest from its border outwards.
 pub(super) fn places(map: &LabelMap) -> Vec<Place> {
-    let depths = map.depths(OBJECT);
+    let depths = map.depths(OBJECT_ID);
     let mut inside: Vec<usize> = (0..depths.len()).filter(|&at| depths[at] > 0).collect();
     inside.sort_by_key(|&at| std::cmp::Reverse(depths[at]));
     inside.iter().step_by(inside.len().div_ceil(PLACES_MAX).max(1)).map(|&at| place(map, at)).collect()

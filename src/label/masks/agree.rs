@@ -11,7 +11,7 @@ use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
 /// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
-pub const MIN_VIEWS: usize = 2;
+pub const OBJECT_VIEWS_MIN: usize = 2;
 
 /// What the ids of masks mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +56,7 @@ pub fn agree(
     let mut owners = Vec::with_capacity(views.len());
     for view in views {
         owners.push(match &view.mask {
-            Some(mask) => Owners::new(&sweep(engine, &[Voter::of(view, mask)], counting)?),
+            Some(mask) => Owners::new(&sweep(engine, &[Voter::for_view(view, mask)], counting)?),
             None => Owners::default(),
         });
         tick();
@@ -86,7 +86,7 @@ fn settle(
 ) -> Result<Vec<Option<LabelMap>>> {
     let counting = Sweep::new(how.near, 0);
     // The labels that all masks give the model decide the content of each mask.
-    let voters = views.iter().zip(masks).filter_map(|(view, mask)| Some(Voter::of(view, mask.as_ref()?)));
+    let voters = views.iter().zip(masks).filter_map(|(view, mask)| Some(Voter::for_view(view, mask.as_ref()?)));
     let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting)?;
     engine.set_labels(&decision.labels)?;
     let mut mended = Vec::with_capacity(views.len());

@@ -9,11 +9,11 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 /// Weight in a view above which a Gaussian counts as visible there, px.
-const SEEN: f64 = 0.25;
+const VISIBLE_WEIGHT_MIN_PX: f64 = 0.25;
 /// Share of this weight in one mask above which the mask owns the Gaussian.
-const OWNED: f64 = 0.5;
+const OWNED_SHARE_MIN: f64 = 0.5;
 /// Overlap of two groups of masks above which they are one object.
-pub(crate) const SAME_OBJECT: f64 = 0.25;
+pub(crate) const SAME_OBJECT_OVERLAP_MIN: f64 = 0.25;
 
 /// The owner of each Gaussian among the masks of a view.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,7 +32,7 @@ impl Owners {
             let votes = ballot.row(row);
             let total: f64 = votes.iter().map(|&(_, votes)| weight(votes)).sum();
             let &(place, best) = votes.iter().max_by_key(|&&(place, votes)| (votes, u16::MAX - place))?;
-            (total >= SEEN && weight(best) >= OWNED * total).then_some((place, total as f32))
+            (total >= VISIBLE_WEIGHT_MIN_PX && weight(best) >= OWNED_SHARE_MIN * total).then_some((place, total as f32))
         };
         Self { ids: ballot.labels.clone(), rows: (0..ballot.len()).map(owner).collect() }
     }
@@ -60,7 +60,7 @@ impl Overlap {
 }
 
 /// Groups the masks of all views, without 0, into objects. It joins the two groups with the largest overlap until no
-/// overlap exceeds `SAME_OBJECT`. Two masks of one view never join. Returns the groups, each sorted, in the order of
+/// overlap exceeds `SAME_OBJECT_OVERLAP_MIN`. Two masks of one view never join. Returns the groups, each sorted, in the order of
 /// their first masks.
 pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
     let segments: Vec<Segment> = (views.iter().enumerate())
@@ -77,7 +77,7 @@ pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
             }
         }
     }
-    join(&segments, links, SAME_OBJECT)
+    join(&segments, links, SAME_OBJECT_OVERLAP_MIN)
 }
 
 /// Returns the overlaps of the masks of two views, by ids, over the Gaussians visible in both.

@@ -1,19 +1,19 @@
 //! Repairs inconsistent masks by the model that all of them made.
 
-use super::associate::{SAME_OBJECT, Segment};
+use super::associate::{SAME_OBJECT_OVERLAP_MIN, Segment};
 use crate::scene::LabelMap;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of one object in a mask above which the whole mask becomes that object. Otherwise the mask covers several
 /// objects and is divided along the borders in the model.
-const ONE_OBJECT: f64 = 0.85;
+const ONE_OBJECT_SHARE_MIN: f64 = 0.85;
 /// Smallest share of a mask that is split off as another object. Less is a shifted border.
-const PART: f64 = 0.05;
+const PART_SHARE_MIN: f64 = 0.05;
 /// Share of an object's rendered pixels outside of all masks above which the object counts as missing in the view.
-const MISSED: f64 = 0.6;
+const MISSED_SHARE_MIN: f64 = 0.6;
 /// Smallest area to split off or fill in, as a share of the image. Smaller areas are borders, not objects.
-const SMALLEST: f64 = 0.0005;
+const AREA_SHARE_MIN: f64 = 0.0005;
 
 /// The rule for the ids of objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +115,7 @@ fn area(counts: &BTreeMap<u16, BTreeMap<u16, u64>>, object: u16) -> u64 {
 }
 
 /// Returns the object with the most pixels, the smaller id of equals, and these pixels.
-fn most(objects: &BTreeMap<u16, u64>) -> Option<(u16, u64)> {
+fn most_frequent(objects: &BTreeMap<u16, u64>) -> Option<(u16, u64)> {
     let objects = objects.iter().map(|(&object, &pixels)| (object, pixels)).filter(|(object, _)| *object != 0);
     objects.max_by_key(|&(object, pixels)| (pixels, Reverse(object)))
 }
@@ -123,16 +123,16 @@ fn most(objects: &BTreeMap<u16, u64>) -> Option<(u16, u64)> {
 /// Repairs a renamed mask by the rendered labels of its view. Divides masks that cover several objects, corrects the
 /// ids of others, and fills in missing objects.
 pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repairs) -> LabelMap {
-    let smallest = (SMALLEST * mask.ids.len() as f64).max(4.0) as u64;
+    let smallest = (AREA_SHARE_MIN * mask.ids.len() as f64).max(4.0) as u64;
     let counts = shown_by_id(mask, shown);
     let mut out = mask.clone();
     for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
         let total: u64 = seen.iter().filter(|(object, _)| **object != 0).map(|(_, &pixels)| pixels).sum();
-        let least = smallest.max((PART * total as f64) as u64);
+        let least = smallest.max((PART_SHARE_MIN * total as f64) as u64);
         let objects: BTreeMap<u16, u64> =
             seen.iter().map(|(&object, &pixels)| (object, pixels)).filter(|at| at.0 != 0 && at.1 >= least).collect();
-        let Some((most, pixels)) = most(&objects) else { continue };
-        if pixels as f64 >= ONE_OBJECT * total as f64 {
+        let Some((most, pixels)) = most_frequent(&objects) else { continue };
+        if pixels as f64 >= ONE_OBJECT_SHARE_MIN * total as f64 {
             if most != id {
                 repairs.renamed.push(((view, id), most));
                 recolour(&mut out, mask, id, |_| most);
@@ -144,7 +144,7 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
     }
     let nothing = counts.get(&0).into_iter().flatten();
     for (&object, &pixels) in nothing.filter(|(object, _)| **object != 0) {
-        if pixels >= smallest && pixels as f64 >= MISSED * area(&counts, object) as f64 {
+        if pixels >= smallest && pixels as f64 >= MISSED_SHARE_MIN * area(&counts, object) as f64 {
             repairs.filled.push((view, object));
             for (at, to) in out.ids.iter_mut().enumerate() {
                 if mask.ids[at] == 0 && shown.ids[at] == object {
@@ -169,8 +169,12 @@ pub fn adopt(
     let mut out = mask.clone();
     for (&id, seen) in counts.iter().filter(|(id, _)| **id != 0) {
         let total: u64 = seen.values().sum();
-        let new = match most(seen) {
-            Some((object, pixels)) if pixels as f64 >= SAME_OBJECT * total.min(area(&counts, object)) as f64 => object,
+        let new = match most_frequent(seen) {
+            Some((object, pixels))
+                if pixels as f64 >= SAME_OBJECT_OVERLAP_MIN * total.min(area(&counts, object)) as f64 =>
+            {
+                object
+            }
             _ if objects.contains(&id) => id,
             _ => 0,
         };

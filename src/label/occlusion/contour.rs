@@ -60,7 +60,7 @@ type Sides = BTreeMap<(u16, u16), Side>;
 ///   between its visible parts; without this rule nearly everything in a crowd would hide everything.
 /// * be nearer by the margin, along its contour with the previous link, than k is along its contour with a.
 /// * not be hidden by k directly.
-pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
+pub fn occluders_by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
     let sides = sides(labels, depth, rule.margin);
     let mut direct: Occluders = labels.objects().into_iter().map(|label| (label, Vec::new())).collect();
     for (&(label, other), own) in &sides {
@@ -72,7 +72,7 @@ pub fn by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {
             direct.entry(label).or_default().push(other);
         }
     }
-    let outlines = Outline::of_all(labels);
+    let outlines = Outline::find_all(labels);
     let chains = Chains { direct: &direct, sides: &sides, outlines: &outlines, margin: rule.margin };
     direct.keys().map(|&label| (label, chains.occluders(label))).collect()
 }

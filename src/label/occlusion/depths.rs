@@ -1,6 +1,6 @@
 //! Occluders from depth files, by the rule of the paper.
 
-use super::{by_mean, distances};
+use super::{distances, occluders_by_mean};
 use crate::error::{Error, Result};
 use crate::scene::{DepthKind, Occluders, View, crew};
 use crate::scenes::Lookup;
@@ -20,7 +20,7 @@ pub fn from_depths(
     let of_view = |view: &View| {
         let map = folder.read(view)?;
         let mask = view.mask()?.ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
-        Ok((view.name.clone(), by_mean(&mask, &distances(&map, kind))))
+        Ok((view.name.clone(), occluders_by_mean(&mask, &distances(&map, kind))))
     };
     let found: Vec<Result<(String, Occluders)>> = crew::over_views("reading depth maps", views, of_view);
     found.into_iter().collect()

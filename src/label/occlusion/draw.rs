@@ -4,9 +4,9 @@ use super::walk;
 use crate::scene::labels::label_colour;
 use crate::scene::{LabelMap, Occluders};
 
-const IN_FRONT: [u8; 3] = [255; 3];
-const BEHIND: [u8; 3] = [0; 3];
-const NEITHER: [u8; 3] = [128; 3];
+const IN_FRONT_COLOUR: [u8; 3] = [255; 3];
+const BEHIND_COLOUR: [u8; 3] = [0; 3];
+const NEITHER_COLOUR: [u8; 3] = [128; 3];
 
 /// Draws the objects in their colours, darkened by a third, with a line of two pixels along each contour: white in
 /// front and black behind, or grey if neither object hides the other; what has no label has a line where it hides an
@@ -19,10 +19,10 @@ pub fn picture(labels: &LabelMap, occluders: &Occluders) -> Vec<[u8; 3]> {
     walk(labels, |own, other, pixel, _| {
         // Where three objects meet, front wins over back.
         let (rank, colour) = match (hides(own, other), hides(other, own)) {
-            (true, _) => (3, IN_FRONT),
-            (_, true) => (2, BEHIND),
+            (true, _) => (3, IN_FRONT_COLOUR),
+            (_, true) => (2, BEHIND_COLOUR),
             _ if own == 0 || other == 0 => return,
-            _ => (1, NEITHER),
+            _ => (1, NEITHER_COLOUR),
         };
         if rank > drawn[pixel] {
             (drawn[pixel], pixels[pixel]) = (rank, colour);

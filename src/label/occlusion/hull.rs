@@ -33,7 +33,7 @@ fn half(points: impl Iterator<Item = Point>) -> Vec<Point> {
 
 impl Outline {
     /// Returns the outlines of all objects, by id.
-    pub(super) fn of_all(labels: &LabelMap) -> BTreeMap<u16, Self> {
+    pub(super) fn find_all(labels: &LabelMap) -> BTreeMap<u16, Self> {
         // The leftmost and rightmost pixels of the rows are enough for the hull.
         let mut rows: BTreeMap<u16, BTreeMap<i64, (i64, i64)>> = BTreeMap::new();
         let mut sums: BTreeMap<u16, (Point, i64)> = BTreeMap::new();

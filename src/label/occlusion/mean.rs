@@ -4,7 +4,7 @@ use super::walk;
 use crate::scene::{DepthKind, DepthMap, LabelMap, Occluders};
 use std::collections::BTreeMap;
 
-/// Returns the distances for [`by_mean`], `[H, W]`; 0 and NaN are holes.
+/// Returns the distances for [`occluders_by_mean`], `[H, W]`; 0 and NaN are holes.
 ///
 /// For inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the image. Its nearest pixel
 /// becomes 0 and so a hole. Metric depth stays as it is.
@@ -23,7 +23,7 @@ pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
 /// Returns the occluders of each object (LabelGS, occlusion analysis). k' hides k if they touch and the mean distance
 /// of the contour of k' with k is smaller than that of k with k'. What has no label hides nothing. There is no margin,
 /// because the scale of the distances is unknown.
-pub fn by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
+pub fn occluders_by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
     // Sum and number of the distances along each contour.
     let mut bands: BTreeMap<(u16, u16), (f64, u64)> = BTreeMap::new();
     walk(labels, |own, other, pixel, _| {

@@ -1,9 +1,9 @@
 //! Occluders: which objects hide which in one view. They are the paper's O_k; U_k leaves out the pixels of the
 //! occluders of k.
 //!
-//! [`by_mean`] is the rule of the paper, for monocular depth of a network. [`by_contour`] needs consistent depth, such
+//! [`occluders_by_mean`] is the rule of the paper, for monocular depth of a network. [`occluders_by_contour`] needs consistent depth, such
 //! as that of the model. Both use the contours between objects: a pixel is on the contour of k with k' if its label is
-//! k and one of its 8 neighbours is k'. What has no label (0) is not hidden; [`by_contour`] lets it hide, because masks
+//! k and one of its 8 neighbours is k'. What has no label (0) is not hidden; [`occluders_by_contour`] lets it hide, because masks
 //! seldom cover everything that stands before an object.
 
 mod contour;
@@ -12,11 +12,11 @@ pub mod draw;
 mod hull;
 pub mod mean;
 
-pub use contour::{Rule, by_contour};
+pub use contour::{Rule, occluders_by_contour};
 pub use depths::from_depths;
 pub use draw::picture;
-pub use mean::by_mean;
 pub(crate) use mean::distances;
+pub use mean::occluders_by_mean;
 
 use crate::scene::LabelMap;
 use std::collections::BTreeMap;

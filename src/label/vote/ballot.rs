@@ -32,13 +32,13 @@ pub struct Voter<'a> {
 
 impl<'a> Voter<'a> {
     /// Makes a voter of a view and any mask of its size.
-    pub fn of(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
+    pub fn for_view(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
         Self { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
     }
 
     /// Makes voters of the views that have masks.
-    pub fn of_views(views: &[&'a View]) -> Vec<Self> {
-        views.iter().filter_map(|view| Some(Self::of(view, view.mask.as_ref()?))).collect()
+    pub fn for_views(views: &[&'a View]) -> Vec<Self> {
+        views.iter().filter_map(|view| Some(Self::for_view(view, view.mask.as_ref()?))).collect()
     }
 }
 

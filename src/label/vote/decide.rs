@@ -13,12 +13,12 @@ use std::num::NonZero;
 
 /// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is
 /// inside or behind an object, and its own votes mean little.
-pub(crate) const EVIDENCE: f64 = 1.0;
+pub(crate) const EVIDENCE_MIN_PX: f64 = 1.0;
 /// Number of these neighbours.
-const NEIGHBOURS: usize = 8;
+const VOTING_NEIGHBOURS: usize = 8;
 /// Least longest side at which masks are compared with the labels of the model, px. An agreement is a ratio over many
 /// pixels, and needs fewer of them than the votes.
-const JUDGED_PX: f64 = 160.0;
+const JUDGED_SIDE_MIN_PX: f64 = 160.0;
 
 /// The labels of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,14 +53,14 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]]) -> Result<Decision> {
     let tree = tree_of(means, &totals)?;
     let decide_row = |row: usize| {
         let mut votes: BTreeMap<u16, f64> = own(row).collect();
-        if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE)
-            && let Some(asked) = NonZero::new(NEIGHBOURS.min(rows.len()))
+        if let Some((tree, rows)) = tree.as_ref().filter(|_| totals[row] < EVIDENCE_MIN_PX)
+            && let Some(asked) = NonZero::new(VOTING_NEIGHBOURS.min(rows.len()))
         {
             let at = means[row].map(f64::from);
             let near = tree.query(&at).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
             for item in &near {
                 let winner = winners[rows[item.item as usize]];
-                *votes.entry(winner).or_default() += (EVIDENCE - totals[row]) / asked.get() as f64;
+                *votes.entry(winner).or_default() += (EVIDENCE_MIN_PX - totals[row]) / asked.get() as f64;
             }
         }
         let column = winner(votes.iter().map(|(&column, &share)| (column, share)));
@@ -94,7 +94,7 @@ fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
 
 /// Returns a k-d tree of the Gaussians with enough weight, and their rows.
 fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree<f64, 3>, Vec<usize>)>> {
-    let sure = |&row: &usize| totals[row] >= EVIDENCE && means[row].iter().all(|value| value.is_finite());
+    let sure = |&row: &usize| totals[row] >= EVIDENCE_MIN_PX && means[row].iter().all(|value| value.is_finite());
     let rows: Vec<usize> = (0..means.len()).filter(sure).collect();
     if rows.is_empty() {
         return Ok(None);
@@ -105,10 +105,10 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
 }
 
 /// Returns camera and mask at the size at which masks are judged: half of the full one, but no less than
-/// [`JUDGED_PX`].
+/// [`JUDGED_SIDE_MIN_PX`].
 fn judged(voter: &Voter) -> Result<(Camera, LabelMap)> {
     let longest = voter.camera.width.max(voter.camera.height);
-    let camera = voter.camera.shrunk((JUDGED_PX / f64::from(longest)).clamp(0.5, 1.0));
+    let camera = voter.camera.shrunk((JUDGED_SIDE_MIN_PX / f64::from(longest)).clamp(0.5, 1.0));
     let mask = voter.mask.get()?.resized(camera.width, camera.height);
     Ok((camera, mask))
 }

@@ -1,6 +1,6 @@
 //! The lift of the paper on a trained model, for comparison with votes.
 
-use crate::render::Rendered;
+use crate::render::Render;
 use crate::scene::{Camera, LabelMap, UNLABELLED};
 use glam::DVec3;
 
@@ -10,7 +10,7 @@ const WEIGHT_MIN: f32 = 0.6;
 /// Writes the labels of one view's mask to the main Gaussians of its pixels, over previous labels. Within the view the
 /// larger weight wins, then the larger label. The centre of the Gaussian must project into the same mask (equation 7).
 /// `camera` is [relative](Camera::relative_to) to the origin of `means`.
-pub(crate) fn lift(labels: &mut [u32], means: &[[f32; 3]], camera: &Camera, rendered: &Rendered, mask: &LabelMap) {
+pub(crate) fn lift(labels: &mut [u32], means: &[[f32; 3]], camera: &Camera, rendered: &Render, mask: &LabelMap) {
     let mut best = vec![(0.0_f32, UNLABELLED); labels.len()];
     for ((&top, &weight), &id) in rendered.top_id.iter().zip(&rendered.top_weight).zip(&mask.ids) {
         let Ok(row) = usize::try_from(top) else { continue };

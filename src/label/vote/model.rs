@@ -17,13 +17,13 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Counts of votes. In the second, masks that disagree with the result of the first count less.
-pub(crate) const ROUNDS: u32 = 2;
+pub(crate) const VOTE_ROUNDS: u32 = 2;
 /// Seed of the order of the views by the rule of the paper.
 const SEED: u64 = 0;
 
 /// The options for counting votes.
 #[derive(Clone, Copy, Debug)]
-pub struct Counting {
+pub struct VoteOptions {
     /// Near plane, world units.
     pub near: f32,
     /// Width of the band along mask contours without votes, px.
@@ -47,7 +47,7 @@ pub(crate) fn limited_vote_engine(
 ) -> Result<Engine> {
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let labels = LabelSize { vote_columns: columns, ..LabelSize::default() };
-    let size = EngineSize::of_model(model, sizes).with_labels(Some(labels));
+    let size = EngineSize::for_model(model, sizes).with_labels(Some(labels));
     let mut engine = Engine::new(gpu, size, options)?;
     engine.upload_model(model)?;
     Ok(engine)
@@ -68,14 +68,14 @@ pub fn label_by_votes(
     engine: &mut Engine,
     model: &mut Gaussians,
     views: &[&View],
-    how: &Counting,
+    how: &VoteOptions,
     tick: &mut dyn FnMut(u32),
 ) -> Result<()> {
-    let voters = Voter::of_views(views);
+    let voters = Voter::for_views(views);
     let sweep = Sweep::new(how.near, how.mask_border);
-    for round in 0..ROUNDS {
+    for round in 0..VOTE_ROUNDS {
         let mut decision = count(engine, &voters, round > 0, &model.means, sweep)?;
-        if round + 1 == ROUNDS {
+        if round + 1 == VOTE_ROUNDS {
             lower_outside(engine, &voters, sweep, &mut decision)?;
             decision.drop_unsure(how.min_confidence);
         }
@@ -95,7 +95,7 @@ pub fn label_by_lift(engine: &mut Engine, model: &mut Gaussians, views: &[&View]
     for view in order.into_iter().map(|index| views[index]) {
         stage.count();
         let Some(mask) = view.mask()? else { continue };
-        let rendered = render(engine, &view.camera, &RenderOptions::of_main(near))?;
+        let rendered = render(engine, &view.camera, &RenderOptions::for_main(near))?;
         lift(&mut labels, &model.means, &view.camera.relative_to(model.origin), &rendered, &mask);
     }
     model.labels = Some(labels);

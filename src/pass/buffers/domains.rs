@@ -50,11 +50,11 @@ macro_rules! domains {
     ($($row:ident $field:ident: $name:literal, $cure:expr, $doc:literal $(, $optional:ident)?;)*
         .. $($other:ident: $other_doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
-        enum Place { $($row),* }
+        enum Index { $($row),* }
 
         impl Domain {
             $(#[doc = $doc] pub const $row: Self = Self {
-                count: Count::At(Place::$row as usize),
+                count: Count::At(Index::$row as usize),
                 cure: |fits| $cure(fits, $name),
                 is_optional: !stringify!($($optional)?).is_empty(),
             };)*

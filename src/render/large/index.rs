@@ -12,16 +12,16 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Bound of what 32-bit floats round on the way to a pixel, as a share of the distance to the camera.
-const ROUNDING: f64 = 1e-5;
+const ROUNDING_SHARE_MAX: f64 = 1e-5;
 /// Margins of the cull pass, doubled: a factor of the radius of a splat, and px.
-const FACTOR: f64 = 1.002;
-const PIXELS: f64 = 1.0;
+const CULL_RADIUS_FACTOR: f64 = 1.002;
+const CULL_MARGIN_PX: f64 = 1.0;
 /// Reach of a Gaussian that no pixel sees.
-const UNSEEN: f32 = -1.0;
+const UNSEEN_REACH: f32 = -1.0;
 
 /// Places, reaches and labels of the Gaussians to be shown, 25 bytes each.
 #[derive(Clone, Debug, Default)]
-pub struct Index {
+pub struct GaussianIndex {
     /// World position that `means` are relative to, and how far it is from the origin of the model.
     pub(super) origin: DVec3,
     pub(super) far: DVec3,
@@ -35,10 +35,10 @@ pub struct Index {
     numbers: Vec<u32>,
 }
 
-impl Index {
+impl GaussianIndex {
     /// Looks at every Gaussian of a model, and keeps some by their label and its confidence. Those with less than `least` are
     /// no part of an object that is shown alone. Returns notes for the user too.
-    pub fn of(model: ModelRef, least: f32, keep: impl Fn(u32, Option<f32>) -> bool) -> Result<(Self, Vec<String>)> {
+    pub fn new(model: ModelRef, least: f32, keep: impl Fn(u32, Option<f32>) -> bool) -> Result<(Self, Vec<String>)> {
         if i32::try_from(model.count()).is_err() {
             let problem = format!("has {} Gaussians, at most {} are drawn; take a part of it", model.count(), i32::MAX);
             return Err(Error::usage("model", problem));
@@ -87,7 +87,7 @@ impl Index {
 
     /// Returns the places in the index of the Gaussians that a picture may show, sorted; of all, or of some objects alone.
     pub(super) fn seen(&self, uniforms: &StepUniforms, only: Option<&[u32]>) -> Vec<u32> {
-        let sight = Sight::new(uniforms);
+        let sight = CullCamera::new(uniforms);
         let shows = |at: usize| match (only, &self.labels) {
             (None, _) => true,
             (Some(only), Some(labels)) => self.sure[at] && only.contains(&labels[at]),
@@ -109,14 +109,14 @@ fn reach(row: &Row) -> f32 {
     let squared = 2.0 * (opacity_of(row.opacity) / f64::from(ALPHA_MIN)).ln();
     // The device rounds opacities otherwise.
     if squared < -1e-3 {
-        return UNSEEN;
+        return UNSEEN_REACH;
     }
     let longest = row.scale.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     (f64::from(longest).exp() * (squared.max(0.0) + 1e-3).sqrt()) as f32
 }
 
 /// A camera, as the cull pass sees it (glsl/project/cull.comp).
-struct Sight {
+struct CullCamera {
     rows: [DVec3; 3],
     centre: DVec3,
     near: f64,
@@ -124,7 +124,7 @@ struct Sight {
     axes: [[f64; 4]; 2],
 }
 
-impl Sight {
+impl CullCamera {
     fn new(u: &StepUniforms) -> Self {
         let axis = |focal: f32, principal: f32, size: u32, low: f32, high: f32| {
             [f64::from(focal), f64::from(principal), f64::from(size), f64::from(low.abs().max(high.abs()))]
@@ -143,12 +143,12 @@ impl Sight {
     /// Returns true if the cull pass may keep a Gaussian. All lengths are multiplied by its depth, so that no rounding is
     /// divided by a small one.
     fn sees(&self, mean: Vec3, reach: f32) -> bool {
-        if reach == UNSEEN {
+        if reach == UNSEEN_REACH {
             return false;
         }
         let from = mean.as_dvec3() - self.centre;
         let [x, y, z] = self.rows.map(|row| row.dot(from));
-        let rounding = ROUNDING * (from.length() + self.near);
+        let rounding = ROUNDING_SHARE_MAX * (from.length() + self.near);
         if z <= self.near - rounding {
             return false;
         }
@@ -157,8 +157,8 @@ impl Sight {
         let blur = COV2D_BLUR * 2.0 * (1.0 / f64::from(ALPHA_MIN)).ln() * depth * depth;
         [x, y].into_iter().zip(&self.axes).all(|(along, &[focal, principal, size, slope])| {
             let stretch = focal * f64::from(reach);
-            let radius = (stretch * stretch * (1.0 + slope * slope) + blur).sqrt() * FACTOR
-                + PIXELS * depth
+            let radius = (stretch * stretch * (1.0 + slope * slope) + blur).sqrt() * CULL_RADIUS_FACTOR
+                + CULL_MARGIN_PX * depth
                 + rounding * (focal + principal.abs() + size);
             let centre = focal * along + principal * depth;
             centre + radius >= 0.0 && centre - radius <= size * depth

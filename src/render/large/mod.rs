@@ -3,5 +3,5 @@
 mod index;
 mod painter;
 
-pub use index::Index;
+pub use index::GaussianIndex;
 pub use painter::{Painter, fits};

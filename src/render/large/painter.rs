@@ -1,12 +1,12 @@
 //! Draws a large model: reads the Gaussians that a picture may show, and halves the picture until they fit.
 
-use super::Index;
+use super::GaussianIndex;
 use crate::engine::{Band, Engine, EngineSize, LabelSize, tell_apart, uniforms};
 use crate::error::{Error, Result};
 use crate::formats::ModelRef;
 use crate::gpu::Gpu;
 use crate::pass::KernelShape;
-use crate::render::{RenderOptions, Rendered, render_band};
+use crate::render::{Render, RenderOptions, render_band};
 use crate::scene::{Camera, Gaussians};
 use crate::scheduler::SchedulerOptions;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ fn prediction(gpu: &Gpu, size: EngineSize, options: SchedulerOptions) -> Result<
 pub struct Painter<'a> {
     gpu: Arc<Gpu>,
     model: ModelRef<'a>,
-    index: Index,
+    index: GaussianIndex,
     only: Option<Vec<u32>>,
     engine: Option<Engine>,
     shape: KernelShape,
@@ -43,8 +43,8 @@ pub struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     /// Makes a painter of the Gaussians in an index of `model`.
-    pub fn new(gpu: Arc<Gpu>, model: ModelRef<'a>, index: Index, options: SchedulerOptions) -> Self {
-        let shape = KernelShape::of(gpu.capabilities());
+    pub fn new(gpu: Arc<Gpu>, model: ModelRef<'a>, index: GaussianIndex, options: SchedulerOptions) -> Self {
+        let shape = KernelShape::for_device(gpu.capabilities());
         Self { gpu, model, index, only: None, engine: None, shape, options }
     }
 
@@ -60,16 +60,16 @@ impl<'a> Painter<'a> {
     }
 
     /// Draws a picture like [`render`](crate::render::render()). Main Gaussians have their places in the index.
-    pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+    pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         let size = EngineSize::new(1, (camera.width, camera.height));
-        let mut open = Band::all(camera.height, size.band(&self.shape).unwrap_or(camera.height));
+        let mut open = Band::split(camera.height, size.band(&self.shape).unwrap_or(camera.height));
         // The next band is the last one of the list.
         open.reverse();
-        let mut whole: Option<Rendered> = None;
+        let mut whole: Option<Render> = None;
         while let Some(band) = open.pop() {
             match self.band(camera, band, options)? {
-                Drawn::Picture(drawn) => whole = Some(drawn.below(whole)),
-                Drawn::TooLarge(error) => {
+                BandResult::Picture(drawn) => whole = Some(drawn.below(whole)),
+                BandResult::TooLarge(error) => {
                     let rows = (band.rows / 2).next_multiple_of(self.shape.tile_height);
                     if rows >= band.rows {
                         return Err(error);
@@ -83,12 +83,12 @@ impl<'a> Painter<'a> {
     }
 
     /// Draws some rows of a picture, if the Gaussians that they may show fit.
-    fn band(&mut self, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Drawn> {
+    fn band(&mut self, camera: &Camera, band: Band, options: &RenderOptions) -> Result<BandResult> {
         let of =
             |part: &Camera| uniforms::view_uniforms(part, self.index.origin, &self.shape, options.near, [0.0; 3], 0);
         let seen =
             self.index.seen(&uniforms::with_slopes_of(of(&band.camera(camera)), &of(camera)), self.only.as_deref());
-        let part = |error| Drawn::TooLarge(of_part(error, (camera.width, band.rows), seen.len()));
+        let part = |error| BandResult::TooLarge(part_error(error, (camera.width, band.rows), seen.len()));
         if let Some(error) = self.labels().and_then(|labels| tell_apart(seen.iter().map(|&at| labels[at as usize]))) {
             return Ok(part(error));
         }
@@ -107,12 +107,12 @@ impl<'a> Painter<'a> {
                 let mut drawn = drawn?;
                 let place = |row: i32| usize::try_from(row).map_or(row, |row| seen[row] as i32);
                 drawn.top_id.iter_mut().for_each(|row| *row = place(*row));
-                Ok(Drawn::Picture(drawn))
+                Ok(BandResult::Picture(drawn))
             }
         }
     }
 
-    fn draw(&mut self, model: &Gaussians, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Rendered> {
+    fn draw(&mut self, model: &Gaussians, camera: &Camera, band: Band, options: &RenderOptions) -> Result<Render> {
         let engine = self.engine.as_mut().ok_or_else(|| Error::Bug("there is no engine".to_owned()))?;
         engine.upload_model(model)?;
         let uniforms = engine.band_uniforms(camera, band, options.near, options.background);
@@ -144,13 +144,13 @@ impl<'a> Painter<'a> {
 }
 
 /// A part of a picture, or why it is too large.
-enum Drawn {
-    Picture(Rendered),
+enum BandResult {
+    Picture(Render),
     TooLarge(Error),
 }
 
 /// Says which part of a picture does not fit.
-fn of_part(error: Error, (width, height): (u32, u32), count: usize) -> Error {
+fn part_error(error: Error, (width, height): (u32, u32), count: usize) -> Error {
     match error {
         Error::OutOfMemory { what, needed, limit_name, limit, .. } => Error::OutOfMemory {
             what: format!("{what}, for {width} x {height} px that may show {count} Gaussians,"),

@@ -17,29 +17,29 @@ use crate::render::{Parts, RenderOptions, render};
 use crate::scene::Gaussians;
 use crate::stage::Stage;
 use glam::DVec3;
-use sights::{Ball, Sight};
+use sights::{BoundingBall, DepthPicture};
 use std::sync::Arc;
 use volume::Volume;
 
 /// Cells along the longest side of an object.
-pub const CELLS: u32 = 128;
+pub const CELLS_DEFAULT: u32 = 128;
 /// Most cells along a side: numbers of all cells and pixels of all pictures take 2 GB.
 pub const CELLS_MAX: u32 = 512;
 /// Fewest cells along a side.
 pub const CELLS_MIN: u32 = 8;
 
 /// Most directions from which an object is drawn.
-const SIGHTS: usize = 64;
+const DIRECTIONS_MAX: usize = 64;
 /// Pictures that find the box of the object, and their size, px.
-const FIRST_SIGHTS: usize = 16;
-const FIRST_SIDE: u32 = 128;
+const BOX_DIRECTIONS: usize = 16;
+const BOX_PICTURE_SIDE_PX: u32 = 128;
 /// What is read of a picture.
-const PARTS: Parts = Parts { depth: true, main: true, labels: false };
+const MESH_PARTS: Parts = Parts { depth: true, main: true, labels: false };
 /// Pixels for each cell along a side, and most of them.
 const PIXELS_PER_CELL: u32 = 2;
-const SIDE_MAX: u32 = 1024;
+const SIDE_MAX_PX: u32 = 1024;
 /// Share of the surface's pixels at each end of an axis that may be specks.
-const SPECKS: f64 = 0.001;
+const SPECK_SHARE: f64 = 0.001;
 
 /// Makes the surface of the Gaussians with a label, with `cells` cells along its longest side. `cameras` are the places in the
 /// world from which the model was seen; without one outside of the object, it is drawn alone, from all sides.
@@ -49,32 +49,32 @@ const SPECKS: f64 = 0.001;
 /// A device that cannot draw the model, and an object without a surface: no pixel shows it.
 pub fn object_mesh(gpu: &Arc<Gpu>, model: &Gaussians, label: u32, cameras: &[DVec3], cells: u32) -> Result<Mesh> {
     let cells = cells.clamp(CELLS_MIN, CELLS_MAX);
-    let side = (PIXELS_PER_CELL * cells).clamp(FIRST_SIDE, SIDE_MAX);
+    let side = (PIXELS_PER_CELL * cells).clamp(BOX_PICTURE_SIDE_PX, SIDE_MAX_PX);
     let sure = |row: usize| model.label_confidence.as_ref().is_none_or(|shares| shares[row] >= MIN_LABEL_CONFIDENCE);
     let part = model.filtered(|row| model.label(row) == label && sure(row));
-    let around = Ball::of_gaussians(&part);
+    let around = BoundingBall::around(&part);
     let outside: Vec<DVec3> = cameras.iter().copied().filter(|&camera| around.is_seen_from(camera)).collect();
     let is_alone = outside.is_empty();
     let shown = if is_alone { &part } else { model };
-    let places = |ball: Ball| {
-        let all = if is_alone { ball.all_round(SIGHTS) } else { outside.clone() };
-        sights::apart(&all, ball.centre, SIGHTS)
+    let places = |ball: BoundingBall| {
+        let all = if is_alone { ball.all_round(DIRECTIONS_MAX) } else { outside.clone() };
+        sights::apart(&all, ball.centre, DIRECTIONS_MAX)
     };
-    let mut engine = Engine::of_model(gpu.clone(), shown, [(side, side)])?;
-    let mut draw = |ball: Ball, places: &[DVec3], side: u32| {
+    let mut engine = Engine::for_model(gpu.clone(), shown, [(side, side)])?;
+    let mut draw = |ball: BoundingBall, places: &[DVec3], side: u32| {
         let stage = Stage::new("drawing depths", places.len());
         let mut sights = Vec::with_capacity(places.len());
         for &place in places {
             let (camera, near) = ball.camera(place, side);
-            let rendered = render(&mut engine, &camera, &RenderOptions::new(near, PARTS))?;
-            sights.push(Sight::new(camera, &rendered, shown, label));
+            let rendered = render(&mut engine, &camera, &RenderOptions::new(near, MESH_PARTS))?;
+            sights.push(DepthPicture::new(camera, &rendered, shown, label));
             stage.count();
         }
         Ok::<_, Error>(sights)
     };
     let first = places(around);
-    let first = draw(around, &first[..first.len().min(FIRST_SIGHTS)], FIRST_SIDE)?;
-    let Some((low, high)) = sights::bounds(&first, SPECKS) else {
+    let first = draw(around, &first[..first.len().min(BOX_DIRECTIONS)], BOX_PICTURE_SIDE_PX)?;
+    let Some((low, high)) = sights::bounds(&first, SPECK_SHARE) else {
         let problem = "has no surface: no pixel shows it more opaque than clear, so it has no mesh";
         return Err(Error::usage("the object", problem));
     };

@@ -1,6 +1,6 @@
 //! Pictures of an object from around it, with the depth and the slant of its surface.
 
-use crate::render::{NEAR, Rendered};
+use crate::render::{NEAR_DEFAULT, Render};
 use crate::scene::gaussians::{ALPHA_MAX, axes_of};
 use crate::scene::{Camera, Gaussians};
 use glam::{DMat3, DVec2, DVec3};
@@ -8,28 +8,28 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Distance of cameras from a ball that they see whole, in radii.
-const DISTANCE: f64 = 3.0;
+const CAMERA_DISTANCE_RADII: f64 = 3.0;
 /// Least distance of a camera of the model from the centre of a ball that it shows, in radii.
-const OUTSIDE: f64 = 1.1;
+const CAMERA_DISTANCE_MIN_RADII: f64 = 1.1;
 /// Part of the distance before which nothing is drawn, if the usual near plane is farther.
-const CLOSE: f64 = 0.05;
+const NEAR_DISTANCE_SHARE: f64 = 0.05;
 /// Opacity from which on a Gaussian counts for the ball.
 const OPACITY_MIN: f64 = 0.1;
 /// Least radius, world units.
 const RADIUS_MIN: f64 = 1e-6;
 /// Least share of the fog of a Gaussian in front of its surface.
-const SHARE_MIN: f64 = 0.02;
+const FOG_SHARE_MIN: f64 = 0.02;
 
 /// A ball around an object.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
+pub(super) struct BoundingBall {
     pub(super) centre: DVec3,
     pub(super) radius: f64,
 }
 
-impl Ball {
+impl BoundingBall {
     /// Around the box of the Gaussians that can be seen.
-    pub(super) fn of_gaussians(part: &Gaussians) -> Self {
+    pub(super) fn around(part: &Gaussians) -> Self {
         let seen = |row: &usize| part.opacity(*row) >= OPACITY_MIN;
         let reach =
             |row: usize| 2.0 * part.scales[row].into_iter().map(|scale| f64::from(scale).exp()).fold(0.0, f64::max);
@@ -46,7 +46,7 @@ impl Ball {
 
     /// True for a place from which all of the ball is in front.
     pub(super) fn is_seen_from(self, place: DVec3) -> bool {
-        place.distance(self.centre) > OUTSIDE * self.radius
+        place.distance(self.centre) > CAMERA_DISTANCE_MIN_RADII * self.radius
     }
 
     /// Returns places around the ball, evenly to all sides: a spiral by the golden angle.
@@ -57,7 +57,7 @@ impl Ball {
             let (sin, cos) = (golden * index as f64).sin_cos();
             DVec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + DVec3::Z * z
         };
-        (0..count).map(|index| self.centre + DISTANCE * self.radius * direction(index)).collect()
+        (0..count).map(|index| self.centre + CAMERA_DISTANCE_RADII * self.radius * direction(index)).collect()
     }
 
     /// Returns a camera at a place that sees the ball in a square picture, and its near plane.
@@ -72,7 +72,10 @@ impl Ball {
         let edge = self.radius
             / (distance * distance - self.radius * self.radius).max(self.radius * self.radius * 0.01).sqrt();
         let camera = Camera::at_origin([half / edge, half / edge, half, half], (side, side));
-        (Camera { rotation, translation: -(rotation * place), ..camera }, NEAR.min((CLOSE * distance) as f32))
+        (
+            Camera { rotation, translation: -(rotation * place), ..camera },
+            NEAR_DEFAULT.min((NEAR_DISTANCE_SHARE * distance) as f32),
+        )
     }
 }
 
@@ -92,7 +95,7 @@ pub(super) fn apart(places: &[DVec3], centre: DVec3, most: usize) -> Vec<DVec3> 
 
 /// A picture of the object.
 #[derive(Debug)]
-pub(super) struct Sight {
+pub(super) struct DepthPicture {
     pub(super) camera: Camera,
     pixels: Vec<Pixel>,
 }
@@ -109,10 +112,10 @@ pub(super) struct Pixel {
     pub(super) colour: [f32; 3],
 }
 
-impl Sight {
+impl DepthPicture {
     /// The surface is where half of the light is lost within the main Gaussian of a pixel. The mean depth would be drawn
     /// to what is behind the object, by the light that comes through.
-    pub(super) fn new(camera: Camera, rendered: &Rendered, shown: &Gaussians, label: u32) -> Self {
+    pub(super) fn new(camera: Camera, rendered: &Render, shown: &Gaussians, label: u32) -> Self {
         let main = |pixel: usize| usize::try_from(rendered.top_id[pixel]).ok();
         let depth = |pixel: usize| {
             let mean = rendered.depth_at(pixel)?;
@@ -148,7 +151,7 @@ impl Sight {
 
     /// Returns what is seen in the direction of a world point, and how far that point is behind the camera's near side of the
     /// surface along the ray: negative in front of it, minus infinity where there is no surface.
-    pub(super) fn at(&self, world: DVec3) -> Option<(&Pixel, f64)> {
+    pub(super) fn pixel_at(&self, world: DVec3) -> Option<(&Pixel, f64)> {
         let place = self.camera.to_camera(world);
         let DVec2 { x, y } = self.camera.project(place);
         let inside = place.z > 0.0
@@ -174,7 +177,7 @@ fn half_light(shown: &Gaussians, row: usize, weight: f64, camera: &Camera, pixel
     let alpha = (shown.opacity(row) * (-0.5 * off).exp()).max(weight).min(ALPHA_MAX);
     // What is left of the light before it, and the share of its fog in which that falls to one half.
     let before = (weight / alpha).min(1.0);
-    let share = ((2.0 * before).ln() / -(-alpha).ln_1p()).clamp(SHARE_MIN, 0.5);
+    let share = ((2.0 * before).ln() / -(-alpha).ln_1p()).clamp(FOG_SHARE_MIN, 0.5);
     // The place of that share of a normal distribution, by the logistic one.
     let depth = peak + (share / (1.0 - share)).ln() / 1.702 / ray.length();
     (depth > 0.0 && depth.is_finite()).then_some(depth as f32)
@@ -182,7 +185,7 @@ fn half_light(shown: &Gaussians, row: usize, weight: f64, camera: &Camera, pixel
 
 /// Returns the box of the surface in some pictures without a share of its pixels at each end of an axis; `None` without a
 /// surface.
-pub(super) fn bounds(sights: &[Sight], share: f64) -> Option<(DVec3, DVec3)> {
+pub(super) fn bounds(sights: &[DepthPicture], share: f64) -> Option<(DVec3, DVec3)> {
     let places: Vec<DVec3> = sights
         .iter()
         .flat_map(|sight| sight.pixels.iter().enumerate().map(move |pixel| (sight, pixel)))

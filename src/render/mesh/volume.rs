@@ -1,6 +1,6 @@
 //! The grid of distances to a surface, and its triangles.
 
-use super::sights::{Ball, Sight};
+use super::sights::{BoundingBall, DepthPicture};
 use crate::formats::Mesh;
 use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
@@ -8,21 +8,21 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// Cells around the box of the object.
-const MARGIN: f64 = 3.0;
+const MARGIN_CELLS: f64 = 3.0;
 /// Farthest distance in front of a surface that counts, cells; what is farther is only free.
-const FRONT: f64 = 3.0;
+const FRONT_MAX_CELLS: f64 = 3.0;
 /// Farthest distance behind a surface that counts, cells: less, because the other side of a thin wall may be there.
-const BEHIND: f64 = 1.5;
+const BEHIND_MAX_CELLS: f64 = 1.5;
 /// How far a surface may be outside of the box of what was seen of it, cells.
-const SLACK: f64 = 0.5;
+const BOX_SLACK_CELLS: f64 = 0.5;
 /// Weights against 1 of a picture that shows the surface at a place from its front: of one in which the place is free, or
 /// at the surface of something else; of one in which it is behind the object, or behind something else; and of the guess
 /// that it is inside.
-const FREE: f64 = 0.006;
-const HIDDEN: f64 = 0.01;
-const INSIDE: f64 = 1e-4;
+const FREE_WEIGHT: f64 = 0.006;
+const HIDDEN_WEIGHT: f64 = 0.01;
+const INSIDE_WEIGHT: f64 = 1e-4;
 /// Least size of a part of the object, in its largest one.
-const PART_MIN: f64 = 0.01;
+const PART_SIZE_SHARE_MIN: f64 = 0.01;
 /// Least cosine of the slant of a surface whose depth counts.
 const COSINE_MIN: f32 = 0.1;
 
@@ -42,26 +42,26 @@ impl Volume {
     /// Makes a grid around a box, with `cells` cells along its longest side.
     pub(super) fn around(low: DVec3, high: DVec3, cells: u32) -> Self {
         let cell = ((high - low).max_element() / f64::from(cells)).max(f64::MIN_POSITIVE);
-        let count = |axis: usize| ((high - low)[axis] / cell + 2.0 * MARGIN).ceil() as u32 + 1;
-        Self { seen: (low, high), low: low - MARGIN * cell, cell, size: [0, 1, 2].map(count) }
+        let count = |axis: usize| ((high - low)[axis] / cell + 2.0 * MARGIN_CELLS).ceil() as u32 + 1;
+        Self { seen: (low, high), low: low - MARGIN_CELLS * cell, cell, size: [0, 1, 2].map(count) }
     }
 
     /// The ball around the grid.
-    pub(super) fn ball(&self) -> Ball {
+    pub(super) fn ball(&self) -> BoundingBall {
         let half = DVec3::from_array(self.size.map(|size| f64::from(size - 1))) * (self.cell / 2.0);
-        Ball { centre: self.low + half, radius: half.length() }
+        BoundingBall { centre: self.low + half, radius: half.length() }
     }
 
     /// Returns the surface that some pictures show, closed where they show nothing.
-    pub(super) fn mesh(&self, sights: &[Sight]) -> Mesh {
+    pub(super) fn mesh(&self, sights: &[DepthPicture]) -> Mesh {
         let shape = RuntimeShape::<u32, 3>::new(self.size);
         let distance = |index: u32| {
             let at = shape.delinearize(index);
             let is_end = (0..3).any(|axis| at[axis] == 0 || at[axis] + 1 == self.size[axis]);
             let place = self.low + self.cell * DVec3::from_array(at.map(f64::from));
             // Nothing goes on outside of the box, so that what was not seen there closes.
-            let outside = (self.seen.0 - place).max(place - self.seen.1).max_element() / self.cell - SLACK;
-            if is_end { FRONT as f32 } else { self.distance(place, sights).max(outside) as f32 }
+            let outside = (self.seen.0 - place).max(place - self.seen.1).max_element() / self.cell - BOX_SLACK_CELLS;
+            if is_end { FRONT_MAX_CELLS as f32 } else { self.distance(place, sights).max(outside) as f32 }
         };
         let mut distances: Vec<f32> = (0..shape.size()).into_par_iter().map(distance).collect();
         self.without_specks(&mut distances);
@@ -82,21 +82,21 @@ impl Volume {
     }
 
     /// Returns the distance of a place to the surface, cells: negative inside.
-    fn distance(&self, place: DVec3, sights: &[Sight]) -> f64 {
-        let (mut sum, mut weight) = (-INSIDE * BEHIND, INSIDE);
+    fn distance(&self, place: DVec3, sights: &[DepthPicture]) -> f64 {
+        let (mut sum, mut weight) = (-INSIDE_WEIGHT * BEHIND_MAX_CELLS, INSIDE_WEIGHT);
         let mut add = |value: f64, share: f64| (sum, weight) = (sum + share * value, weight + share);
-        for (pixel, behind) in sights.iter().filter_map(|sight| sight.at(place)) {
+        for (pixel, behind) in sights.iter().filter_map(|sight| sight.pixel_at(place)) {
             let along = -behind / self.cell;
             let cosine = f64::from(pixel.cosine);
             match pixel.is_own {
-                _ if along > FRONT => add(FRONT, FREE),
+                _ if along > FRONT_MAX_CELLS => add(FRONT_MAX_CELLS, FREE_WEIGHT),
                 // What is at the surface of something else is not of the object.
-                false if along > -BEHIND => add(FRONT, FREE),
-                false => add(BEHIND, HIDDEN),
+                false if along > -BEHIND_MAX_CELLS => add(FRONT_MAX_CELLS, FREE_WEIGHT),
+                false => add(BEHIND_MAX_CELLS, HIDDEN_WEIGHT),
                 // Across the surface, not along the ray.
-                true if along > -BEHIND && pixel.cosine > COSINE_MIN => add(along * cosine, cosine * cosine),
-                true if along > -BEHIND => {}
-                true => add(-BEHIND, HIDDEN),
+                true if along > -BEHIND_MAX_CELLS && pixel.cosine > COSINE_MIN => add(along * cosine, cosine * cosine),
+                true if along > -BEHIND_MAX_CELLS => {}
+                true => add(-BEHIND_MAX_CELLS, HIDDEN_WEIGHT),
             }
         }
         sum / weight
@@ -106,11 +106,11 @@ impl Volume {
     fn without_specks(&self, distances: &mut [f32]) {
         let free = self.regions(distances, |distance| distance >= 0.0);
         // The first one begins at a corner of the grid.
-        free.iter().skip(1).flatten().for_each(|&cell| distances[cell] = -BEHIND as f32);
+        free.iter().skip(1).flatten().for_each(|&cell| distances[cell] = -BEHIND_MAX_CELLS as f32);
         let parts = self.regions(distances, |distance| distance < 0.0);
         let largest = parts.iter().map(Vec::len).max().unwrap_or(0) as f64;
-        let specks = parts.iter().filter(|part| (part.len() as f64) < PART_MIN * largest);
-        specks.flatten().for_each(|&cell| distances[cell] = FRONT as f32);
+        let specks = parts.iter().filter(|part| (part.len() as f64) < PART_SIZE_SHARE_MIN * largest);
+        specks.flatten().for_each(|&cell| distances[cell] = FRONT_MAX_CELLS as f32);
     }
 
     /// Returns the cells of each region in which a distance is `wanted`, by their first cells.
@@ -140,11 +140,11 @@ impl Volume {
     }
 
     /// Returns the mean colour of each place in the pictures that show it; the mean of all where none does.
-    fn colours(&self, places: &[DVec3], sights: &[Sight]) -> Vec<[f32; 3]> {
+    fn colours(&self, places: &[DVec3], sights: &[DepthPicture]) -> Vec<[f32; 3]> {
         let colour = |&place: &DVec3| {
             let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-            for (pixel, behind) in sights.iter().filter_map(|sight| sight.at(place)) {
-                if behind.abs() < BEHIND * self.cell {
+            for (pixel, behind) in sights.iter().filter_map(|sight| sight.pixel_at(place)) {
+                if behind.abs() < BEHIND_MAX_CELLS * self.cell {
                     let share = f64::from(pixel.cosine).powi(2);
                     (sum, weight) = (sum + share * DVec3::from_array(pixel.colour.map(f64::from)), weight + share);
                 }

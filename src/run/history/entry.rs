@@ -21,9 +21,9 @@ pub(crate) enum Entry {
         pruned: u32,
     },
     /// Scores of one view, in its preview.
-    Preview(Scored),
+    Preview(ViewScore),
     /// Mean scores of the held-out views at the end of the run.
-    Scores(Scored),
+    Scores(ViewScore),
     /// A warning.
     Warning {
         /// Steps done.
@@ -59,7 +59,7 @@ pub(crate) struct Steps {
 /// Scores of one or more views. A value that is not finite is absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub(crate) struct Scored {
+pub(crate) struct ViewScore {
     /// Steps done.
     pub step: u32,
     /// The view, if it is one.
@@ -89,12 +89,12 @@ impl Entry {
     }
 
     /// Returns the scores of a preview.
-    pub(crate) fn preview(&self) -> Option<&Scored> {
+    pub(crate) fn preview(&self) -> Option<&ViewScore> {
         if let Self::Preview(scored) = self { Some(scored) } else { None }
     }
 
     /// Returns the scores of the end.
-    pub(crate) fn scores(&self) -> Option<&Scored> {
+    pub(crate) fn scores(&self) -> Option<&ViewScore> {
         if let Self::Scores(scored) = self { Some(scored) } else { None }
     }
 

@@ -7,21 +7,21 @@
 mod entry;
 mod read;
 
-pub(crate) use entry::{Entry, Scored, Steps, Sums};
+pub(crate) use entry::{Entry, Steps, Sums, ViewScore};
 pub(crate) use read::read;
 
 use crate::error::{Error, Result};
 use crate::files::append::Lines;
-use crate::train::{Densified, StepReport, Trainer};
+use crate::train::{DensifyCounts, StepReport, Trainer};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Name of the file.
-pub(crate) const FILE: &str = "history.jsonl";
+pub(crate) const HISTORY_FILE: &str = "history.jsonl";
 
 /// Steps of a line.
-pub(crate) const EVERY: u32 = 10;
+pub(crate) const STEPS_PER_LINE: u32 = 10;
 
 /// Writes the history of a run.
 pub(super) struct Recorder {
@@ -42,7 +42,7 @@ pub(super) struct Recorder {
 impl Recorder {
     /// Opens the history of a run in the folder `out` that goes on after `step`, of `last` steps. 0 begins a new history.
     pub(super) fn new(out: &Path, (step, last): (u32, u32), sums: Sums) -> Self {
-        let path = out.join(FILE);
+        let path = out.join(HISTORY_FILE);
         let (bytes, before) = kept(&path, step, last);
         let mut recorder = Self {
             lines: None,
@@ -77,7 +77,7 @@ impl Recorder {
     /// Notes that a step was submitted, which took some time.
     pub(super) fn submitted(&mut self, step: u32, is_last: bool, gaussians: u32, time: Duration) {
         self.spent = (self.spent.0 + time, self.spent.1 + 1);
-        if step.is_multiple_of(EVERY) || is_last {
+        if step.is_multiple_of(STEPS_PER_LINE) || is_last {
             let ms = 1000.0 * self.spent.0.as_secs_f64() / f64::from(self.spent.1);
             self.spent = (Duration::ZERO, 0);
             let seconds = self.seconds();
@@ -111,8 +111,8 @@ impl Recorder {
     }
 
     /// Adds a densification.
-    pub(super) fn densified(&mut self, step: u32, what: Densified) {
-        let Densified { cloned, split, pruned } = what;
+    pub(super) fn densified(&mut self, step: u32, what: DensifyCounts) {
+        let DensifyCounts { cloned, split, pruned } = what;
         self.put(&Entry::Densified { step, cloned, split, pruned });
     }
 

@@ -1,6 +1,6 @@
 //! Memory planned and measured, and times by pass.
 
-use super::load::Ran;
+use super::load::ReportedRun;
 use super::{columns, row, run_name};
 use crate::report::text::{bytes, count, number, significant};
 use crate::run::passes::Pass;
@@ -10,7 +10,7 @@ use maud::{Markup, html};
 const STAGES_MAX: usize = 8;
 
 /// Returns both.
-pub(super) fn costs(runs: &[Ran]) -> Markup {
+pub(super) fn costs(runs: &[ReportedRun]) -> Markup {
     let rows = [
         row(runs, "planned for the first model", |run| run.info.memory.planned_start.map(bytes)),
         row(runs, "planned for the last model", |run| run.info.memory.planned_end.map(bytes)),
@@ -48,7 +48,7 @@ pub(super) fn costs(runs: &[Ran]) -> Markup {
     }
 }
 
-fn buffers(run: &Ran) -> Markup {
+fn buffers(run: &ReportedRun) -> Markup {
     let buffers = &run.info.memory.buffers;
     let largest = buffers.iter().map(|row| row.1).max().unwrap_or(1).max(1);
     html! {

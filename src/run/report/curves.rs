@@ -1,31 +1,33 @@
 //! Curves over the steps.
 
-use super::load::Ran;
+use super::load::ReportedRun;
 use crate::report::text::{DECIBELS, SCORE};
 use crate::report::{Chart, Digits, Mark, Scale, Series};
-use crate::run::history::{Entry, Scored, Steps};
+use crate::run::history::{Entry, Steps, ViewScore};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
 /// Most marks of a kind that may come often.
 const MARKS_MAX: usize = 12;
-/// Least length of the axes of PSNR, dB, and IoU.
-const SPANS: (f64, f64) = (5.0, 0.1);
+/// Shortest PSNR axis, dB.
+const PSNR_AXIS_MIN_DB: f64 = 5.0;
+/// Shortest IoU axis.
+const IOU_AXIS_MIN: f64 = 0.1;
 
 /// Returns all charts.
-pub(super) fn curves(runs: &[Ran]) -> Markup {
+pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
     if runs.iter().all(|run| run.history.is_empty()) {
         return html! { p.quiet { "There is no history.jsonl." } };
     }
     let marks = marks(runs);
     let mut charts = losses(runs);
     charts.push(Chart {
-        least_span: SPANS.0,
+        least_span: PSNR_AXIS_MIN_DB,
         digits: Digits::Fixed(DECIBELS),
         ..chart("PSNR", "dB", views_of(runs, |scored| scored.psnr))
     });
     charts.push(Chart {
-        least_span: SPANS.1,
+        least_span: IOU_AXIS_MIN,
         ceiling: Some(1.0),
         digits: Digits::Fixed(SCORE),
         ..chart("IoU of labels", "mean over objects", views_of(runs, |scored| scored.iou))
@@ -50,7 +52,7 @@ pub(super) fn curves(runs: &[Ran]) -> Markup {
 }
 
 /// The parts of the loss: in one chart for one run, in a chart each for several.
-fn losses(runs: &[Ran]) -> Vec<Chart> {
+fn losses(runs: &[ReportedRun]) -> Vec<Chart> {
     let parts: [(&str, fn(&Steps) -> f64); 4] = [
         ("Photo loss", |steps| steps.loss),
         ("L1", |steps| steps.l1),
@@ -61,7 +63,7 @@ fn losses(runs: &[Ran]) -> Vec<Chart> {
     let parts = parts.into_iter().filter(|part| part.0 != "Label loss" || has_labels);
     let on_log = |title: &str, note: &str, series| Chart { scale: Scale::Logarithmic, ..chart(title, note, series) };
     if let [run] = runs {
-        let series = parts.enumerate().map(|(index, (name, value))| of_steps(run, name, index, value));
+        let series = parts.enumerate().map(|(index, (name, value))| step_series(run, name, index, value));
         return vec![on_log("Loss", "logarithmic", series.collect())];
     }
     parts.map(|(name, value)| on_log(name, "logarithmic", steps_of(runs, value))).collect()
@@ -75,20 +77,20 @@ fn chart(title: &str, note: &str, series: Vec<Series>) -> Chart {
     Chart { title: title.to_owned(), note: note.to_owned(), series, ..Chart::default() }
 }
 
-fn of_steps(run: &Ran, name: &str, colour: usize, value: impl Fn(&Steps) -> f64) -> Series {
+fn step_series(run: &ReportedRun, name: &str, colour: usize, value: impl Fn(&Steps) -> f64) -> Series {
     let lines = run.history.iter().filter_map(Entry::steps);
     Series::new(name, colour, lines.map(|steps| (f64::from(steps.step), value(steps))))
 }
 
-fn steps_of(runs: &[Ran], value: impl Fn(&Steps) -> f64) -> Vec<Series> {
-    runs.iter().enumerate().map(|(index, run)| of_steps(run, &run.name, index, &value)).collect()
+fn steps_of(runs: &[ReportedRun], value: impl Fn(&Steps) -> f64) -> Vec<Series> {
+    runs.iter().enumerate().map(|(index, run)| step_series(run, &run.name, index, &value)).collect()
 }
 
 /// Scores of the view of the previews, and those of all held-out views, which are few points.
-fn views_of(runs: &[Ran], value: impl Fn(&Scored) -> Option<f64>) -> Vec<Series> {
+fn views_of(runs: &[ReportedRun], value: impl Fn(&ViewScore) -> Option<f64>) -> Vec<Series> {
     let mut series = Vec::new();
     for (index, run) in runs.iter().enumerate() {
-        let point = |scored: &Scored| Some((f64::from(scored.step), value(scored)?));
+        let point = |scored: &ViewScore| Some((f64::from(scored.step), value(scored)?));
         let previews = || run.history.iter().filter_map(Entry::preview);
         let ends = run.history.iter().filter_map(Entry::scores).filter_map(point);
         let view = previews().find_map(|scored| scored.view.as_deref());
@@ -105,7 +107,7 @@ fn views_of(runs: &[Ran], value: impl Fn(&Scored) -> Option<f64>) -> Vec<Series>
 }
 
 /// Events by step. Those of one of several runs have its name and colour; those of all runs have neither.
-fn marks(runs: &[Ran]) -> Vec<Mark> {
+fn marks(runs: &[ReportedRun]) -> Vec<Mark> {
     let mut known: BTreeMap<u32, Vec<(&str, Vec<usize>)>> = BTreeMap::new();
     for (index, run) in runs.iter().enumerate() {
         for (step, text) in events(run) {
@@ -133,7 +135,7 @@ fn marks(runs: &[Ran]) -> Vec<Mark> {
 }
 
 /// Events of a run with their steps.
-fn events(run: &Ran) -> Vec<(u32, &'static str)> {
+fn events(run: &ReportedRun) -> Vec<(u32, &'static str)> {
     let train = &run.settings.train;
     let mut events = Vec::new();
     if train.full_size_from() > 0 {

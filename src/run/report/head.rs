@@ -1,6 +1,6 @@
 //! What was run, its numbers, warnings and settings.
 
-use super::load::Ran;
+use super::load::ReportedRun;
 use super::{columns, row, run_name};
 use crate::report::text::{DECIBELS, SCORE, bytes, count, duration, number, utc};
 use crate::run::Settings;
@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use std::path::Path;
 
 /// What a run decides by itself where the default leaves it open.
-const AUTOMATIC: &str = "by the scene and the length of the run";
+const AUTOMATIC_TEXT: &str = "by the scene and the length of the run";
 
 /// Returns the title: the name of the scene, or that of the run where a run does not tell.
-pub(super) fn title(runs: &[Ran]) -> String {
-    let scene = |run: &Ran| {
+pub(super) fn title(runs: &[ReportedRun]) -> String {
+    let scene = |run: &ReportedRun| {
         let name = Path::new(&run.info.scene).file_name();
         name.map_or_else(|| run.name.clone(), |name| name.to_string_lossy().into_owned())
     };
@@ -26,7 +26,7 @@ pub(super) fn title(runs: &[Ran]) -> String {
 }
 
 /// Returns the line below the title.
-pub(super) fn lead(runs: &[Ran]) -> Markup {
+pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
     let [run] = runs else {
         return html! { p.quiet { "Trainings with labelgs, side by side." } };
     };
@@ -45,7 +45,7 @@ pub(super) fn lead(runs: &[Ran]) -> Markup {
 }
 
 /// Returns the main numbers.
-pub(super) fn numbers(runs: &[Ran]) -> Markup {
+pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     let score = |value: f64| number(Some(value), SCORE);
     let main = [
         row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBELS) + " dB")),
@@ -66,7 +66,7 @@ pub(super) fn numbers(runs: &[Ran]) -> Markup {
 }
 
 /// Numbers for a second look.
-fn more_numbers(runs: &[Ran]) -> [(String, Vec<Option<String>>); 3] {
+fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
     let objects = "IoU of objects, visible parts";
     [
         row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE))),
@@ -76,8 +76,8 @@ fn more_numbers(runs: &[Ran]) -> [(String, Vec<Option<String>>); 3] {
 }
 
 /// Returns command, version, device and inputs.
-pub(super) fn what(runs: &[Ran]) -> Markup {
-    let part = |run: &Ran| run.info.parts.last().cloned();
+pub(super) fn what(runs: &[ReportedRun]) -> Markup {
+    let part = |run: &ReportedRun| run.info.parts.last().cloned();
     let mut rows = vec![
         row(runs, "scene", |run| Some(run.info.scene.clone()).filter(|scene| !scene.is_empty())),
         row(runs, "masks", |run| run.info.masks.clone()),
@@ -114,8 +114,8 @@ pub(super) fn what(runs: &[Ran]) -> Markup {
 }
 
 /// Returns all warnings; none if there are none.
-pub(super) fn warnings(runs: &[Ran]) -> Option<Markup> {
-    let of = |run: &Ran| run.info.parts.iter().flat_map(|part| part.warnings.clone()).collect::<Vec<String>>();
+pub(super) fn warnings(runs: &[ReportedRun]) -> Option<Markup> {
+    let of = |run: &ReportedRun| run.info.parts.iter().flat_map(|part| part.warnings.clone()).collect::<Vec<String>>();
     let all: Vec<(usize, Vec<String>)> = runs.iter().map(of).enumerate().filter(|(_, all)| !all.is_empty()).collect();
     let markup = html! {
         @for (index, all) in &all {
@@ -127,15 +127,15 @@ pub(super) fn warnings(runs: &[Ran]) -> Option<Markup> {
 }
 
 /// Returns the settings that differ from the defaults, or between the runs.
-pub(super) fn settings(runs: &[Ran]) -> Markup {
+pub(super) fn settings(runs: &[ReportedRun]) -> Markup {
     let defaults = Settings::default().texts();
     let texts: Vec<_> = runs.iter().map(|run| run.settings.texts()).collect();
     let changed = Settings::keys().filter(|key| texts.iter().any(|own| own.get(key.name) != defaults.get(key.name)));
     let rows: Vec<_> =
         changed.map(|key| (key.name, texts.iter().map(|own| own.get(key.name)).collect::<Vec<_>>())).collect();
     let default = |key: &str| match defaults.get(key).map(String::as_str) {
-        None => AUTOMATIC,
-        Some("0" | "0.0") if ["near", "budget"].contains(&key) => AUTOMATIC,
+        None => AUTOMATIC_TEXT,
+        Some("0" | "0.0") if ["near", "budget"].contains(&key) => AUTOMATIC_TEXT,
         Some(value) => value,
     };
     html! {

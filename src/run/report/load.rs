@@ -11,10 +11,10 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// File with the times of passes, if the user put one there.
-const PROFILE: &str = "profile.json";
+const PROFILE_FILE: &str = "profile.json";
 
 /// A run.
-pub(super) struct Ran {
+pub(super) struct ReportedRun {
     pub name: String,
     pub folder: PathBuf,
     pub settings: Settings,
@@ -32,13 +32,13 @@ pub(super) struct Metrics {
     pub steps: u32,
     pub gaussians: u32,
     pub objects: Vec<ObjectSummary>,
-    pub test: Option<Test>,
+    pub test: Option<TestScores>,
 }
 
 /// Mean scores of the held-out views.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Test {
+pub(super) struct TestScores {
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
     pub iou_map: Option<f64>,
@@ -60,29 +60,29 @@ pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     if path.is_file() { read::json(path, EXPECTED).map(Some) } else { Ok(None) }
 }
 
-impl Ran {
+impl ReportedRun {
     /// Reads the files in the folder of a run. All but `config.toml` may be missing: an interrupted run lacks some.
     pub(super) fn read(folder: &Path) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "is not a folder; name the folder that a training wrote"));
         }
-        let Some(settings) = Settings::of_model(folder)? else {
+        let Some(settings) = Settings::for_model(folder)? else {
             let problem = format!("has no {}; name the folder that a training wrote", run_folder::CONFIG);
             return Err(Error::data(folder, "", problem));
         };
-        let path = folder.join(history::FILE);
+        let path = folder.join(history::HISTORY_FILE);
         let history = if path.is_file() { history::read(&path)?.entries } else { Vec::new() };
-        let info = Info::read(&folder.join(info::FILE))?.unwrap_or_default();
+        let info = Info::read(&folder.join(info::RUN_FILE))?.unwrap_or_default();
         // Without an end, the file is of another run in this folder.
-        let metrics = if info.ended.is_some() { json(&folder.join(summary::FILE))? } else { None };
+        let metrics = if info.ended.is_some() { json(&folder.join(summary::METRICS_FILE))? } else { None };
         let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let name = whole.file_name().map_or_else(|| whole.display().to_string(), |name| name.to_string_lossy().into());
-        let profile = json(&folder.join(PROFILE))?;
+        let profile = json(&folder.join(PROFILE_FILE))?;
         Ok(Self { name, folder: folder.to_owned(), settings, info, history, metrics, profile })
     }
 
     /// Returns the mean scores.
-    pub(super) fn test(&self) -> Option<&Test> {
+    pub(super) fn test(&self) -> Option<&TestScores> {
         self.metrics.as_ref()?.test.as_ref()
     }
 
@@ -110,7 +110,7 @@ impl Ran {
 }
 
 /// Gives runs of the same name the path of their folder as name.
-pub(super) fn tell_apart(runs: &mut [Ran]) {
+pub(super) fn tell_apart(runs: &mut [ReportedRun]) {
     let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
     for run in runs {
         if names.iter().filter(|name| **name == run.name).count() > 1 {

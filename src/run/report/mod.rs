@@ -16,12 +16,12 @@ use crate::error::{Error, Result};
 use crate::files::atomic;
 use crate::report::chart::colour_class;
 use crate::report::{page, section};
-use load::Ran;
+use load::ReportedRun;
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
 /// Name of the report of one run, in its folder.
-pub(crate) const FILE: &str = "report.html";
+pub(crate) const REPORT_FILE: &str = "report.html";
 
 /// Writes the report of the runs in some folders to `path`, and returns it.
 ///
@@ -37,15 +37,15 @@ pub(crate) fn write_with(folders: &[PathBuf], path: &Path, text: &str) -> Result
     if folders.is_empty() {
         return Err(Error::usage("runs", "names no run; name the folder of one or more trainings"));
     }
-    let mut runs = folders.iter().map(|folder| Ran::read(folder)).collect::<Result<Vec<_>>>()?;
+    let mut runs = folders.iter().map(|folder| ReportedRun::read(folder)).collect::<Result<Vec<_>>>()?;
     load::tell_apart(&mut runs);
     let page = compose(&runs, text)?;
     atomic::write(path, |out| out.write_all(page.as_bytes()))?;
     Ok(path.to_owned())
 }
 
-fn compose(runs: &[Ran], text: &str) -> Result<String> {
-    let mut book = views::Book::default();
+fn compose(runs: &[ReportedRun], text: &str) -> Result<String> {
+    let mut book = views::PictureBook::default();
     let (first, views) = views::views(&mut book, runs)?;
     let objects = objects::objects(&mut book, runs)?;
     let body = html! {
@@ -66,7 +66,7 @@ fn compose(runs: &[Ran], text: &str) -> Result<String> {
 }
 
 /// Returns a table with a column for each run; rows without any value are left out.
-fn columns(runs: &[Ran], rows: &[(String, Vec<Option<String>>)]) -> Markup {
+fn columns(runs: &[ReportedRun], rows: &[(String, Vec<Option<String>>)]) -> Markup {
     let rows = rows.iter().filter(|(_, cells)| cells.iter().any(Option::is_some));
     html! {
         div.scroll {
@@ -85,11 +85,15 @@ fn columns(runs: &[Ran], rows: &[(String, Vec<Option<String>>)]) -> Markup {
 }
 
 /// Returns a row of [`columns`].
-fn row(runs: &[Ran], name: &str, value: impl Fn(&Ran) -> Option<String>) -> (String, Vec<Option<String>>) {
+fn row(
+    runs: &[ReportedRun],
+    name: &str,
+    value: impl Fn(&ReportedRun) -> Option<String>,
+) -> (String, Vec<Option<String>>) {
     (name.to_owned(), runs.iter().map(value).collect())
 }
 
 /// Returns the name of a run with its colour.
-fn run_name(index: usize, run: &Ran) -> Markup {
+fn run_name(index: usize, run: &ReportedRun) -> Markup {
     html! { span.run { i class=(colour_class(index)) {} (run.name) } }
 }

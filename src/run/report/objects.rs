@@ -1,8 +1,8 @@
 //! A row for each object.
 
-use super::load::Ran;
+use super::load::ReportedRun;
 use super::run_name;
-use super::views::Book;
+use super::views::PictureBook;
 use crate::Result;
 use crate::report::text::{DECIBELS, SCORE, count, number};
 use crate::run::{ObjectSummary, thumbnails};
@@ -11,8 +11,8 @@ use maud::{Markup, html};
 use std::collections::BTreeMap;
 
 /// Returns the table of all objects.
-pub(super) fn objects(book: &mut Book, runs: &[Ran]) -> Result<Markup> {
-    let of = |run: &Ran| run.metrics.as_ref().map(|metrics| metrics.objects.clone()).unwrap_or_default();
+pub(super) fn objects(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Markup> {
+    let of = |run: &ReportedRun| run.metrics.as_ref().map(|metrics| metrics.objects.clone()).unwrap_or_default();
     let all: Vec<BTreeMap<u32, ObjectSummary>> =
         runs.iter().map(|run| of(run).into_iter().map(|object| (object.id, object)).collect()).collect();
     let mut ids: Vec<(u32, Option<String>)> = Vec::new();
@@ -77,7 +77,7 @@ fn single<'a>(objects: impl Iterator<Item = &'a ObjectSummary>, pictures: &Pictu
 
 /// IoU, PSNR and Gaussians by run.
 fn several(
-    runs: &[Ran],
+    runs: &[ReportedRun],
     all: &[BTreeMap<u32, ObjectSummary>],
     ids: &[(u32, Option<String>)],
     pictures: &Pictures,

@@ -1,24 +1,24 @@
 //! Pictures of held-out views.
 
-use super::load::Ran;
+use super::load::ReportedRun;
 use crate::error::Result;
 use crate::files::read;
 use crate::report::text::{DECIBELS, SCORE, number};
 use crate::report::{Figure, Panel};
-use crate::run::info::Pictured;
-use crate::run::pictures::{HEAT, KINDS, path};
+use crate::run::info::PicturedView;
+use crate::run::pictures::{HEAT_MAP_FILE, PICTURE_KINDS, path};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use std::path::Path;
 
 /// Names of the pictures that are shown at once.
-const FIRST: [&str; 3] = [KINDS[0].0, KINDS[1].0, KINDS[2].0];
+const FIRST_KINDS: [&str; 3] = [PICTURE_KINDS[0].0, PICTURE_KINDS[1].0, PICTURE_KINDS[2].0];
 /// Most bytes of all pictures in a page, before they become text.
 const BYTES_MAX: u64 = 12 << 20;
 
 /// Returns the figure that stands first, and the other pictures.
-pub(super) fn views(book: &mut Book, runs: &[Ran]) -> Result<(Markup, Markup)> {
+pub(super) fn views(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<(Markup, Markup)> {
     let mut figures = match runs {
         [run] => run.info.pictures.iter().map(|view| single(book, run, view)).collect::<Result<Vec<_>>>()?,
         _ => several(book, runs)?,
@@ -37,21 +37,21 @@ pub(super) fn views(book: &mut Book, runs: &[Ran]) -> Result<(Markup, Markup)> {
     Ok((html! { @if let Some(first) = first { (first.markup()) } }, rest))
 }
 
-fn single(book: &mut Book, run: &Ran, view: &Pictured) -> Result<Figure> {
+fn single(book: &mut PictureBook, run: &ReportedRun, view: &PicturedView) -> Result<Figure> {
     let mut panels = Vec::new();
-    for (name, file) in KINDS {
+    for (name, file) in PICTURE_KINDS {
         panels.extend(book.panel(run, view.number, file, name)?);
     }
     let numbers = [("PSNR", view.psnr, DECIBELS, " dB"), ("SSIM", view.ssim, SCORE, ""), ("IoU", view.iou, SCORE, "")];
     let numbers = numbers.into_iter().filter(|(_, value, ..)| value.is_some());
     let numbers = numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
     // Masks and errors are for a second look.
-    let (more, panels) = panels.into_iter().partition(|panel: &Panel| !FIRST.contains(&panel.name.as_str()));
+    let (more, panels) = panels.into_iter().partition(|panel: &Panel| !FIRST_KINDS.contains(&panel.name.as_str()));
     Ok(Figure { view: view.view.clone(), numbers, panels, more, ..Figure::default() })
 }
 
 /// The photo of each view, and what each run makes of it.
-fn several(book: &mut Book, runs: &[Ran]) -> Result<Vec<Figure>> {
+fn several(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Vec<Figure>> {
     let mut names: Vec<&str> = Vec::new();
     for view in runs.iter().flat_map(|run| &run.info.pictures) {
         if !names.contains(&view.view.as_str()) {
@@ -64,9 +64,9 @@ fn several(book: &mut Book, runs: &[Ran]) -> Result<Vec<Figure>> {
         for run in runs {
             let Some(view) = run.info.pictures.iter().find(|view| view.view == name) else { continue };
             if figure.panels.is_empty() {
-                figure.panels.extend(book.panel(run, view.number, KINDS[0].1, KINDS[0].0)?);
+                figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[0].1, PICTURE_KINDS[0].0)?);
             }
-            figure.panels.extend(book.panel(run, view.number, KINDS[1].1, &run.name)?);
+            figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[1].1, &run.name)?);
             figure.numbers.push((run.name.clone(), number(view.psnr, DECIBELS) + " dB"));
         }
         figures.push(figure);
@@ -76,16 +76,16 @@ fn several(book: &mut Book, runs: &[Ran]) -> Result<Vec<Figure>> {
 
 /// The pictures of a page.
 #[derive(Default)]
-pub(super) struct Book {
+pub(super) struct PictureBook {
     bytes: u64,
     is_full: bool,
 }
 
-impl Book {
+impl PictureBook {
     /// Returns a picture of a view if there is one, and room for it.
-    fn panel(&mut self, run: &Ran, number: u32, file: &str, name: &str) -> Result<Option<Panel>> {
+    fn panel(&mut self, run: &ReportedRun, number: u32, file: &str, name: &str) -> Result<Option<Panel>> {
         let source = self.source(&path(&run.folder, number, file))?;
-        Ok(source.map(|source| Panel { name: name.to_owned(), source, is_heat: file == HEAT }))
+        Ok(source.map(|source| Panel { name: name.to_owned(), source, is_heat: file == HEAT_MAP_FILE }))
     }
 
     /// Returns the address of a picture inside the page if there is one, and room for it.

@@ -2,15 +2,15 @@
 
 use super::Limits;
 use super::buffers::{Buf, BufferDecl, Class, Table};
-use super::lifetime::Life;
+use super::lifetime::Lifetime;
 use super::{GUARD_BYTES, Page, Placement, PlanOptions};
 use crate::error::{Error, Result};
 
-struct Placed {
+struct PlacedBuffer {
     page: usize,
     start: u64,
     end: u64,
-    life: Life,
+    life: Lifetime,
 }
 
 /// Places every buffer outside of scratch, and the scratch buffers of the list; returns the sizes of the Step pages.
@@ -20,7 +20,7 @@ struct Placed {
 pub(super) fn place(
     table: &'static Table,
     sizes: &[u64],
-    lives: &[Option<Life>],
+    lives: &[Option<Lifetime>],
     limits: &Limits,
     options: PlanOptions,
 ) -> Result<(Vec<Option<Placement>>, Vec<u64>)> {
@@ -34,12 +34,12 @@ pub(super) fn place(
             placements[index] = Some(Placement { page: Page::Own(Buf(index as u16)), offset: 0, bytes, bound });
         } else if let Some(life) = lives[index] {
             check_allocation(decl, bound, limits)?;
-            let life = if options.aliases() { life } else { Life { first: 0, last: usize::MAX } };
+            let life = if options.aliases() { life } else { Lifetime { first: 0, last: usize::MAX } };
             scratch.push((index, bytes, bound, life));
         }
     }
     scratch.sort_by(|a, b| b.2.cmp(&a.2).then_with(|| table[a.0].name.cmp(table[b.0].name)));
-    let mut placed: Vec<Placed> = Vec::new();
+    let mut placed: Vec<PlacedBuffer> = Vec::new();
     let mut pages: Vec<u64> = Vec::new();
     for (index, bytes, bound, life) in scratch {
         let (page, start) = first_fit(&placed, pages.len(), bound, life, limits);
@@ -47,14 +47,14 @@ pub(super) fn place(
             pages.push(0);
         }
         pages[page] = pages[page].max((start + bound).next_multiple_of(limits.alignment()));
-        placed.push(Placed { page, start, end: start + bound, life });
+        placed.push(PlacedBuffer { page, start, end: start + bound, life });
         placements[index] = Some(Placement { page: Page::Step(page as u32), offset: start, bytes, bound });
     }
     Ok((placements, pages))
 }
 
 /// Returns the lowest place in the first page with room, or the start of a new page.
-fn first_fit(placed: &[Placed], pages: usize, bytes: u64, life: Life, limits: &Limits) -> (usize, u64) {
+fn first_fit(placed: &[PlacedBuffer], pages: usize, bytes: u64, life: Lifetime, limits: &Limits) -> (usize, u64) {
     for page in 0..pages {
         let mut taken = placed
             .iter()

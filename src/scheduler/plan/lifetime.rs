@@ -6,25 +6,25 @@ use crate::error::{Error, Result};
 
 /// The range of items in which a buffer's contents matter, both ends inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Life {
+pub struct Lifetime {
     /// First item that uses the buffer.
     pub first: usize,
     /// Last item that uses the buffer.
     pub last: usize,
 }
 
-impl Life {
+impl Lifetime {
     /// Returns true if both are alive during at least one item.
     pub fn overlaps(self, other: Self) -> bool {
         self.first <= other.last && other.first <= self.last
     }
 }
 
-pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Life>> {
-    let mut lives = vec![None::<Life>; buffers];
+pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Lifetime>> {
+    let mut lives = vec![None::<Lifetime>; buffers];
     for (item, uses) in uses.iter().enumerate() {
         for touched in uses {
-            let life = lives[touched.buf.index()].get_or_insert(Life { first: item, last: item });
+            let life = lives[touched.buf.index()].get_or_insert(Lifetime { first: item, last: item });
             life.last = item;
         }
     }

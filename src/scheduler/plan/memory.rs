@@ -96,11 +96,11 @@ impl MemoryReport {
     ) -> Result<Self> {
         let plans =
             lists.iter().map(|list| Plan::new(table, counts, list, limits, options)).collect::<Result<Vec<_>>>()?;
-        Self::of_plans(table, counts, &plans.iter().collect::<Vec<_>>(), limits, options)
+        Self::from_plans(table, counts, &plans.iter().collect::<Vec<_>>(), limits, options)
     }
 
     /// Memory of existing plans.
-    pub fn of_plans(
+    pub fn from_plans(
         table: &'static Table,
         counts: &[u64],
         plans: &[&Plan],

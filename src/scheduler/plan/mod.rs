@@ -18,7 +18,7 @@ pub use crate::gpu::limits::PlanLimits as Limits;
 pub use barrier::Use;
 pub(crate) use barrier::{Barrier, Touch, Uses};
 pub use buffers::{Buf, BufferDecl, Class, Count, Domain, Table, TexelFormat};
-pub(crate) use lifetime::Life;
+pub(crate) use lifetime::Lifetime;
 pub use memory::MemoryReport;
 pub use pass::{Grid, PassDecl, PassList, Stage, Work};
 
@@ -110,7 +110,7 @@ pub struct Plan {
     /// Place of each buffer by row of the table; `None` for Step buffers outside of the list.
     pub placements: Vec<Option<Placement>>,
     /// First and last use of each buffer.
-    pub lives: Vec<Option<Life>>,
+    pub lives: Vec<Option<Lifetime>>,
     /// Bytes of each page of the Step arena.
     pub step_pages: Vec<u64>,
     /// The items, one for each of the list.

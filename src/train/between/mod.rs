@@ -1,6 +1,6 @@
 //! Work between two steps: when it is due, and what it does.
 //!
-//! A new job is a file that implements [`Between`], and its place in [`Jobs`]. [`crate::run`] has jobs too: they write files.
+//! A new job is a file that implements [`StepJob`], and its place in [`TrainingJobs`]. [`crate::run`] has jobs too: they write files.
 
 mod growth;
 mod occluders;
@@ -8,16 +8,16 @@ mod pose_adjustment;
 mod votes;
 
 pub(super) use growth::Growth;
-pub(super) use occluders::Occluders;
+pub(super) use occluders::OccluderJob;
 pub(super) use pose_adjustment::PoseAdjustment;
-pub(super) use votes::Votes;
+pub(super) use votes::VoteJob;
 
 use super::context::Context;
 use super::settings::TrainConfig;
 use crate::error::Result;
 
 /// Work between two steps, with what it works on.
-pub(crate) trait Between<C: ?Sized> {
+pub(crate) trait StepJob<C: ?Sized> {
     /// Returns true if it is due at a step. Whether it comes before or after the step is up to the list that has it.
     fn is_due(&self, step: u32, context: &C) -> bool;
 
@@ -27,7 +27,7 @@ pub(crate) trait Between<C: ?Sized> {
 
 /// The place of work at a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum When {
+pub(super) enum JobTime {
     /// Before it.
     Before,
     /// After it.
@@ -35,23 +35,23 @@ pub(super) enum When {
 }
 
 /// The jobs of a training.
-pub(super) struct Jobs {
+pub(super) struct TrainingJobs {
     pub(super) poses: PoseAdjustment,
-    pub(super) votes: Votes,
-    pub(super) occluders: Occluders,
+    pub(super) votes: VoteJob,
+    pub(super) occluders: OccluderJob,
     pub(super) growth: Growth,
 }
 
-impl Jobs {
+impl TrainingJobs {
     pub(super) fn new(config: &TrainConfig) -> Self {
-        Self { poses: PoseAdjustment, votes: Votes::default(), occluders: Occluders, growth: Growth::new(config) }
+        Self { poses: PoseAdjustment, votes: VoteJob::default(), occluders: OccluderJob, growth: Growth::new(config) }
     }
 
     /// Returns the jobs before or after a step, in their order.
-    pub(super) fn list(&mut self, when: When) -> Vec<&mut dyn Between<Context>> {
+    pub(super) fn list(&mut self, when: JobTime) -> Vec<&mut dyn StepJob<Context>> {
         match when {
-            When::Before => vec![&mut self.poses, &mut self.votes, &mut self.occluders],
-            When::After => vec![&mut self.growth],
+            JobTime::Before => vec![&mut self.poses, &mut self.votes, &mut self.occluders],
+            JobTime::After => vec![&mut self.growth],
         }
     }
 }

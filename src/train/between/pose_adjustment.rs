@@ -1,6 +1,6 @@
 //! Poses of the photos by a comparison of these with each other.
 
-use super::Between;
+use super::StepJob;
 use crate::bundle_adjustment::{Frame, PHOTOS_MAX, adjusted};
 use crate::error::Result;
 use crate::render::{RenderOptions, render};
@@ -12,17 +12,17 @@ use crate::train::shared::poses;
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::train) struct PoseAdjustment;
 
-impl Between<Context> for PoseAdjustment {
+impl StepJob<Context> for PoseAdjustment {
     fn is_due(&self, step: u32, context: &Context) -> bool {
         // A finished model tells the poses itself.
         context.objective.trains(Parameter::Positions)
-            && context.shared.photo_rows(poses::NAME).is_some()
-            && poses::are_compared_before(context.at(step))
+            && context.shared.photo_rows(poses::POSES_NAME).is_some()
+            && poses::are_compared_before(context.step_context(step))
             && !context.blurs_depth_before(step)
     }
 
     fn run(&mut self, _step: u32, context: &mut Context) -> Result<()> {
-        let Some(range) = context.shared.photo_rows(poses::NAME) else { return Ok(()) };
+        let Some(range) = context.shared.photo_rows(poses::POSES_NAME) else { return Ok(()) };
         if context.views.len() > PHOTOS_MAX {
             tracing::warn!("the model alone tells the poses of more than {PHOTOS_MAX} photos");
             return Ok(());
@@ -33,7 +33,7 @@ impl Between<Context> for PoseAdjustment {
         let mut unknown = Vec::new();
         for (index, found) in found.iter().enumerate() {
             let view = &context.views[index];
-            let of_view = &mut rows[context.shared.of_view(index)][range.clone()];
+            let of_view = &mut rows[context.shared.view_range(index)][range.clone()];
             if found.as_ref().and_then(|found| poses::settle(of_view, &view.camera, found)).is_none() {
                 unknown.push(view.name.as_str());
             }
@@ -54,7 +54,7 @@ impl Between<Context> for PoseAdjustment {
 /// Returns the photo of each view with the depths of the model.
 fn frames(context: &mut Context) -> Result<Vec<Frame>> {
     let Context { engine, config, views, .. } = context;
-    let options = RenderOptions::of_depth(config.near);
+    let options = RenderOptions::for_depth(config.near);
     let mut frames = Vec::with_capacity(views.len());
     for (index, view) in views.iter().enumerate() {
         let camera = Frame::camera_of(views.camera(index), views.len());

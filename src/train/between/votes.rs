@@ -1,6 +1,6 @@
 //! Labels by votes, counted over all training views at intervals and at the end.
 
-use super::Between;
+use super::StepJob;
 use crate::error::Result;
 use crate::label::vote::ballot::Sweep;
 use crate::label::vote::decide::{self, Decision};
@@ -10,12 +10,12 @@ use crate::train::{LabelRule, TrainConfig};
 
 /// Counts votes and labels the Gaussians.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::train) struct Votes {
+pub(in crate::train) struct VoteJob {
     /// The Gaussians have labels of votes, with which masks can be compared.
     pub(in crate::train) have_labelled: bool,
 }
 
-impl Votes {
+impl VoteJob {
     /// Returns true if votes decide labels.
     fn decide(context: &Context) -> bool {
         let TrainConfig { label_rule, .. } = context.config;
@@ -43,7 +43,7 @@ impl Votes {
     }
 }
 
-impl Between<Context> for Votes {
+impl StepJob<Context> for VoteJob {
     fn is_due(&self, step: u32, context: &Context) -> bool {
         Self::decide(context) && context.config.counts_votes_at(step) && !context.blurs_depth_before(step)
     }

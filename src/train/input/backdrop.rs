@@ -7,14 +7,14 @@ use rand::Rng;
 use std::borrow::Cow;
 
 /// First stream of the colours; the step is added.
-const STREAM: u64 = 5 << 32;
+const COLOUR_STREAM: u64 = 5 << 32;
 
 /// Returns the colour behind the scene in a step: r, g, b, 0 to 1.
 pub(in crate::train) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
     if !config.random_background {
         return config.background;
     }
-    let mut random = stream(config.seed, STREAM + u64::from(step));
+    let mut random = stream(config.seed, COLOUR_STREAM + u64::from(step));
     [(); 3].map(|()| random.random_range(0.0..1.0))
 }
 

@@ -11,21 +11,21 @@ use glam::DVec3;
 use rand::Rng;
 
 /// Most Gaussians to take depths from, evenly chosen.
-const SAMPLE: usize = 65_536;
+const SAMPLE_GAUSSIANS_MAX: usize = 65_536;
 /// Near plane of a camera in the depths of the Gaussians that it sees: this share of this quantile.
 const NEAR_SHARE: f64 = 0.25;
 const NEAR_QUANTILE: f64 = 0.01;
 /// The quantile in a scene without points, where some of the first Gaussians are before everything.
 const NEAR_QUANTILE_RANDOM: f64 = 0.1;
 /// Number of cameras whose median a camera takes, itself included.
-const NEIGHBOURS: usize = 5;
+const MEDIAN_CAMERAS: usize = 5;
 
 /// Returns the near plane of each camera, at least `least`. Up to there space is taken as free: no Gaussian stands for
 /// anything so much nearer than all that the camera sees of the initial `model`.
 pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
     let cameras = dataset.train.iter().map(|view| &view.camera);
     let quantile = if init::has_points(dataset) { NEAR_QUANTILE } else { NEAR_QUANTILE_RANDOM };
-    let rows = sample(model, SAMPLE);
+    let rows = sample(model, SAMPLE_GAUSSIANS_MAX);
     let nearest = |camera: &Camera| {
         let mut depths = seen_depths(camera, &rows);
         let at = (quantile * depths.len() as f64) as usize;
@@ -35,7 +35,7 @@ pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least:
     let plane = |centre: DVec3| {
         let mut near: Vec<(f64, f64)> = found.iter().map(|&(other, depth)| (other.distance(centre), depth)).collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut depths: Vec<f64> = near.iter().take(NEIGHBOURS).map(|&(_, depth)| depth).collect();
+        let mut depths: Vec<f64> = near.iter().take(MEDIAN_CAMERAS).map(|&(_, depth)| depth).collect();
         depths.sort_by(f64::total_cmp);
         least.max((NEAR_SHARE * depths[depths.len() / 2]) as f32)
     };
@@ -46,7 +46,7 @@ pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least:
 const PARTNERS_MAX: usize = 4;
 const AXES_COSINE_MIN: f64 = 0.85;
 /// Random stream of the partner of a step, beside those of the step numbers.
-const STREAM: u64 = 1 << 40;
+const PARTNER_STREAM: u64 = 1 << 40;
 
 /// Returns for each camera the nearest ones that look in a similar direction, none of them farther away than the first
 /// thing that the camera sees: nothing stands between such two.
@@ -68,7 +68,7 @@ pub(in crate::train) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec
 
 /// Returns the partner of a step, one of `partners`.
 pub(in crate::train) fn partner(seed: u64, step: u32, partners: &[usize]) -> Option<usize> {
-    let index = stream(seed, STREAM + u64::from(step)).random_range(0..partners.len().max(1));
+    let index = stream(seed, PARTNER_STREAM + u64::from(step)).random_range(0..partners.len().max(1));
     partners.get(index).copied()
 }
 

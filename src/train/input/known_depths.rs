@@ -6,14 +6,14 @@ use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
 /// One in this many pixels of a depth map counts, along each side.
-const STRIDE: usize = 4;
+const PIXEL_STRIDE: usize = 4;
 
 /// Known depths of a photo. Copies share them.
 #[derive(Clone, Debug, Default)]
-pub struct KnownDepths(Arc<Vec<Known>>);
+pub struct KnownDepths(Arc<Vec<KnownDepth>>);
 
 #[derive(Clone, Copy, Debug)]
-struct Known {
+struct KnownDepth {
     /// Place in the photo, px.
     at: [f32; 2],
     /// 1 / depth along the axis of the camera, 1 / world unit.
@@ -22,8 +22,8 @@ struct Known {
 
 impl KnownDepths {
     /// Takes the depths of the points that a view shows, by their pixels.
-    pub(crate) fn of_points(view: &View, points: impl Iterator<Item = (DVec2, DVec3)>) -> Self {
-        let known = |(at, point): (DVec2, DVec3)| Known {
+    pub(crate) fn from_points(view: &View, points: impl Iterator<Item = (DVec2, DVec3)>) -> Self {
+        let known = |(at, point): (DVec2, DVec3)| KnownDepth {
             at: at.as_vec2().to_array(),
             inverse: (1.0 / view.camera.to_camera(point).z) as f32,
         };
@@ -31,13 +31,14 @@ impl KnownDepths {
     }
 
     /// Takes the depths of a map of the photo's size, world units. Holes are not finite or not positive.
-    pub(crate) fn of_map(map: &DepthMap) -> Self {
+    pub(crate) fn from_map(map: &DepthMap) -> Self {
         let width = map.width as usize;
-        let rows = (STRIDE / 2..map.height as usize).step_by(STRIDE);
-        let places = rows.flat_map(|y| (STRIDE / 2..width).step_by(STRIDE).map(move |x| (x, y)));
+        let rows = (PIXEL_STRIDE / 2..map.height as usize).step_by(PIXEL_STRIDE);
+        let places = rows.flat_map(|y| (PIXEL_STRIDE / 2..width).step_by(PIXEL_STRIDE).map(move |x| (x, y)));
         let known = |(x, y): (usize, usize)| {
             let inverse = 1.0 / map.values[y * width + x];
-            (inverse.is_finite() && inverse > 0.0).then_some(Known { at: [x as f32 + 0.5, y as f32 + 0.5], inverse })
+            (inverse.is_finite() && inverse > 0.0)
+                .then_some(KnownDepth { at: [x as f32 + 0.5, y as f32 + 0.5], inverse })
         };
         Self(Arc::new(places.filter_map(known).collect()))
     }

@@ -4,7 +4,7 @@
 //! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it, and
 //! votes and renders between steps are those of whole photos.
 
-use super::step_input::{self, Shown};
+use super::step_input::{self, ObjectLight};
 use crate::engine::Band;
 use crate::scene::labels::objects_of;
 use crate::scene::{Camera, LabelMap, Photo};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// What a step trains on.
 #[derive(Debug)]
-pub(in crate::train) struct Part {
+pub(in crate::train) struct PhotoPart {
     /// Index of the training view.
     pub(in crate::train) view: usize,
     /// Its rows.
@@ -27,19 +27,19 @@ pub(in crate::train) struct Part {
     /// Ids of the objects in its mask, sorted.
     pub(in crate::train) objects: Vec<u16>,
     /// Light and area of each object, by id.
-    pub(in crate::train) shown: BTreeMap<u16, Shown>,
+    pub(in crate::train) shown: BTreeMap<u16, ObjectLight>,
 }
 
-impl Part {
+impl PhotoPart {
     /// Returns the parts of a view, of at most `most` rows. `labels` is the mask in the layout of the device.
-    pub(in crate::train) fn all(
+    pub(in crate::train) fn split(
         (view, camera): (usize, &Camera),
         photo: &Photo,
         mask: Option<&LabelMap>,
         labels: &[u32],
         most: Option<u32>,
     ) -> Vec<Self> {
-        let bands = Band::all(camera.height, most.unwrap_or(camera.height));
+        let bands = Band::split(camera.height, most.unwrap_or(camera.height));
         let is_whole = bands.len() == 1;
         let of = |band: Band| {
             let pixels = band.pixels(camera.width);

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 /// Most steps ahead: more than the device needs to take the time of one.
-const STEPS_MAX: usize = 8;
+const STEPS_AHEAD_MAX: usize = 8;
 
 /// The pixels of a step, with their camera.
 #[derive(Debug)]
@@ -79,7 +79,7 @@ impl Prefetch {
     /// Makes one for the steps up to `last`.
     pub(in crate::train) fn new(views: &[TrainView], last: u32) -> Self {
         let waits = views.iter().map(|view| &view.photo).filter(|photo| !photo.is_held());
-        let steps = waits.map(Pixels::at_once).min().map_or(0, |most| most.min(STEPS_MAX));
+        let steps = waits.map(Pixels::at_once).min().map_or(0, |most| most.min(STEPS_AHEAD_MAX));
         Self { running: BTreeMap::new(), steps, last }
     }
 

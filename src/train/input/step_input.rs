@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 /// Share of D-SSIM in the photometric loss; the rest is L1 (3DGS).
 pub(in crate::train) const LAMBDA_DSSIM: f32 = 0.2;
 /// Largest weight of a small object relative to the mean.
-const WEIGHT_MAX: f64 = 10.0;
+const LAYER_WEIGHT_MAX: f64 = 10.0;
 
 /// A training view.
 #[derive(Debug)]
@@ -61,7 +61,7 @@ pub struct StepView<'a> {
     /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
     pub depths: &'a [f32],
     /// Light and area of each object, by id.
-    pub shown: &'a BTreeMap<u16, Shown>,
+    pub shown: &'a BTreeMap<u16, ObjectLight>,
     /// Occluders of each object.
     pub occluders: &'a Occluders,
 }
@@ -77,7 +77,7 @@ pub(crate) fn valid_pixels(photo: &[[u8; 4]]) -> u64 {
 
 /// The pixels of an object in a view that the label loss uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Shown {
+pub struct ObjectLight {
     /// Sum of r + g + b over these pixels of the photo.
     pub light: f64,
     /// Number of these pixels.
@@ -94,8 +94,8 @@ pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
 }
 
 /// Sums light and area of each object. The label loss of an empty layer follows from them.
-pub(crate) fn shown_objects(photo: &[[u8; 4]], view_labels: &[u32]) -> BTreeMap<u16, Shown> {
-    let mut objects: BTreeMap<u16, Shown> = BTreeMap::new();
+pub(crate) fn shown_objects(photo: &[[u8; 4]], view_labels: &[u32]) -> BTreeMap<u16, ObjectLight> {
+    let mut objects: BTreeMap<u16, ObjectLight> = BTreeMap::new();
     for (&id, &[r, g, b, valid]) in view_labels.iter().zip(photo) {
         if id != 0 && id & LABEL_BORDER == 0 && valid > 127 {
             let shown = objects.entry(id as u16).or_default();
@@ -107,12 +107,13 @@ pub(crate) fn shown_objects(photo: &[[u8; 4]], view_labels: &[u32]) -> BTreeMap<
 }
 
 /// Returns the weights of the layers of a step: 1, or proportional to 1 / sqrt(area). An object of the mean area then
-/// has weight 1; [`WEIGHT_MAX`] is the upper bound.
+/// has weight 1; [`LAYER_WEIGHT_MAX`] is the upper bound.
 pub(crate) fn layer_weights(input: &StepInput, view: StepView, config: &TrainConfig) -> Vec<f32> {
     let areas: Vec<f64> =
         input.layers.iter().map(|label| view.shown.get(label).map_or(0.0, |shown| shown.pixels as f64)).collect();
     let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
-    let weight = |area: f64| if config.label_balance { (mean / area.max(1.0)).sqrt().min(WEIGHT_MAX) } else { 1.0 };
+    let weight =
+        |area: f64| if config.label_balance { (mean / area.max(1.0)).sqrt().min(LAYER_WEIGHT_MAX) } else { 1.0 };
     areas.into_iter().map(|area| weight(area) as f32).collect()
 }
 

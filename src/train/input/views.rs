@@ -1,7 +1,7 @@
 //! The training views, at the size of each step.
 
 use super::free_space;
-use super::part::Part;
+use super::part::PhotoPart;
 use super::prefetch::{Prefetch, Request, StepPixels};
 use super::step_input::{self, StepInput, StepView, TrainView};
 use crate::error::{Error, Result};
@@ -16,14 +16,14 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 /// Number of sizes below the full one.
-const SIZES: u32 = 8;
+const SMALLER_SIZES: u32 = 8;
 
 /// The training views. As a slice, those at full size.
 #[derive(Debug)]
 pub(in crate::train) struct Views {
     whole: Vec<TrainView>,
     /// What steps train on.
-    parts: Vec<Part>,
+    parts: Vec<PhotoPart>,
     /// Shrunk photos of those in memory, by size and part, until no step in flight uses the size.
     shrunk: BTreeMap<(u32, usize), Arc<StepPixels>>,
     /// Pixels of the steps in flight.
@@ -45,7 +45,7 @@ pub(in crate::train) struct Views {
 
 impl Views {
     pub(in crate::train) fn new(
-        (whole, parts): (Vec<TrainView>, Vec<Part>),
+        (whole, parts): (Vec<TrainView>, Vec<PhotoPart>),
         config: &TrainConfig,
         frames: usize,
     ) -> Self {
@@ -101,7 +101,7 @@ impl Views {
     }
 
     /// Returns the parts of the views, each for a step.
-    pub(in crate::train) fn parts(&self) -> &[Part] {
+    pub(in crate::train) fn parts(&self) -> &[PhotoPart] {
         &self.parts
     }
 
@@ -121,18 +121,18 @@ impl Views {
         Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[view].near)))
     }
 
-    /// Returns the number of the size of `step`, from 0; [`SIZES`] is the full one.
+    /// Returns the number of the size of `step`, from 0; [`SMALLER_SIZES`] is the full one.
     fn size_at(&self, step: u32) -> u32 {
         if step < self.full_from {
-            (u64::from(step) * u64::from(SIZES) / u64::from(self.full_from)) as u32
+            (u64::from(step) * u64::from(SMALLER_SIZES) / u64::from(self.full_from)) as u32
         } else {
-            SIZES
+            SMALLER_SIZES
         }
     }
 
     /// Returns the share of the full size of `step`. Sizes grow in equal ratios.
     pub(in crate::train) fn share_at(&self, step: u32) -> f64 {
-        self.start.powf(1.0 - f64::from(self.size_at(step)) / f64::from(SIZES))
+        self.start.powf(1.0 - f64::from(self.size_at(step)) / f64::from(SMALLER_SIZES))
     }
 
     /// Returns an upper bound of the image size at `step`, given that of full size.
@@ -158,7 +158,7 @@ impl Views {
             }
         };
         let is_held = |part: usize| self.whole[self.parts[part].view].photo.is_held();
-        if key.0 < SIZES && is_held(part) {
+        if key.0 < SMALLER_SIZES && is_held(part) {
             self.shrunk.insert(key, Arc::clone(&ready));
         }
         self.ready.insert(step, ready);
@@ -180,7 +180,7 @@ impl Views {
     fn request(&self, step: u32, index: usize) -> Request {
         let part = &self.parts[index];
         let view = &self.whole[part.view];
-        let is_small = self.size_at(step) < SIZES;
+        let is_small = self.size_at(step) < SMALLER_SIZES;
         Request {
             step,
             index,
@@ -193,7 +193,7 @@ impl Views {
     }
 
     /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
-    pub(in crate::train) fn of(&self, input: &StepInput) -> Result<StepView<'_>> {
+    pub(in crate::train) fn step_view(&self, input: &StepInput) -> Result<StepView<'_>> {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
         let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
         let view = &self.whole[part.view];

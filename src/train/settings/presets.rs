@@ -42,7 +42,7 @@ impl TrainConfig {
     }
 
     /// Returns the settings for what is trained beside a finished model, which is drawn from `near`.
-    pub(in crate::train) fn of_finished(model: &Gaussians, near: f32) -> Self {
+    pub(in crate::train) fn for_finished(model: &Gaussians, near: f32) -> Self {
         Self {
             near,
             sh_degree: model.sh_degree,

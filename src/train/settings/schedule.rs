@@ -3,43 +3,43 @@
 use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
 /// Length of the runs that the learning rates of 3DGS are made for, steps.
-const LONG_RUN: f64 = 30_000.0;
+const LONG_RUN_STEPS: f64 = 30_000.0;
 /// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MAX.
 const RATE_POWER: f64 = 0.3;
 const RATE_MAX: f64 = 3.0;
 /// Share of the run after which the rates fall.
-const RATE_FALL_FROM: f64 = 0.6;
+const RATE_FALL_FROM_SHARE: f64 = 0.6;
 /// Step with the final learning rate of positions: LabelGS keeps that of 3DGS for its 15000 steps.
 const POSITION_LR_STEPS: f64 = 30_000.0;
 /// Learning rate of the colours of higher degrees, by that of degree 0 (3DGS).
-const FEATURE_REST: f64 = 20.0;
+const FEATURE_REST_DIVISOR: f64 = 20.0;
 /// Fewest steps of densification with the strategy of 3DGS.
 const ADC_STEPS_MIN: u32 = 1000;
 /// Gaussians of a run by default: at most for each step.
-const BUDGET_PER_STEP: f64 = 30.0;
+const GAUSSIANS_PER_STEP_MAX: f64 = 30.0;
 /// Size of the photos in the first steps: share of the full one, and longest side at most, px.
-const START_SIZE: f32 = 0.4;
-const START_PX: f32 = 160.0;
+const START_SIZE_SHARE: f32 = 0.4;
+const START_SIDE_MAX_PX: f32 = 160.0;
 /// Share of the run after which photos have their full size, and that for a run too short to resolve it.
-const FULL_FROM: f64 = 0.6;
-const FULL_FROM_LATEST: f64 = 0.9;
+const FULL_SIZE_FROM_SHARE: f64 = 0.6;
+const FULL_SIZE_FROM_SHARE_MAX: f64 = 0.9;
 /// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
 const REGULARISER_WEIGHT: f64 = 0.01;
-const RELOCATE_UNTIL: f64 = 25.0 / 30.0;
+const RELOCATE_UNTIL_SHARE: f64 = 25.0 / 30.0;
 /// Share of the run after which Gaussians with little weight are pruned, and those across contours split: soon after
 /// growth, so that the others adapt.
-const EXCHANGE_AT: f64 = 0.55;
+const EXCHANGE_AT_SHARE: f64 = 0.55;
 
 /// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
-const LAYER_EVERY: u32 = 8;
+const LAYER_STEP_INTERVAL: u32 = 8;
 /// Steps between two with the disagreement of labels, which counts for those between.
-const DISAGREEMENT_EVERY: u32 = 2;
+const DISAGREEMENT_STEP_INTERVAL: u32 = 2;
 /// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
 /// of default settings has one of each when labels start, and votes at the end.
-const VOTE_EVERY: f64 = 0.5;
-const OCCLUSION_EVERY: f64 = 0.5;
+const VOTE_INTERVAL_SHARE: f64 = 0.5;
+const OCCLUSION_INTERVAL_SHARE: f64 = 0.5;
 /// Share of a run after which known depths have no weight.
-const DEPTHS_UNTIL: f64 = 0.6;
+const DEPTHS_UNTIL_SHARE: f64 = 0.6;
 
 /// Learning rates of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,13 +65,13 @@ impl TrainConfig {
     }
 
     pub(in crate::train) fn rate_factor(&self) -> f64 {
-        let derived = (LONG_RUN / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MAX);
+        let derived = (LONG_RUN_STEPS / f64::from(self.iterations)).powf(RATE_POWER).clamp(1.0, RATE_MAX);
         self.rate_factor.unwrap_or(derived)
     }
 
     /// Returns the factor by which all rates have fallen at `step`.
     pub(in crate::train) fn rate_fall(&self, step: u32) -> f64 {
-        let from = self.share(RATE_FALL_FROM);
+        let from = self.share(RATE_FALL_FROM_SHARE);
         let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
         self.rate_final.powf(late.min(1.0))
     }
@@ -87,7 +87,7 @@ impl TrainConfig {
             scale: factor * self.scaling_lr,
             rotation: factor * self.rotation_lr,
             colour: factor * self.feature_lr,
-            colour_rest: factor * (self.feature_lr / FEATURE_REST),
+            colour_rest: factor * (self.feature_lr / FEATURE_REST_DIVISOR),
         }
     }
 
@@ -115,7 +115,7 @@ impl TrainConfig {
 
     /// Returns the first step at full size.
     pub fn full_size_from(&self) -> u32 {
-        if self.start_size == Some(1.0) { 0 } else { self.full_size_from.unwrap_or(self.share(FULL_FROM)) }
+        if self.start_size == Some(1.0) { 0 } else { self.full_size_from.unwrap_or(self.share(FULL_SIZE_FROM_SHARE)) }
     }
 
     /// Returns true for steps that set labels and have a label loss, given masks.
@@ -130,7 +130,7 @@ impl TrainConfig {
 
     /// Returns the steps between two with object layers; 0 without any.
     pub fn layer_every(&self) -> u32 {
-        self.layer_every.unwrap_or(if self.label_rule == LabelRule::Main { 1 } else { LAYER_EVERY })
+        self.layer_every.unwrap_or(if self.label_rule == LabelRule::Main { 1 } else { LAYER_STEP_INTERVAL })
     }
 
     /// Returns true for steps with labels that render objects alone.
@@ -140,7 +140,7 @@ impl TrainConfig {
 
     /// Returns the steps between two with the disagreement of labels; the paper's rule lifts labels in each step.
     pub fn disagreement_every(&self) -> u32 {
-        if self.label_rule == LabelRule::Main { 1 } else { DISAGREEMENT_EVERY }
+        if self.label_rule == LabelRule::Main { 1 } else { DISAGREEMENT_STEP_INTERVAL }
     }
 
     /// Returns true for steps with labels that have their disagreement, if they have no object layers.
@@ -151,12 +151,12 @@ impl TrainConfig {
 
     /// Returns true if the votes are counted before `step`.
     pub fn counts_votes_at(&self, step: u32) -> bool {
-        self.is_label_turn(step, self.vote_every.unwrap_or(self.share(VOTE_EVERY)))
+        self.is_label_turn(step, self.vote_every.unwrap_or(self.share(VOTE_INTERVAL_SHARE)))
     }
 
     /// Returns true if the occluders are updated before `step`.
     pub fn updates_occluders_at(&self, step: u32) -> bool {
-        self.is_label_turn(step, self.occlusion_every.unwrap_or(self.share(OCCLUSION_EVERY)))
+        self.is_label_turn(step, self.occlusion_every.unwrap_or(self.share(OCCLUSION_INTERVAL_SHARE)))
     }
 
     fn is_label_turn(&self, step: u32, every: u32) -> bool {
@@ -168,7 +168,7 @@ impl TrainConfig {
     }
 
     pub(in crate::train) fn depths_until(&self) -> u32 {
-        if self.has_depths() { self.labels_from().min(self.share(DEPTHS_UNTIL)) } else { 0 }
+        if self.has_depths() { self.labels_from().min(self.share(DEPTHS_UNTIL_SHARE)) } else { 0 }
     }
 
     /// Returns the weight of known depths at `step`.
@@ -182,26 +182,27 @@ impl TrainConfig {
     }
 
     /// Returns the Gaussians that photos of a size ask for, however long the run is.
-    fn by_pixels(&self, (width, height): (u32, u32)) -> f64 {
+    fn pixel_budget(&self, (width, height): (u32, u32)) -> f64 {
         self.detail * f64::from(width) * f64::from(height)
     }
 
     /// Returns the budget for photos of a size of a run that is long enough; none with a strategy that has no budget.
     pub(in crate::train) fn full_budget(&self, size: (u32, u32)) -> Option<u64> {
-        let budget = if self.budget > 0 { self.budget } else { self.by_pixels(size).max(1.0) as u64 };
+        let budget = if self.budget > 0 { self.budget } else { self.pixel_budget(size).max(1.0) as u64 };
         (self.strategy != StrategyKind::Adc).then_some(budget)
     }
 
     /// Returns the settings with what they leave open: by the size of the photos budget, first size and first step at
     /// full size; and the steps between two with object layers.
     pub fn for_size(&self, (width, height): (u32, u32)) -> Self {
-        let by_pixels = self.by_pixels((width, height));
-        let by_steps = BUDGET_PER_STEP * f64::from(self.iterations);
+        let by_pixels = self.pixel_budget((width, height));
+        let by_steps = GAUSSIANS_PER_STEP_MAX * f64::from(self.iterations);
         let budget = if self.budget > 0 { self.budget } else { by_pixels.min(by_steps).max(1.0) as u64 };
-        let start_size = self.start_size.unwrap_or(START_SIZE.min(START_PX / width.max(height).max(1) as f32));
+        let start_size =
+            self.start_size.unwrap_or(START_SIZE_SHARE.min(START_SIDE_MAX_PX / width.max(height).max(1) as f32));
         // Side of the size that as many Gaussians can resolve as the steps allow, as a share of the full one.
         let resolved = (by_steps / by_pixels).min(1.0).sqrt();
-        let derived = self.share(resolved * FULL_FROM + (1.0 - resolved) * FULL_FROM_LATEST);
+        let derived = self.share(resolved * FULL_SIZE_FROM_SHARE + (1.0 - resolved) * FULL_SIZE_FROM_SHARE_MAX);
         let full_size_from = Some(self.full_size_from.unwrap_or(derived));
         let layer_every = Some(self.layer_every());
         Self { budget, start_size: Some(start_size), full_size_from, layer_every, ..self.clone() }
@@ -252,7 +253,7 @@ impl TrainConfig {
 
     /// Returns true for steps that end with a relocation.
     pub fn relocates_at(&self, step: u32) -> bool {
-        let until = self.densify_until().max(self.share(RELOCATE_UNTIL));
+        let until = self.densify_until().max(self.share(RELOCATE_UNTIL_SHARE));
         step < until && step > self.densify_from() && step.is_multiple_of(self.densify_interval())
     }
 
@@ -263,7 +264,7 @@ impl TrainConfig {
 
     /// Returns true for the step after which Gaussians with little weight make room for others.
     pub fn exchanges_at(&self, step: u32) -> bool {
-        step == self.share(EXCHANGE_AT) && self.prune_share > 0.0
+        step == self.share(EXCHANGE_AT_SHARE) && self.prune_share > 0.0
     }
 
     /// Returns true for steps that end with a densification.

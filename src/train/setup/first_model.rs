@@ -9,29 +9,29 @@ use std::borrow::Cow;
 
 /// Random Gaussians for a scene without points: at most this many, and this share of the budget, so that growth chooses
 /// the places of the others.
-const RANDOM_MAX: u64 = 50_000;
-const RANDOM_SHARE: f64 = 0.25;
+const RANDOM_GAUSSIANS_MAX: u64 = 50_000;
+const RANDOM_BUDGET_SHARE_MAX: f64 = 0.25;
 /// Most points, in budgets: more Gaussians than that show little more and cost as much time each.
-const BUDGETS_MAX: u64 = 4;
+const POINT_BUDGETS_MAX: u64 = 4;
 /// First opacity with the strategy mcmc, and factor of the first deviations. 3DGS-MCMC has 0.5 and 0.1; its long runs
 /// have the time to grow.
 const MCMC_OPACITY: f32 = 0.5;
-const MCMC_SIZE: f32 = 0.3;
+const MCMC_SIZE_FACTOR: f32 = 0.3;
 
 /// Makes the initial Gaussians of a training: at the points of the scene or at random places, and far ones. Points beyond
 /// `max_gaussians`, or far beyond the budget without it, are thinned evenly; half of `max_gaussians` is left for growth.
 pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
     let random = match config.strategy {
-        StrategyKind::Adc => RANDOM_MAX,
-        StrategyKind::Budget | StrategyKind::Mcmc => {
-            RANDOM_MAX.min((RANDOM_SHARE * for_photos(config, dataset)?.budget as f64) as u64).max(1)
-        }
+        StrategyKind::Adc => RANDOM_GAUSSIANS_MAX,
+        StrategyKind::Budget | StrategyKind::Mcmc => RANDOM_GAUSSIANS_MAX
+            .min((RANDOM_BUDGET_SHARE_MAX * for_photos(config, dataset)?.budget as f64) as u64)
+            .max(1),
     };
     let mut model = init::first_gaussians(dataset, &points(dataset, config)?, config.seed, random as usize)?;
     init::add_far_gaussians(&mut model, dataset, config.far_points)?;
     if config.strategy == StrategyKind::Mcmc {
         model.opacities.fill((MCMC_OPACITY / (1.0 - MCMC_OPACITY)).ln());
-        model.scales.iter_mut().flatten().for_each(|scale| *scale += MCMC_SIZE.ln());
+        model.scales.iter_mut().flatten().for_each(|scale| *scale += MCMC_SIZE_FACTOR.ln());
     }
     thin(&mut model, config.max_gaussians);
     Ok(model)
@@ -46,11 +46,11 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
     let (most, why) = match (config.max_gaussians, budget) {
         (0, None) => return Ok(Cow::Borrowed(&dataset.points)),
         (0, Some(budget)) if config.budget > 0 => {
-            (budget.saturating_mul(BUDGETS_MAX), format!("{} is {budget}", Setting("budget")))
+            (budget.saturating_mul(POINT_BUDGETS_MAX), format!("{} is {budget}", Setting("budget")))
         }
         (0, Some(budget)) => {
             let why = format!("photos of {width} x {height} px ask for {budget} Gaussians");
-            (budget.saturating_mul(BUDGETS_MAX), why)
+            (budget.saturating_mul(POINT_BUDGETS_MAX), why)
         }
         (bound, _) if all <= bound => return Ok(Cow::Borrowed(&dataset.points)),
         (bound, budget) => {

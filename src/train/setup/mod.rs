@@ -13,9 +13,9 @@ use crate::scene::pixels::Source;
 use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
 use crate::scheduler::SchedulerOptions;
 use crate::train::input::known_depths::KnownDepths;
-use crate::train::input::part::Part;
+use crate::train::input::part::PhotoPart;
 use crate::train::input::step_input::{self, TrainView};
-use crate::train::shared::Shared;
+use crate::train::shared::SharedSet;
 use crate::train::strategy::Strategy;
 use crate::train::{LabelRule, Moments, Objective, TrainConfig};
 use region::Region;
@@ -34,7 +34,7 @@ pub struct TrainerOptions {
     /// The strategy for the number of Gaussians; none takes that of the objective and the configuration.
     pub strategy: Option<Box<dyn Strategy>>,
     /// Parameters of the scene or of photos.
-    pub shared: Shared,
+    pub shared: SharedSet,
     /// The part of the scene that is trained; none for all of it.
     pub region: Option<Region>,
     /// Depths that each training photo is known to have; none with a weight of 0.
@@ -115,7 +115,7 @@ pub(in crate::train) fn train_views(
     depths: Vec<KnownDepths>,
     border: u32,
     most: Option<u32>,
-) -> Result<(Vec<TrainView>, Vec<Part>)> {
+) -> Result<(Vec<TrainView>, Vec<PhotoPart>)> {
     let views = &dataset.train;
     let of = |index: usize| train_view((index, &views[index]), border, most);
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
@@ -128,15 +128,15 @@ pub(in crate::train) fn train_views(
     Ok((whole, parts))
 }
 
-fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> Result<(TrainView, Vec<Part>)> {
+fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> Result<(TrainView, Vec<PhotoPart>)> {
     let (pixels, mask) = (view.photo()?, view.mask()?);
     let photo = view.photo.clone().unwrap_or_else(|| pixels.clone().into());
     let objects = mask.as_deref().map(LabelMap::objects).unwrap_or_default();
     let labels = mask.as_ref().map(|mask| step_input::view_labels(mask, border)).unwrap_or_default();
-    let parts = Part::all((index, &view.camera), &pixels, mask.as_deref(), &labels, most);
+    let parts = PhotoPart::split((index, &view.camera), &pixels, mask.as_deref(), &labels, most);
     let view_labels = match &view.mask {
         Some(mask) if !mask.is_held() => {
-            Pixels::made(Arc::new(LabelsOf { mask: mask.clone(), border }), Default::default())
+            Pixels::made(Arc::new(LazyViewLabels { mask: mask.clone(), border }), Default::default())
         }
         _ => labels.into(),
     };
@@ -156,12 +156,12 @@ fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> 
 
 /// The layout of the device of a mask that is not in memory.
 #[derive(Debug)]
-struct LabelsOf {
+struct LazyViewLabels {
     mask: Pixels<LabelMap>,
     border: u32,
 }
 
-impl Source<Vec<u32>> for LabelsOf {
+impl Source<Vec<u32>> for LazyViewLabels {
     fn make(&self) -> Result<Arc<Vec<u32>>> {
         Ok(Arc::new(step_input::view_labels(&*self.mask.get()?, self.border)))
     }

@@ -6,17 +6,17 @@
 //! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
 //! mean exposure.
 
-use super::{Place, SharedLayout, SharedParameters};
+use super::{RowOffsets, SharedLayout, SharedParameters};
 use crate::Setting;
 use crate::pass::{Builder, Extension, Hook, loss};
 use crate::scene::ColourMatrix;
 use crate::shaders::constants::{EXPOSURE_ROWS, EXPOSURE_SHARE};
-use crate::train::strategy::At;
+use crate::train::strategy::StepContext;
 use crate::train::{ExposureMode, TrainConfig};
 use std::sync::Arc;
 
 /// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
-const RATE: f64 = 0.01;
+const LEARNING_RATE: f64 = 0.01;
 /// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
 /// 0.04, by what shines and by noise.
 const SPREAD_MIN: f64 = 0.07;
@@ -24,7 +24,7 @@ const SPREAD_MIN: f64 = 0.07;
 const KNOWN_SHARE_MIN: f64 = 0.5;
 
 /// Name of the parameters.
-pub(in crate::train) const NAME: &str = "exposure";
+pub(in crate::train) const EXPOSURE_NAME: &str = "exposure";
 
 /// Gains of a photo, r, g, b; `None` where nothing tells them.
 pub(crate) type Gains = Option<[f64; 3]>;
@@ -121,7 +121,7 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
 
 impl SharedParameters for Exposure {
     fn name(&self) -> &'static str {
-        NAME
+        EXPOSURE_NAME
     }
 
     fn layout(&self) -> SharedLayout {
@@ -132,20 +132,20 @@ impl SharedParameters for Exposure {
         view.into_iter().flat_map(|view| self.start.get(view).copied().unwrap_or_default()).collect()
     }
 
-    fn rates(&self, at: At) -> Vec<[f32; 4]> {
-        let rate = if self.is_fixed { 0.0 } else { (RATE * at.config.rate_fall(at.step)) as f32 };
+    fn rates(&self, at: StepContext) -> Vec<[f32; 4]> {
+        let rate = if self.is_fixed { 0.0 } else { (LEARNING_RATE * at.config.rate_fall(at.step)) as f32 };
         vec![[rate, rate, rate, 0.0]; EXPOSURE_ROWS as usize]
     }
 
-    fn extension(&self, place: Place) -> Arc<dyn Extension> {
-        Arc::new(Passes(place))
+    fn extension(&self, place: RowOffsets) -> Arc<dyn Extension> {
+        Arc::new(ExposurePasses(place))
     }
 }
 
 #[derive(Debug)]
-struct Passes(Place);
+struct ExposurePasses(RowOffsets);
 
-impl Extension for Passes {
+impl Extension for ExposurePasses {
     fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
         match hook {
             Hook::Picture => loss::expose(b, self.0.photo),

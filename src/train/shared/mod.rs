@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::pass::Extension;
 use crate::scene::Dataset;
 use crate::train::setup::region::Region;
-use crate::train::strategy::At;
+use crate::train::strategy::StepContext;
 use crate::train::{ExposureMode, TrainConfig};
 use exposure::{Exposure, Gains};
 use poses::Poses;
@@ -45,19 +45,19 @@ impl SharedLayout {
     }
 
     /// Returns the rows of a view.
-    pub fn of_view(self, view: usize) -> Range<u32> {
+    pub fn view_rows(self, view: usize) -> Range<u32> {
         self.count(view)..self.count(view + 1)
     }
 
     /// Returns the rows of a step on a view.
-    fn of_step(self, view: usize) -> impl Iterator<Item = u32> {
-        (0..self.scene).chain(self.of_view(view))
+    fn step_rows(self, view: usize) -> impl Iterator<Item = u32> {
+        (0..self.scene).chain(self.view_rows(view))
     }
 }
 
 /// Where the rows of one owner are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct RowOffsets {
     /// The first of its rows of the scene among those of a step.
     pub scene: u32,
     /// The first of its rows of the photo among those of a step.
@@ -80,27 +80,32 @@ pub trait SharedParameters: Debug + Send {
 
     /// Returns the learning rates of the rows of a step: those of the scene, then those of its photo. A row with rates
     /// of 0 keeps its values and moments in this step.
-    fn rates(&self, at: At) -> Vec<[f32; 4]>;
+    fn rates(&self, at: StepContext) -> Vec<[f32; 4]>;
 
     /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
     /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
-    fn extension(&self, place: Place) -> Arc<dyn Extension>;
+    fn extension(&self, place: RowOffsets) -> Arc<dyn Extension>;
 }
 
 /// The shared parameters of a training. The default has none and costs nothing.
 #[derive(Debug, Default)]
-pub struct Shared(Vec<Box<dyn SharedParameters>>);
+pub struct SharedSet(Vec<Box<dyn SharedParameters>>);
 
-impl<P: SharedParameters + 'static> From<P> for Shared {
+impl<P: SharedParameters + 'static> From<P> for SharedSet {
     fn from(parameters: P) -> Self {
         Self(vec![Box::new(parameters)])
     }
 }
 
-impl Shared {
+impl SharedSet {
     /// Returns the parameters that the configuration asks for. `gains` are the first gains of each photo.
     /// Those of a region stay.
-    pub(crate) fn of(config: &TrainConfig, gains: &[Gains], dataset: &Dataset, region: Option<&Region>) -> Self {
+    pub(crate) fn from_config(
+        config: &TrainConfig,
+        gains: &[Gains],
+        dataset: &Dataset,
+        region: Option<&Region>,
+    ) -> Self {
         let mut all: Vec<Box<dyn SharedParameters>> = Vec::new();
         if config.exposure == ExposureMode::On {
             all.push(Box::new(match region {
@@ -116,7 +121,7 @@ impl Shared {
 
     /// Returns the parameters, or those that the configuration asks for.
     pub(in crate::train) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
-        if self.0.is_empty() { Self::of(config, &[], dataset, region) } else { self }
+        if self.0.is_empty() { Self::from_config(config, &[], dataset, region) } else { self }
     }
 
     fn layout(&self) -> SharedLayout {
@@ -124,11 +129,11 @@ impl Shared {
     }
 
     /// Returns each owner with the place of its rows.
-    fn placed(&self) -> impl Iterator<Item = (&dyn SharedParameters, Place)> {
+    fn placed(&self) -> impl Iterator<Item = (&dyn SharedParameters, RowOffsets)> {
         let all = self.layout();
         let mut before = SharedLayout::default();
         self.0.iter().map(move |of| {
-            let place = Place { scene: before.scene, photo: all.scene + before.photo, all };
+            let place = RowOffsets { scene: before.scene, photo: all.scene + before.photo, all };
             before = before.and(of.layout());
             (of.as_ref(), place)
         })
@@ -142,8 +147,8 @@ impl Shared {
     }
 
     /// Returns the rows of a view among all rows.
-    pub(in crate::train) fn of_view(&self, view: usize) -> Range<usize> {
-        let rows = self.layout().of_view(view);
+    pub(in crate::train) fn view_range(&self, view: usize) -> Range<usize> {
+        let rows = self.layout().view_rows(view);
         rows.start as usize..rows.end as usize
     }
 
@@ -163,7 +168,7 @@ impl Shared {
         Ok(rows)
     }
 
-    pub(in crate::train) fn of_step(&self, at: At, view: usize) -> Result<Vec<SharedRow>> {
+    pub(in crate::train) fn step_rows(&self, at: StepContext, view: usize) -> Result<Vec<SharedRow>> {
         let (mut rates, mut of_photo) = (Vec::new(), Vec::new());
         for of in &self.0 {
             let SharedLayout { scene, photo } = of.layout();
@@ -173,7 +178,7 @@ impl Shared {
             of_photo.extend_from_slice(rest);
         }
         rates.extend(of_photo);
-        Ok(self.layout().of_step(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
+        Ok(self.layout().step_rows(view).zip(rates).map(|(row, rates)| SharedRow { row, rates }).collect())
     }
 
     pub(in crate::train) fn extensions(&self) -> Vec<Arc<dyn Extension>> {

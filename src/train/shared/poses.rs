@@ -5,26 +5,26 @@
 //! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
 
 use super::preconditioner::{self, Matrix};
-use super::{Place, SharedLayout, SharedParameters};
+use super::{RowOffsets, SharedLayout, SharedParameters};
 use crate::bundle_adjustment;
 use crate::pass::{Builder, Extension, Hook, project};
 use crate::scene::{Camera, Dataset, Point, View};
-use crate::train::strategy::At;
+use crate::train::strategy::StepContext;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// Name of the parameters.
-pub(in crate::train) const NAME: &str = "poses";
+pub(in crate::train) const POSES_NAME: &str = "poses";
 /// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
-pub(crate) const ROWS: usize = 14;
+pub(crate) const ROWS_PER_PHOTO: usize = 14;
 /// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some
-/// dozens a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`FALL`] of itself.
-const RATE: f64 = 2e-3;
-const FALL: f64 = 0.02;
+/// dozens a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`LEARNING_RATE_FALL`] of itself.
+const LEARNING_RATE_START: f64 = 2e-3;
+const LEARNING_RATE_FALL: f64 = 0.02;
 /// Share of the run before the first update: Gaussians have no colours of their own yet.
-const FROM: f64 = 0.08;
+const FIRST_UPDATE_SHARE: f64 = 0.08;
 /// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any more.
-const COMPARED: [f64; 3] = [0.2, 0.35, 0.5];
+const COMPARISON_SHARES: [f64; 3] = [0.2, 0.35, 0.5];
 
 /// Corrections of the poses, 0 in the beginning.
 #[derive(Clone, Debug, Default)]
@@ -45,16 +45,16 @@ impl Poses {
         };
         let of_view = |view: &View| {
             let depth = depth(view);
-            (depth, preconditioner::of_view(&view.camera, &dataset.points, depth.into()))
+            (depth, preconditioner::view_preconditioner(&view.camera, &dataset.points, depth.into()))
         };
         Self { of_views: dataset.train.iter().map(of_view).collect() }
     }
 }
 
 /// Returns true if a comparison of all photos settles poses before this step.
-pub(in crate::train) fn are_compared_before(at: At) -> bool {
+pub(in crate::train) fn are_compared_before(at: StepContext) -> bool {
     let after = |share: f64| (share * f64::from(at.config.iterations)).round() as u32 + 1;
-    COMPARED.iter().any(|&share| at.step == after(share))
+    COMPARISON_SHARES.iter().any(|&share| at.step == after(share))
 }
 
 /// Returns a camera with the correction of its rows (glsl/include/pose.glsl).
@@ -71,7 +71,8 @@ pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera
     let turn = 2.0 / turn.w * turn.xyz();
     let shift = from.rotation * (to.centre() - from.centre()) / f64::from(rows[1][3]);
     let mut numbers = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
-    let mut matrix: Vec<f64> = rows[2..ROWS].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
+    let mut matrix: Vec<f64> =
+        rows[2..ROWS_PER_PHOTO].iter().flat_map(|row| [row[0], row[1], row[2]].map(f64::from)).collect();
     bundle_adjustment::solve(&mut matrix, &mut numbers)?;
     for (row, three) in rows.iter_mut().zip(numbers.chunks_exact(3)) {
         row[..3].iter_mut().zip(three).for_each(|(to, &number)| *to = number as f32);
@@ -82,11 +83,11 @@ pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera
 
 impl SharedParameters for Poses {
     fn name(&self) -> &'static str {
-        NAME
+        POSES_NAME
     }
 
     fn layout(&self) -> SharedLayout {
-        SharedLayout { scene: 0, photo: ROWS as u32 }
+        SharedLayout { scene: 0, photo: ROWS_PER_PHOTO as u32 }
     }
 
     fn start(&self, view: Option<usize>) -> Vec<[f32; 4]> {
@@ -96,23 +97,24 @@ impl SharedParameters for Poses {
         [[0.0; 4], [0.0, 0.0, 0.0, *depth]].into_iter().chain(matrix).collect()
     }
 
-    fn rates(&self, at: At) -> Vec<[f32; 4]> {
+    fn rates(&self, at: StepContext) -> Vec<[f32; 4]> {
         let part = f64::from(at.step) / f64::from(at.config.iterations);
-        let rate = if part > FROM { (RATE * FALL.powf(part)) as f32 } else { 0.0 };
-        let mut rates = vec![[0.0; 4]; ROWS];
+        let rate =
+            if part > FIRST_UPDATE_SHARE { (LEARNING_RATE_START * LEARNING_RATE_FALL.powf(part)) as f32 } else { 0.0 };
+        let mut rates = vec![[0.0; 4]; ROWS_PER_PHOTO];
         rates[..2].fill([rate, rate, rate, 0.0]);
         rates
     }
 
-    fn extension(&self, place: Place) -> Arc<dyn Extension> {
-        Arc::new(Passes(place))
+    fn extension(&self, place: RowOffsets) -> Arc<dyn Extension> {
+        Arc::new(PosePasses(place))
     }
 }
 
 #[derive(Debug)]
-struct Passes(Place);
+struct PosePasses(RowOffsets);
 
-impl Extension for Passes {
+impl Extension for PosePasses {
     fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
         match hook {
             Hook::Camera => project::pose(b, self.0.photo),
@@ -124,7 +126,7 @@ impl Extension for Passes {
 
 #[cfg(test)]
 mod tests {
-    use super::{Poses, ROWS, corrected, settle};
+    use super::{Poses, ROWS_PER_PHOTO, corrected, settle};
     use crate::scene::{Camera, Point};
     use crate::train::shared::SharedParameters;
     use glam::{DMat3, DVec3};
@@ -136,10 +138,10 @@ mod tests {
         let camera = Camera { rotation, translation, fx: 90.0, fy: 90.0, cx: 50.0, cy: 40.0, width: 100, height: 80 };
         let place = |k: usize| DVec3::new((k % 5) as f64 - 2.0, (k % 7) as f64 * 0.5 - 1.5, (k % 3) as f64 * 0.8);
         let points: Vec<Point> = (0..60).map(|k| Point { position: place(k), colour: [0; 3] }).collect();
-        let matrix = crate::train::shared::preconditioner::of_view(&camera, &points, 4.0);
+        let matrix = crate::train::shared::preconditioner::view_preconditioner(&camera, &points, 4.0);
         let poses = Poses { of_views: vec![(4.0, matrix)] };
         let mut rows = poses.start(Some(0));
-        assert_eq!((rows.len(), rows[0][3]), (ROWS, 0.0));
+        assert_eq!((rows.len(), rows[0][3]), (ROWS_PER_PHOTO, 0.0));
         let to = camera.corrected(DVec3::new(0.02, -0.01, 0.03), DVec3::new(0.05, 0.1, -0.04));
         settle(&mut rows, &camera, &to).expect("rows");
         let found = corrected(&camera, &rows);

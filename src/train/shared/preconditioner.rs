@@ -12,11 +12,11 @@ pub(in crate::train) type Matrix = [[f64; 6]; 6];
 
 /// Share of its diagonal that is added to the second moments: a number that hardly shows takes steps up to its inverse root
 /// longer.
-const DAMPING: f64 = 0.01;
+const DAMPING_SHARE: f64 = 0.01;
 /// Fewest points that tell the moments.
-const POINTS: usize = 10;
+const POINTS_MIN: usize = 10;
 /// Iterations of the root; each one doubles the digits once the root is near.
-const ROUNDS: usize = 40;
+const ROOT_ITERATIONS: usize = 40;
 
 const IDENTITY: Matrix = {
     let mut one = [[0.0; 6]; 6];
@@ -30,10 +30,10 @@ const IDENTITY: Matrix = {
 
 /// Returns the preconditioner of a view: the inverse root of the second moments of the derivatives of points in the photo,
 /// focal lengths. Moves are in units of `unit`, world units. A view of few points has the identity.
-pub(in crate::train) fn of_view(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
+pub(in crate::train) fn view_preconditioner(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
     let seen: Vec<DVec3> =
         points.iter().filter(|point| camera.sees(point.position).is_some()).map(|p| p.position).collect();
-    if seen.len() < POINTS {
+    if seen.len() < POINTS_MIN {
         return IDENTITY;
     }
     let mut moments = [[0.0; 6]; 6];
@@ -51,7 +51,7 @@ pub(in crate::train) fn of_view(camera: &Camera, points: &[Point], unit: f64) ->
             }
         }
     }
-    (0..6).for_each(|k| moments[k][k] *= 1.0 + DAMPING);
+    (0..6).for_each(|k| moments[k][k] *= 1.0 + DAMPING_SHARE);
     inverse_root(&moments).unwrap_or(IDENTITY)
 }
 
@@ -64,7 +64,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
 fn inverse_root(matrix: &Matrix) -> Option<Matrix> {
     let size = matrix.as_flattened().iter().map(|value| value * value).sum::<f64>().sqrt();
     let (mut root, mut inverse) = (matrix.map(|row| row.map(|value| value / size)), IDENTITY);
-    for _ in 0..ROUNDS {
+    for _ in 0..ROOT_ITERATIONS {
         let mut step = product(&inverse, &root).map(|row| row.map(|value| -0.5 * value));
         (0..6).for_each(|k| step[k][k] += 1.5);
         (root, inverse) = (product(&root, &step), product(&step, &inverse));
@@ -76,7 +76,7 @@ fn inverse_root(matrix: &Matrix) -> Option<Matrix> {
 
 #[cfg(test)]
 mod tests {
-    use super::{IDENTITY, Matrix, inverse_root, of_view, product};
+    use super::{IDENTITY, Matrix, inverse_root, product, view_preconditioner};
     use crate::scene::{Camera, Point};
     use glam::{DMat3, DVec3};
 
@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn numbers_move_the_points_equally_far() {
         let (camera, points) = (camera(), points());
-        let matrix = of_view(&camera, &points, 4.0);
+        let matrix = view_preconditioner(&camera, &points, 4.0);
         assert_ne!(matrix, IDENTITY);
         let moved = |numbers: [f64; 6]| -> f64 {
             let pose = matrix.map(|row| row.iter().zip(numbers).map(|(a, b)| a * b).sum::<f64>());
@@ -127,6 +127,6 @@ mod tests {
             numbers[k] = 1e-3;
             assert!((0.8..1.02).contains(&(moved(numbers) / 1e-3)), "{k}: {}", moved(numbers) / 1e-3);
         }
-        assert_eq!(of_view(&camera, &points[..9], 4.0), IDENTITY, "too few points");
+        assert_eq!(view_preconditioner(&camera, &points[..9], 4.0), IDENTITY, "too few points");
     }
 }

@@ -1,7 +1,7 @@
 //! The strategy of 3DGS, adaptive density control: clones and splits Gaussians with large screen-space gradients,
 //! prunes faint or too large ones, and resets opacities if the settings say so.
 
-use super::{At, OPACITY_MIN, Population, Strategy, passes};
+use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
@@ -21,11 +21,11 @@ impl Strategy for AdcStrategy {
         "adc"
     }
 
-    fn acts_after(&self, at: At) -> bool {
+    fn acts_after(&self, at: StepContext) -> bool {
         !at.is_last() && (at.config.densifies_at(at.step) || resets_opacity_at(at.config, at.step))
     }
 
-    fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
+    fn act(&mut self, at: StepContext, population: &mut Population) -> Result<()> {
         let uniforms = uniforms(at, population.uniforms());
         if at.config.densifies_at(at.step) {
             let what = population.densify(uniforms, u64::MAX)?;
@@ -38,15 +38,15 @@ impl Strategy for AdcStrategy {
     }
 
     /// A densification replaces the parameters of the gradients, so that no update follows (3DGS).
-    fn updates(&self, at: At) -> bool {
+    fn updates(&self, at: StepContext) -> bool {
         at.is_last() || !at.config.densifies_at(at.step)
     }
 
-    fn blurs_depth_after(&self, at: At) -> bool {
+    fn blurs_depth_after(&self, at: StepContext) -> bool {
         resets_opacity_at(at.config, at.step)
     }
 
-    fn passes(&self, at: At) -> u32 {
+    fn passes(&self, at: StepContext) -> u32 {
         passes::smooth(at)
     }
 
@@ -55,7 +55,7 @@ impl Strategy for AdcStrategy {
     }
 }
 
-fn uniforms(at: At, step: StepUniforms) -> StepUniforms {
+fn uniforms(at: StepContext, step: StepUniforms) -> StepUniforms {
     let config = at.config;
     StepUniforms {
         densify_threshold: config.densify_grad_threshold,

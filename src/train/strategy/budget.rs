@@ -5,7 +5,7 @@
 //! make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the cameras.
 
 use super::exchange::exchange;
-use super::{At, OPACITY_MIN, Population, Strategy, passes};
+use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
@@ -19,12 +19,12 @@ impl Strategy for BudgetStrategy {
         "budget"
     }
 
-    fn acts_after(&self, at: At) -> bool {
+    fn acts_after(&self, at: StepContext) -> bool {
         !at.is_last()
             && (at.config.densifies_at(at.step) || at.config.prunes_at(at.step) || at.config.exchanges_at(at.step))
     }
 
-    fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
+    fn act(&mut self, at: StepContext, population: &mut Population) -> Result<()> {
         let config = at.config;
         let grows = config.densifies_at(at.step);
         let uniforms = StepUniforms {
@@ -45,13 +45,13 @@ impl Strategy for BudgetStrategy {
         Ok(())
     }
 
-    fn uniforms(&self, at: At, to: &mut StepUniforms) {
+    fn uniforms(&self, at: StepContext, to: &mut StepUniforms) {
         passes::regularise(at, to);
         to.sum_absolute = 1;
     }
 
-    fn passes(&self, at: At) -> u32 {
-        passes::of(at)
+    fn passes(&self, at: StepContext) -> u32 {
+        passes::pass_bits(at)
     }
 
     fn planes(&self) -> &'static [Buf] {

@@ -2,16 +2,16 @@
 //! those across contours of the masks, which blur two things.
 
 use super::weights::weights;
-use super::{Densified, Population};
+use super::{DensifyCounts, Population};
 use crate::error::Result;
 use crate::label::vote::ballot::{Ballot, Sweep, sweep};
-use crate::label::vote::decide::EVIDENCE;
+use crate::label::vote::decide::EVIDENCE_MIN_PX;
 use crate::train::TrainConfig;
 
 /// Prunes the [share](TrainConfig::prune_share) of the Gaussians with the least blending weight over all training views.
 /// Given masks, it splits up to a [share](TrainConfig::contour_share) of the others, and prunes as many more. Statistics
 /// start over.
-pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<Densified> {
+pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<DensifyCounts> {
     let ballot = ballot(population, config)?;
     let weights = match &ballot {
         Some(ballot) if config.mask_border == 0 && population.views.iter().all(|view| view.mask.is_some()) => {
@@ -45,12 +45,12 @@ fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
 }
 
 /// Returns up to `most` of the first `count` Gaussians, sorted: those with the most weight on other labels than their main
-/// one, at least [`EVIDENCE`], times its share of all their weight. Without the share, large Gaussians behind an object would come
+/// one, at least [`EVIDENCE_MIN_PX`], times its share of all their weight. Without the share, large Gaussians behind an object would come
 /// first, of which a little shows beside its contour.
 fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
     let score = |row: usize| {
         let (all, astray) = ballot.spread(row);
-        if astray >= EVIDENCE { astray * astray / all } else { 0.0 }
+        if astray >= EVIDENCE_MIN_PX { astray * astray / all } else { 0.0 }
     };
     let scores: Vec<f64> = (0..count).map(score).collect();
     let mut rows: Vec<usize> = (0..count).filter(|&row| scores[row] > 0.0).collect();

@@ -5,13 +5,13 @@
 //! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
 //! factor of the learning rates for short runs does not apply to the moves.
 
-use super::{At, OPACITY_MIN, Population, Strategy, passes};
+use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 
 /// Random moves by the learning rate of positions, both in scene extents (3DGS-MCMC).
-const NOISE: f64 = 5e5;
+const NOISE_PER_RATE: f64 = 5e5;
 
 /// Relocation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,11 +22,11 @@ impl Strategy for McmcStrategy {
         "mcmc"
     }
 
-    fn acts_after(&self, at: At) -> bool {
+    fn acts_after(&self, at: StepContext) -> bool {
         !at.is_last() && (at.config.relocates_at(at.step) || at.config.prunes_at(at.step))
     }
 
-    fn act(&mut self, at: At, population: &mut Population) -> Result<()> {
+    fn act(&mut self, at: StepContext, population: &mut Population) -> Result<()> {
         let config = at.config;
         let start = population.first_count();
         let wanted = if config.relocates_at(at.step) { config.budget_at(at.step, start) } else { 0 };
@@ -36,14 +36,14 @@ impl Strategy for McmcStrategy {
         Ok(())
     }
 
-    fn uniforms(&self, at: At, to: &mut StepUniforms) {
+    fn uniforms(&self, at: StepContext, to: &mut StepUniforms) {
         passes::regularise(at, to);
         let rate = at.config.rates_at(at.step).position / at.config.rate_factor();
-        to.noise = (NOISE * rate / at.extent) as f32;
+        to.noise = (NOISE_PER_RATE * rate / at.extent) as f32;
     }
 
-    fn passes(&self, at: At) -> u32 {
-        passes::of(at) | passes::EXPLORE
+    fn passes(&self, at: StepContext) -> u32 {
+        passes::pass_bits(at) | passes::EXPLORE_BIT
     }
 
     fn planes(&self) -> &'static [Buf] {

@@ -12,8 +12,8 @@ pub mod weights;
 use adc::AdcStrategy;
 use budget::BudgetStrategy;
 use mcmc::McmcStrategy;
-pub(crate) use population::Bound;
-pub use population::{Densified, Population};
+pub(crate) use population::GaussianLimit;
+pub use population::{DensifyCounts, Population};
 
 use super::{StrategyKind, TrainConfig};
 use crate::error::Result;
@@ -30,7 +30,7 @@ use std::sync::Arc;
 pub(crate) const OPACITY_MIN: f32 = 0.005;
 
 /// Makes the strategy of a configuration.
-pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
+pub fn make(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {
         StrategyKind::Budget => Box::new(BudgetStrategy),
         StrategyKind::Mcmc => Box::new(McmcStrategy),
@@ -40,7 +40,7 @@ pub fn of(kind: StrategyKind) -> Box<dyn Strategy> {
 
 /// The step that a strategy decides about.
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a> {
+pub struct StepContext<'a> {
     /// Step, from 1.
     pub step: u32,
     /// The configuration.
@@ -49,7 +49,7 @@ pub struct At<'a> {
     pub extent: f64,
 }
 
-impl At<'_> {
+impl StepContext<'_> {
     /// Returns true for the last step of the run and beyond it.
     pub fn is_last(&self) -> bool {
         self.step >= self.config.iterations
@@ -63,36 +63,36 @@ pub trait Strategy: Debug + Send {
     fn name(&self) -> &'static str;
 
     /// Returns true if it acts after this step. The trainer then waits for the steps in flight.
-    fn acts_after(&self, _at: At) -> bool {
+    fn acts_after(&self, _at: StepContext) -> bool {
         false
     }
 
     /// Acts after such a step.
-    fn act(&mut self, _at: At, _population: &mut Population) -> Result<()> {
+    fn act(&mut self, _at: StepContext, _population: &mut Population) -> Result<()> {
         Ok(())
     }
 
     /// Returns true if the step updates the parameters.
-    fn updates(&self, _at: At) -> bool {
+    fn updates(&self, _at: StepContext) -> bool {
         true
     }
 
     /// Returns true if the depth of the model is unreliable right after this step. Votes and occluders then wait for
     /// their next turn.
-    fn blurs_depth_after(&self, _at: At) -> bool {
+    fn blurs_depth_after(&self, _at: StepContext) -> bool {
         false
     }
 
     /// Sets uniforms of a step.
-    fn uniforms(&self, _at: At, _to: &mut StepUniforms) {}
+    fn uniforms(&self, _at: StepContext, _to: &mut StepUniforms) {}
 
     /// Returns the passes to add to steps; called once. The default has those of the built-in strategies.
     fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(passes::Passes)
+        Arc::new(passes::StrategyPasses)
     }
 
     /// Returns the number of its pass list for a step, for [`Extension::extend`]. 0: the step has none of its passes.
-    fn passes(&self, _at: At) -> u32 {
+    fn passes(&self, _at: StepContext) -> u32 {
         0
     }
 
@@ -133,14 +133,14 @@ pub struct StrategyState {
 
 impl StrategyState {
     /// Returns the state of a strategy.
-    pub fn of(strategy: &dyn Strategy) -> Self {
+    pub fn from_strategy(strategy: &dyn Strategy) -> Self {
         let planes = strategy.planes().iter().map(|buf| TABLE[buf.index()].name.to_owned()).collect();
         Self { name: strategy.name().to_owned(), planes, value: strategy.keep() }
     }
 
     /// Restores a strategy of the same name and planes.
     pub fn restore(&self, strategy: &mut dyn Strategy) -> Result<(), String> {
-        let own = Self::of(strategy);
+        let own = Self::from_strategy(strategy);
         if (&own.name, &own.planes) != (&self.name, &self.planes) {
             return Err(format!("was made with the strategy {}, not {}", self.name, own.name));
         }

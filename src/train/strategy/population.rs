@@ -8,7 +8,7 @@ use crate::train::input::views::Views;
 
 /// Counts of a densification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Densified {
+pub struct DensifyCounts {
     /// Gaussians cloned.
     pub cloned: u32,
     /// Gaussians split.
@@ -18,7 +18,7 @@ pub struct Densified {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bound {
+pub(crate) struct GaussianLimit {
     /// Limit of the user or of the device.
     pub most: u64,
     /// Memory has limited the number, and the log says so.
@@ -28,13 +28,13 @@ pub(crate) struct Bound {
 /// The Gaussians on the device, with nothing in flight.
 pub struct Population<'a> {
     pub(in crate::train) engine: &'a mut Engine,
-    pub(in crate::train) bound: &'a mut Bound,
+    pub(in crate::train) bound: &'a mut GaussianLimit,
     pub(in crate::train) views: &'a Views,
     pub(in crate::train) uniforms: StepUniforms,
     pub(in crate::train) step: u32,
     pub(in crate::train) first_count: u32,
     /// Counts of the densification since the step.
-    pub(in crate::train) densified: Option<Densified>,
+    pub(in crate::train) densified: Option<DensifyCounts>,
 }
 
 impl Population<'_> {
@@ -65,7 +65,7 @@ impl Population<'_> {
 
     /// Clones, splits and prunes by the thresholds in `uniforms`, up to `budget` Gaussians and within the limit.
     /// Statistics start over.
-    pub fn densify(&mut self, uniforms: StepUniforms, budget: u64) -> Result<Densified> {
+    pub fn densify(&mut self, uniforms: StepUniforms, budget: u64) -> Result<DensifyCounts> {
         let wanted = self.count_densified(uniforms)?.densified_count;
         let mut most = self.most(wanted)?.min(budget);
         let (uniforms, counted) = loop {
@@ -81,13 +81,14 @@ impl Population<'_> {
         if counted.densified_count == 0 {
             return Err(Error::Pruned { step: self.step });
         }
-        let done = Densified { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count };
+        let done =
+            DensifyCounts { cloned: counted.cloned_count, split: counted.split_count, pruned: counted.pruned_count };
         self.densified = Some(done);
         Ok(done)
     }
 
     /// Removes some of the trained Gaussians and splits some others. Statistics start over.
-    pub fn replace(&mut self, remove: &[usize], split: &[usize]) -> Result<Densified> {
+    pub fn replace(&mut self, remove: &[usize], split: &[usize]) -> Result<DensifyCounts> {
         let mut marks = vec![[0.0; 2]; self.trained_count()];
         remove.iter().for_each(|&row| marks[row][1] = STAT_NEAR);
         split.iter().for_each(|&row| marks[row] = [1.0; 2]);
@@ -106,7 +107,7 @@ impl Population<'_> {
 
     /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`, within
     /// the limit. Each one drawn becomes a stack of copies that look like it. Statistics start over.
-    pub fn relocate(&mut self, uniforms: StepUniforms, wanted: u64) -> Result<Densified> {
+    pub fn relocate(&mut self, uniforms: StepUniforms, wanted: u64) -> Result<DensifyCounts> {
         let counted = self.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
         let (alive, weight) = (u64::from(self.count() - counted.pruned_count), counted.densified_count);
         if alive == 0 {
@@ -120,7 +121,7 @@ impl Population<'_> {
         let uniforms = StepUniforms { draws, draws_per_weight: draws as f32 / weight as f32, ..uniforms };
         let applied = self.engine.run(ListKey::RelocateApply, &uniforms)?.counters;
         self.engine.set_gaussian_count(applied.densified_count);
-        let done = Densified { cloned: applied.cloned_count, split: 0, pruned: applied.pruned_count };
+        let done = DensifyCounts { cloned: applied.cloned_count, split: 0, pruned: applied.pruned_count };
         self.densified = Some(done);
         Ok(done)
     }
@@ -133,7 +134,7 @@ impl Population<'_> {
             Err(error) if error.is_out_of_memory() && most > room => {
                 let hint = self.hint();
                 tracing::warn!("{error}; the number of Gaussians stays at {room} until the run is resumed{hint}");
-                *self.bound = Bound { most: room, by_memory: true };
+                *self.bound = GaussianLimit { most: room, by_memory: true };
                 Ok(Some(room))
             }
             made => made.map(|()| None),

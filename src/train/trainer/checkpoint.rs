@@ -1,7 +1,7 @@
 //! Checkpoints of a trainer. A resumed training gives the same bits as an uninterrupted one.
 
 use super::Trainer;
-use crate::engine::state::Copied;
+use crate::engine::state::StateCopy;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::scene::Dataset;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 pub struct PendingState {
     /// All but the planes.
     pub state: TrainState,
-    planes: Copied,
+    planes: StateCopy,
 }
 
 impl PendingState {
@@ -62,7 +62,7 @@ impl Trainer {
             views: self.fingerprints.clone(),
             occluders: self.occluders(),
             run: serde_json::Value::Null,
-            strategy: StrategyState::of(&*self.context.strategy),
+            strategy: StrategyState::from_strategy(&*self.context.strategy),
             shared: self.context.shared.kept(),
             planes: Vec::new(),
             path: PathBuf::new(),

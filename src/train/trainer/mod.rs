@@ -15,7 +15,7 @@ use crate::lab::fault;
 use crate::render::RenderOptions;
 use crate::scene::{Dataset, Gaussians};
 use crate::train::TrainConfig;
-use crate::train::between::{Jobs, When};
+use crate::train::between::{JobTime, TrainingJobs};
 use crate::train::context::Context;
 use crate::train::input::free_space;
 use crate::train::input::sampler::{self, ViewOrder};
@@ -25,7 +25,7 @@ use crate::train::report::StepReport;
 use crate::train::setup::near_plane;
 use crate::train::setup::{self, TrainerOptions, start_size};
 use crate::train::state::ViewFingerprint;
-use crate::train::strategy::Densified;
+use crate::train::strategy::DensifyCounts;
 use sentinel::Sentinel;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ use timing::Timing;
 /// A model in training.
 pub struct Trainer {
     context: Context,
-    jobs: Jobs,
+    jobs: TrainingJobs,
     order: ViewOrder,
     /// Submitted steps that are not retired yet, at most one per frame.
     in_flight: VecDeque<(StepInput, InFlight)>,
@@ -91,7 +91,7 @@ impl Trainer {
             let lists = context.lists_ahead();
             context.engine.compile_ahead(lists);
         }
-        let jobs = Jobs::new(&context.config);
+        let jobs = TrainingJobs::new(&context.config);
         Ok(Self {
             order: ViewOrder::new(context.config.seed, context.views.parts().len()),
             context,
@@ -132,7 +132,7 @@ impl Trainer {
     }
 
     /// Takes the counts of the last densification; none if they were taken before.
-    pub fn take_densified(&mut self) -> Option<Densified> {
+    pub fn take_densified(&mut self) -> Option<DensifyCounts> {
         self.jobs.growth.densified.take()
     }
 
@@ -162,19 +162,19 @@ impl Trainer {
     /// because some steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
-        let mut done = self.work(When::Before, step)?;
+        let mut done = self.work(JobTime::Before, step)?;
         let input = self.input(step)?;
         if fault::at("nan").is_some() {
             self.context.engine.spoil()?;
         }
         done.extend(self.submit_next(input)?);
         self.step = step;
-        done.extend(self.work(When::After, step)?);
+        done.extend(self.work(JobTime::After, step)?);
         Ok(done)
     }
 
     /// Does what is due before or after a step, after the steps in flight. Returns the reports of these.
-    fn work(&mut self, when: When, step: u32) -> Result<Vec<StepReport>> {
+    fn work(&mut self, when: JobTime, step: u32) -> Result<Vec<StepReport>> {
         let due: Vec<bool> = self.jobs.list(when).iter().map(|job| job.is_due(step, &self.context)).collect();
         let done = if due.contains(&true) { self.drain()? } else { Vec::new() };
         for (job, _) in self.jobs.list(when).into_iter().zip(due).filter(|(_, is_due)| *is_due) {
@@ -208,7 +208,7 @@ impl Trainer {
         };
         let disagrees = objective.has(Loss::Disagreement) && config.has_disagreement_at(step);
         let labels = labels && (!layers.is_empty() || disagrees);
-        let update = self.context.strategy.updates(self.context.at(step));
+        let update = self.context.strategy.updates(self.context.step_context(step));
         self.updates += u32::from(update);
         Ok(StepInput { step, part, layers, labels, update, updates: self.updates })
     }
@@ -250,7 +250,7 @@ impl Trainer {
             timing.note(&mut self.context.engine, input.step, flight.recording)?;
         }
         let Context { config, views, .. } = &self.context;
-        let report = StepReport::new(&input, views.of(&input)?, config, report);
+        let report = StepReport::new(&input, views.step_view(&input)?, config, report);
         self.sentinel.check(&report, &views[views.index(&input)].name)?;
         self.newest = Some(report);
         Ok(self.newest)

@@ -4,7 +4,7 @@ use super::Trainer;
 use crate::error::Result;
 use crate::label::vote::decide;
 use crate::scene::{Camera, ColourMatrix, Gaussians, Occluders};
-use crate::train::between::Between;
+use crate::train::between::StepJob;
 use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
@@ -78,7 +78,7 @@ impl Trainer {
 
     /// Returns the matrix of colours of each training photo, by name; none without exposure. Nothing may be in flight.
     pub fn exposures(&mut self) -> Result<BTreeMap<String, ColourMatrix>> {
-        let rows = self.context.photo_rows(exposure::NAME)?;
+        let rows = self.context.photo_rows(exposure::EXPOSURE_NAME)?;
         let matrices = rows.iter().map(|of| exposure::matrix_of(of));
         Ok(self.names().zip(matrices).collect())
     }

@@ -2,7 +2,7 @@
 //!
 //! * A *gradient* that is not finite, or above 1e18 so that its square overflows, counts as 0 in that step
 //!   (project_backward). The log counts them. The training ends after three steps in a row in which more than
-//!   [`SHARE_MAX`] of the splats have such gradients.
+//!   [`DROPPED_SHARE_MAX`] of the splats have such gradients.
 //! * A *parameter* that is not finite, or so large that its projection is not, is the fault of the device or of its
 //!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
 //!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](crate::train::Trainer::restore)).
@@ -10,11 +10,11 @@
 use crate::error::{Error, Result};
 use crate::train::report::StepReport;
 
-/// Share of the splats whose gradients may be dropped; [`COUNT_MAX`] are always accepted.
-const SHARE_MAX: f64 = 1e-3;
-const COUNT_MAX: u32 = 10;
+/// Share of the splats whose gradients may be dropped; [`DROPPED_COUNT_MAX`] are always accepted.
+const DROPPED_SHARE_MAX: f64 = 1e-3;
+const DROPPED_COUNT_MAX: u32 = 10;
 /// Number of successive steps above that share which ends a training.
-const STEPS_MAX: u32 = 3;
+const BAD_STEPS_MAX: u32 = 3;
 
 /// Gradients that were dropped.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,7 +45,7 @@ impl Sentinel {
             return Err(failure(format!("loss_reduce: the loss is {} and the label loss {}", losses[0], losses[1])));
         }
         let count = counters.nonfinite_count;
-        let most = COUNT_MAX.max((SHARE_MAX * f64::from(counters.visible_count)) as u32);
+        let most = DROPPED_COUNT_MAX.max((DROPPED_SHARE_MAX * f64::from(counters.visible_count)) as u32);
         self.bad_steps = if count > most { self.bad_steps + 1 } else { 0 };
         if count > 0 {
             self.dropped += u64::from(count);
@@ -60,10 +60,10 @@ impl Sentinel {
                 );
             }
         }
-        if self.bad_steps >= STEPS_MAX {
+        if self.bad_steps >= BAD_STEPS_MAX {
             return Err(failure(format!(
                 "project_backward dropped the gradients of {count} of {} Gaussians, the first is {}, and of more than \
-                 {most} in each of {STEPS_MAX} steps",
+                 {most} in each of {BAD_STEPS_MAX} steps",
                 counters.visible_count, counters.nonfinite_first
             )));
         }

@@ -3,7 +3,7 @@
 use super::Judge;
 use super::checks::bounds;
 use super::compare::{Tolerance, close, exact, pick, sure};
-use super::fixture::{Fixture, GRADIENTS, PARAMETERS};
+use super::fixture::{Fixture, GRADIENT_PLANES, PARAMETER_PLANES};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
 use crate::error::Result;
@@ -14,7 +14,7 @@ use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
 use crate::train::strategy::Strategy as _;
 use crate::train::strategy::budget::BudgetStrategy;
-use crate::train::strategy::passes::SMOOTH;
+use crate::train::strategy::passes::SMOOTH_BIT;
 
 /// Gaussians from a twentieth of a pixel to some pixels.
 pub fn fine(seed: u64) -> Scene {
@@ -35,7 +35,7 @@ pub fn around(seed: u64) -> Scene {
 pub fn step(fixture: &mut Fixture, leeway: f64) -> Result<Judge> {
     fixture.train()?;
     let splats = fixture.splats()?;
-    let (v_splats, rows) = (fixture.splat_gradients(&splats)?, fixture.rows(GRADIENTS, splats.len())?);
+    let (v_splats, rows) = (fixture.splat_gradients(&splats)?, fixture.rows(GRADIENT_PLANES, splats.len())?);
     let (model, camera) = (fixture.model(), fixture.scene.camera.clone());
     // Determinants of needles are differences: opacities have larger errors than without.
     let tolerance = Tolerance { absolute: 4e-5 * leeway, relative: 0.0 };
@@ -50,7 +50,7 @@ pub fn step(fixture: &mut Fixture, leeway: f64) -> Result<Judge> {
         let backward = |&at: &usize| project_backward(rules, &camera, &model, splats[at].gaussian, &v_splats[at]);
         let expected: Vec<Row> = sure.iter().map(backward).collect();
         let bounds = bounds(4e-6 / 8.0 * leeway, 4e-6 / 8.0 * leeway);
-        judge::all([of_splats, judge::rows(&pick(&rows, &sure), &expected, model.sh_degree, bounds)])
+        judge::combine([of_splats, judge::rows(&pick(&rows, &sure), &expected, model.sh_degree, bounds)])
     }))
 }
 
@@ -65,13 +65,13 @@ pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
         fixture.engine.raw_mut().upload(Buf::SCALES, 0, 0, &before)?;
         fixture.input.update = true;
         fixture.config.antialias = true;
-        fixture.engine.set_extension(BudgetStrategy.extension(), SMOOTH);
+        fixture.engine.set_extension(BudgetStrategy.extension(), SMOOTH_BIT);
         fixture.train_with(passes)?;
         let after = fixture.get::<[f32; 4]>(Buf::SCALES, before.len())?;
-        Ok((fixture.rows(PARAMETERS, before.len())?, before, after, fixture.scene.camera))
+        Ok((fixture.rows(PARAMETER_PLANES, before.len())?, before, after, fixture.scene.camera))
     };
     let (without, ..) = step(0)?;
-    let (with, before, after, camera) = step(SMOOTH)?;
+    let (with, before, after, camera) = step(SMOOTH_BIT)?;
     // A logarithm and a depth, some roundings each.
     let tolerance = Tolerance { absolute: 1e-6 * leeway, relative: 3e-7 * leeway };
     Ok(Box::new(move |rules: &Rules| {
@@ -92,6 +92,6 @@ pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
         };
         let wanted: Vec<f64> = sure.iter().flat_map(wanted).collect();
         let others = |rows: &[Row]| -> Vec<[u64; 3]> { rows.iter().map(|row| row.mean.map(f64::to_bits)).collect() };
-        judge::all([close(&found, &wanted, tolerance), exact(&others(&with), &others(&without))])
+        judge::combine([close(&found, &wanted, tolerance), exact(&others(&with), &others(&without))])
     }))
 }

@@ -1,10 +1,10 @@
 //! Each pass of a training step against the reference, on a small scene with labels.
 
 use super::compare::{Band, GradientBounds, Summary, Tolerance, Verdict, close, exact, gradients, pick, sure};
-use super::fixture::{Fixture, GRADIENTS, readable};
+use super::fixture::{Fixture, GRADIENT_PLANES, readable};
 use super::order::DepthOrder;
 use super::scenes::{Scene, Shape, dot, plain_camera, scene};
-use super::{LEEWAY, judge, model};
+use super::{ERROR_FACTOR, judge, model};
 use crate::engine::Report;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -27,17 +27,17 @@ use crate::train::strategy::weights::weights;
 use std::sync::Arc;
 
 /// Decisions (alpha 1/255, the stop) with a smaller distance to their threshold may go either way.
-const MARGIN: f64 = 1e-4;
-const COLOUR: Tolerance = Tolerance { absolute: 6.5e-7 * LEEWAY, relative: 0.0 };
-const CUT: Band = Band { width: MARGIN, flip: 0.01, ratio: 0.005 };
+const DECISION_MARGIN: f64 = 1e-4;
+const COLOUR_TOLERANCE: Tolerance = Tolerance { absolute: 6.5e-7 * ERROR_FACTOR, relative: 0.0 };
+const CUT_BAND: Band = Band { width: DECISION_MARGIN, flip: 0.01, ratio: 0.005 };
 
 pub(super) const fn bounds(element: f64, whole: f64) -> GradientBounds {
     GradientBounds {
-        element: Tolerance { absolute: element * LEEWAY, relative: 10.0 * element * LEEWAY },
+        element: Tolerance { absolute: element * ERROR_FACTOR, relative: 10.0 * element * ERROR_FACTOR },
         outliers: 0.0,
-        norm: whole * LEEWAY,
-        angle: whole * LEEWAY,
-        bias: whole * LEEWAY,
+        norm: whole * ERROR_FACTOR,
+        angle: whole * ERROR_FACTOR,
+        bias: whole * ERROR_FACTOR,
     }
 }
 
@@ -74,7 +74,7 @@ impl FinishedStep {
     /// Checks that visible Gaussians are in depth order, equal depths in row order.
     pub(super) fn order(&mut self) -> Result<Verdict> {
         let (count, visible) = (self.fixture.scene.gaussians.len(), self.splats.len());
-        let found = DepthOrder::of(&mut self.fixture)?;
+        let found = DepthOrder::read(&mut self.fixture)?;
         let by_depth: Vec<(u32, u32)> = found.keys.iter().copied().zip(found.gaussians).collect();
         if visible * 2 <= count || !by_depth.is_sorted_by(|a, b| a < b) {
             return Ok(Err(format!("{visible} of {count} Gaussians are visible, or they are not in depth order")));
@@ -82,13 +82,13 @@ impl FinishedStep {
         let depths: Vec<f64> = found.keys.iter().map(|&key| f64::from(f32::from_bits(key))).collect();
         let expected: Vec<f64> = self.splats.iter().map(|splat| splat.depth).collect();
         // Two sums of three products of some 4 units, in different kernels.
-        Ok(close(&depths, &expected, Tolerance { absolute: 1e-6 * LEEWAY, relative: 0.0 }))
+        Ok(close(&depths, &expected, Tolerance { absolute: 1e-6 * ERROR_FACTOR, relative: 0.0 }))
     }
 
     /// Checks centres, conics, opacities and colours of splats.
     pub(super) fn projection(&mut self) -> Result<Verdict> {
         // Centres are about 50 px times the rounding errors of a quotient.
-        let tolerance = Tolerance { absolute: 1.4e-5 * LEEWAY, relative: 0.0 };
+        let tolerance = Tolerance { absolute: 1.4e-5 * ERROR_FACTOR, relative: 0.0 };
         let place = (&self.fixture.scene.camera, &self.fixture.model());
         Ok(judge::projection(&self.rules, place, &self.splats, tolerance))
     }
@@ -129,7 +129,7 @@ impl FinishedStep {
         let image = self.pixels()?;
         let expected =
             blend_forward(&self.rules, &self.splats, self.fixture.size(), self.fixture.scene.target.background);
-        Ok(judge::picture(&image, &expected, (COLOUR, CUT)))
+        Ok(judge::picture(&image, &expected, (COLOUR_TOLERANCE, CUT_BAND)))
     }
 
     /// Checks L1, SSIM, and their gradient with respect to the picture.
@@ -140,13 +140,14 @@ impl FinishedStep {
         let expected = photo_loss(&self.rules, &image, photo);
         let counters = &self.report.counters;
         let sums = [counters.loss_l1, counters.loss_ssim].map(|sum| f64::from(sum) / photo.elements());
-        let values = close(&sums, &[expected.l1, expected.ssim], Tolerance { absolute: 1e-6 * LEEWAY, relative: 0.0 });
+        let values =
+            close(&sums, &[expected.l1, expected.ssim], Tolerance { absolute: 1e-6 * ERROR_FACTOR, relative: 0.0 });
         // Near its kink, the sign of L1 is not determined.
         let verdict = sure(expected.margins, 1e-5, 0.0).and_then(|sure| {
             let (actual, wanted) = (pick(&v_image, &sure), pick(&expected.v_image, &sure));
             gradients(actual.as_flattened(), wanted.as_flattened(), bounds(1.1e-6, 4.6e-6))
         });
-        Ok(judge::all([values, verdict]))
+        Ok(judge::combine([values, verdict]))
     }
 
     /// Checks the gradients of the splats in a step without object layers, from the device's own picture gradient.
@@ -155,7 +156,7 @@ impl FinishedStep {
         self.fixture.input.labels = false;
         self.fixture.train()?;
         let pixels = self.fixture.pixels();
-        let v_image = Upstream::of_colours(&colours(&self.fixture.get(Buf::V_IMAGE, pixels)?));
+        let v_image = Upstream::from_colours(&colours(&self.fixture.get(Buf::V_IMAGE, pixels)?));
         let splats = self.fixture.splats()?;
         let actual = self.fixture.splat_gradients(&splats)?;
         (self.fixture.input.labels, self.fixture.input.layers) = (true, layers);
@@ -187,7 +188,7 @@ impl FinishedStep {
             .collect();
         let expected = disagreement(&self.rules, &splats, &model.labels, self.fixture.size(), &pixels);
         // A sum of 2745 pixels in f32.
-        let tolerance = Tolerance { absolute: 0.0, relative: 2e-6 * LEEWAY };
+        let tolerance = Tolerance { absolute: 0.0, relative: 2e-6 * ERROR_FACTOR };
         let value = close(&[f64::from(with)], &[expected.value], tolerance);
         let of_logits = sure(expected.margins, 1e-5, 0.0).and_then(|sure| {
             let by_logit = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
@@ -196,7 +197,7 @@ impl FinishedStep {
             let actual = by_logit(&|row| of_labels[row].opacity - of_photo[row].opacity);
             gradients(&actual, &by_logit(&|row| expected.v_opacities[row]), bounds(4e-6, 4e-6))
         });
-        Ok(judge::all([value, of_logits]))
+        Ok(judge::combine([value, of_logits]))
     }
 
     /// Checks the gradient of photo loss and label losses with respect to every parameter.
@@ -218,7 +219,7 @@ impl FinishedStep {
             self.fixture.train()?;
             let (pixels, visible) = (self.fixture.pixels(), self.splats.len());
             let mut all: Vec<u32> = self.fixture.get::<u32>(Buf::IMAGE, pixels * 4)?;
-            for plane in [GRADIENTS[0], GRADIENTS[1], GRADIENTS[2], GRADIENTS[3]] {
+            for plane in [GRADIENT_PLANES[0], GRADIENT_PLANES[1], GRADIENT_PLANES[2], GRADIENT_PLANES[3]] {
                 all.extend(self.fixture.get::<u32>(plane, visible * 4)?);
             }
             Ok(all)
@@ -259,7 +260,7 @@ impl FinishedStep {
         let shown = label_map(&mut self.fixture.engine, &camera, near)?;
         let weights = self.fixture.get::<f32>(Buf::LABEL_WEIGHTS, pixels)?;
         let expected = lift::label_map(&self.rules, &self.splats, &labels, size);
-        Ok(judge::label_map((&shown.ids, &weights), &expected, (COLOUR, MARGIN)))
+        Ok(judge::label_map((&shown.ids, &weights), &expected, (COLOUR_TOLERANCE, DECISION_MARGIN)))
     }
 
     /// Checks the sums of blending weights of two views that are the same.
@@ -311,5 +312,5 @@ pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict>
     let expected = blend_forward(&Rules::default(), &splats, fixture.size(), fixture.scene.target.background);
     let pixels = fixture.pixels();
     let image = fixture.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
-    Ok(judge::picture(&image, &expected, (COLOUR, CUT)))
+    Ok(judge::picture(&image, &expected, (COLOUR_TOLERANCE, CUT_BAND)))
 }

@@ -110,7 +110,7 @@ pub struct Band {
 }
 
 /// With fewer flips, their signs are not significant.
-const FLIPS_TO_JUDGE: usize = 12;
+const FLIPS_MIN: usize = 12;
 
 /// Tight bounds outside the band; inside it, a limited share of bounded flips, balanced between both directions.
 /// `crossing(place, actual)` proves a flip: it returns true if the actual value is the result of the opposite decision.
@@ -147,7 +147,7 @@ pub fn close_with_band(
         return Err(format!("{} flips among {} elements, {allowed} are allowed", flips.len(), actual.len()));
     }
     let up = flips.iter().filter(|&&i| actual[i] > expected[i]).count();
-    if flips.len() >= FLIPS_TO_JUDGE && (up * 5 < flips.len() || up * 5 > 4 * flips.len()) {
+    if flips.len() >= FLIPS_MIN && (up * 5 < flips.len() || up * 5 > 4 * flips.len()) {
         return Err(format!("{} of {} flips go up: a bias, not rounding", up, flips.len()));
     }
     summary.flips = flips.len();

@@ -14,9 +14,9 @@ use crate::scene::{Camera, Occluders, Photo};
 use crate::scheduler::SchedulerOptions;
 use crate::scheduler::plan::{Buf, PlanOptions};
 use crate::shaders::structs::StepUniforms;
-use crate::train::input::step_input::{self, SceneScale, Shown, StepInput, StepView};
-use crate::train::setup::near_plane::NEAR;
-use crate::train::strategy::{self, At};
+use crate::train::input::step_input::{self, ObjectLight, SceneScale, StepInput, StepView};
+use crate::train::setup::near_plane::NEAR_DEFAULT;
+use crate::train::strategy::{self, StepContext};
 use crate::train::{LabelRule, TrainConfig};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ use std::f64::consts::LN_2;
 use std::sync::Arc;
 
 /// Planes of the parameters in the order of `plane_rows`.
-pub const PARAMETERS: [Buf; 7] = [Buf::MEANS, Buf::SCALES, Buf::QUATS, Buf::SH0, Buf::SH1, Buf::SH2, Buf::SH3];
+pub const PARAMETER_PLANES: [Buf; 7] = [Buf::MEANS, Buf::SCALES, Buf::QUATS, Buf::SH0, Buf::SH1, Buf::SH2, Buf::SH3];
 /// First moments.
 pub const MOMENTS_1: [Buf; 7] =
     [Buf::M_MEANS, Buf::M_SCALES, Buf::M_QUATS, Buf::M_SH0, Buf::M_SH1, Buf::M_SH2, Buf::M_SH3];
@@ -32,11 +32,11 @@ pub const MOMENTS_1: [Buf; 7] =
 pub const MOMENTS_2: [Buf; 7] =
     [Buf::U_MEANS, Buf::U_SCALES, Buf::U_QUATS, Buf::U_SH0, Buf::U_SH1, Buf::U_SH2, Buf::U_SH3];
 /// Gradients, by splat.
-pub const GRADIENTS: [Buf; 7] =
+pub const GRADIENT_PLANES: [Buf; 7] =
     [Buf::V_MEANS, Buf::V_SCALES, Buf::V_QUATS, Buf::V_SH0, Buf::V_SH1, Buf::V_SH2, Buf::V_SH3];
 
 /// Floats of each plane, and their positions in `Row::floats`: (floats, runs of (from, to, length)).
-pub(super) const LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
+pub(super) const PLANE_LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (4, &[(0, 0, 3), (3, 10, 1)]),
     (4, &[(0, 7, 3)]),
     (4, &[(0, 3, 4)]),
@@ -87,7 +87,7 @@ pub struct OwnView {
     pub occluders: Occluders,
     /// 1 / known depth of each pixel; empty without.
     pub depths: Vec<f32>,
-    shown: BTreeMap<u16, Shown>,
+    shown: BTreeMap<u16, ObjectLight>,
 }
 
 impl OwnView {
@@ -101,7 +101,7 @@ impl OwnView {
         let occluders = |slot: &ObjectPixel| (slot.label as u16, slot.occluders.iter().map(|&id| id as u16).collect());
         let photo = Photo { width: camera.width, height: camera.height, rgba };
         Self {
-            near: NEAR,
+            near: NEAR_DEFAULT,
             shown: step_input::shown_objects(&photo.rgba, &target.label_map),
             photo,
             occluders: target.slots.iter().map(occluders).collect(),
@@ -110,7 +110,7 @@ impl OwnView {
     }
 
     /// Returns the view of its scene for a step.
-    pub fn of_step<'a>(&'a self, scene: &'a Scene) -> StepView<'a> {
+    pub fn step_view<'a>(&'a self, scene: &'a Scene) -> StepView<'a> {
         let Self { near, photo, occluders, depths, shown } = self;
         let (camera, near, valid_pixels) = (&scene.camera, *near, step_input::valid_pixels(&photo.rgba));
         let (finest, view_labels) = (step_input::finest(camera), &scene.target.label_map[..]);
@@ -170,7 +170,7 @@ impl Fixture {
             label_weight: 1.0,
             label_alpha: 0.1,
             label_balance: true,
-            near: NEAR,
+            near: NEAR_DEFAULT,
             ..TrainConfig::adc()
         };
         let layers =
@@ -180,7 +180,8 @@ impl Fixture {
         let fixed = SceneScale { extent: 1.0 };
         let (free_space, layered, shared) = (None, false, Vec::new());
         let mut fixture = Self { view, engine, scene, input, config, fixed, free_space, layered, shared };
-        let weights = step_input::layer_weights(&fixture.input, fixture.view.of_step(&fixture.scene), &fixture.config);
+        let weights =
+            step_input::layer_weights(&fixture.input, fixture.view.step_view(&fixture.scene), &fixture.config);
         fixture.scene.target.slots.iter_mut().zip(weights).for_each(|(slot, weight)| slot.weight = f64::from(weight));
         Ok(fixture)
     }
@@ -188,12 +189,12 @@ impl Fixture {
     /// The uniforms of the step.
     pub fn uniforms(&self) -> StepUniforms {
         let mut uniforms =
-            step_input::uniforms(&self.input, self.view.of_step(&self.scene), &self.config, self.fixed, &self.engine);
+            step_input::uniforms(&self.input, self.view.step_view(&self.scene), &self.config, self.fixed, &self.engine);
         if let Some((camera, near)) = &self.free_space {
             uniforms = self.engine.with_free_space(uniforms, camera, *near);
         }
-        let at = At { step: self.input.step, config: &self.config, extent: self.fixed.extent };
-        strategy::of(self.config.strategy).uniforms(at, &mut uniforms);
+        let at = StepContext { step: self.input.step, config: &self.config, extent: self.fixed.extent };
+        strategy::make(self.config.strategy).uniforms(at, &mut uniforms);
         uniforms
     }
 
@@ -230,7 +231,7 @@ impl Fixture {
     /// The splats of the sorted (splat, tile) pairs, by their place in the order of depth.
     pub fn sorted_splats(&mut self, count: usize) -> Result<Vec<u32>> {
         let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count)?;
-        let (places, ranks) = (self.sorted_pairs(count)?.1, DepthOrder::of(self)?.ranks());
+        let (places, ranks) = (self.sorted_pairs(count)?.1, DepthOrder::read(self)?.ranks());
         let rank = |place: u32| ranks.get(*splat_from_instance.get(place as usize)? as usize).copied();
         Ok(places.into_iter().map(|place| rank(place).unwrap_or(u32::MAX)).collect())
     }
@@ -252,15 +253,20 @@ impl Fixture {
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
         self.layered = matches!(key, ListKey::Train(of) | ListKey::Extended(of, _) if of.supervision.has_layers());
-        let data =
-            step_input::train_input(&self.input, self.view.of_step(&self.scene), &self.config, uniforms, &self.engine);
+        let data = step_input::train_input(
+            &self.input,
+            self.view.step_view(&self.scene),
+            &self.config,
+            uniforms,
+            &self.engine,
+        );
         self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
     }
 
     /// Writes the host inputs of a step, for the caller's own lists.
     pub fn write(&mut self) -> Result<()> {
         let uniforms = self.uniforms();
-        let view = self.view.of_step(&self.scene);
+        let view = self.view.step_view(&self.scene);
         let data = step_input::train_input(&self.input, view, &self.config, uniforms, &self.engine);
         self.engine.write(0, Input::Train(&data))
     }
@@ -289,7 +295,7 @@ impl Fixture {
 
     /// Splats of the device, by depth.
     pub fn splats(&mut self) -> Result<Vec<Splat>> {
-        let order = DepthOrder::of(self)?;
+        let order = DepthOrder::read(self)?;
         let records = self.get::<[f32; 12]>(Buf::SPLATS, order.splats.len())?;
         // The mirrors look these Gaussians up.
         let count = self.scene.gaussians.len();
@@ -303,7 +309,7 @@ impl Fixture {
     /// Gradients of the splats, by depth.
     pub fn splat_gradients(&mut self, splats: &[Splat]) -> Result<Vec<SplatGradient>> {
         let records = self.get::<[f32; 12]>(Buf::V_SPLATS, splats.len())?;
-        let records = DepthOrder::of(self)?.sorted(&records);
+        let records = DepthOrder::read(self)?.sorted(&records);
         let wide = |record: &[f32; 12]| record.map(f64::from);
         let gradients = (records.iter().map(wide).zip(splats))
             .map(|(v, splat)| SplatGradient {
@@ -322,7 +328,7 @@ impl Fixture {
         let mut floats = vec![[0.0; ROW_FLOATS]; count];
         // Bands of colour above the degree have no plane.
         let there = 4 + self.config.sh_degree as usize;
-        for (plane, (stride, runs)) in planes.into_iter().zip(LAYOUT).take(there) {
+        for (plane, (stride, runs)) in planes.into_iter().zip(PLANE_LAYOUT).take(there) {
             let values = self.get::<f32>(plane, count * stride)?;
             for (row, values) in floats.iter_mut().zip(values.chunks_exact(stride)) {
                 for &(from, to, length) in runs {
@@ -330,15 +336,15 @@ impl Fixture {
                 }
             }
         }
-        if planes == GRADIENTS {
-            floats = DepthOrder::of(self)?.sorted(&floats);
+        if planes == GRADIENT_PLANES {
+            floats = DepthOrder::read(self)?.sorted(&floats);
         }
         Ok(floats.iter().map(Row::from_floats).collect())
     }
 
     /// Writes a set of planes; rows must hold f32 values.
     pub fn put_rows(&mut self, planes: [Buf; 7], rows: &[Row]) -> Result<()> {
-        for (plane, (stride, runs)) in planes.into_iter().zip(LAYOUT) {
+        for (plane, (stride, runs)) in planes.into_iter().zip(PLANE_LAYOUT) {
             let mut values = vec![0.0_f32; rows.len() * stride];
             for (row, values) in rows.iter().zip(values.chunks_exact_mut(stride)) {
                 let floats = row.floats();
@@ -353,14 +359,14 @@ impl Fixture {
 
     /// Parameters of `count` Gaussians, and both moments of `trained` ones.
     pub fn planes(&mut self, count: usize, trained: usize) -> Result<[Vec<Row>; 3]> {
-        let (rows, [m, u]) = (self.rows(PARAMETERS, count)?, self.moments(trained)?);
+        let (rows, [m, u]) = (self.rows(PARAMETER_PLANES, count)?, self.moments(trained)?);
         Ok([rows, m, u])
     }
 
     /// Gradients of the last step by Gaussian; 0 without a splat.
     pub fn gradient_rows(&mut self) -> Result<Vec<Row>> {
         let splats = self.splats()?;
-        let by_splat = self.rows(GRADIENTS, splats.len())?;
+        let by_splat = self.rows(GRADIENT_PLANES, splats.len())?;
         let mut rows = vec![Row::default(); self.scene.gaussians.len()];
         for (splat, row) in splats.iter().zip(by_splat) {
             if let Some(to) = rows.get_mut(splat.gaussian) {

@@ -3,9 +3,9 @@
 use super::compare::{
     Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients, pick, sure,
 };
-use crate::reference::adam::{Optimised, Rates};
-use crate::reference::blend::Blended;
-use crate::reference::lift::Labelled;
+use crate::reference::adam::{AdamState, Rates};
+use crate::reference::blend::BlendedImage;
+use crate::reference::lift::PixelLabel;
 use crate::reference::model::flatten;
 use crate::reference::project::project_forward;
 use crate::reference::splat::{Splat, SplatGradient};
@@ -13,7 +13,7 @@ use crate::reference::{Group, Model, Row, Rules};
 use crate::scene::Camera;
 
 /// Combines several verdicts.
-pub fn all(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
+pub fn combine(verdicts: impl IntoIterator<Item = Verdict>) -> Verdict {
     let mut worst = Summary::default();
     for verdict in verdicts {
         let summary = verdict?;
@@ -58,7 +58,7 @@ fn splat_floats(splat: &Splat, scale: &Splat) -> [f64; 10] {
 }
 
 /// Compares colours and transmittance of each pixel; pixels with a decision in the band may flip.
-pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tolerance, Band)) -> Verdict {
+pub fn picture(actual: &[[f32; 4]], expected: &BlendedImage, (tolerance, band): (Tolerance, Band)) -> Verdict {
     let wanted: Vec<f64> =
         expected.pixels.iter().flat_map(|p| [p.colour[0], p.colour[1], p.colour[2], p.transmittance]).collect();
     let actual: Vec<f64> = actual.as_flattened().iter().map(|&v| f64::from(v)).collect();
@@ -70,13 +70,13 @@ pub fn picture(actual: &[[f32; 4]], expected: &Blended, (tolerance, band): (Tole
 /// Compares label and weight of each pixel with a margin above `margin` (more than 95 % of all).
 pub fn label_map(
     (ids, weights): (&[u16], &[f32]),
-    expected: &[Labelled],
+    expected: &[PixelLabel],
     (tolerance, margin): (Tolerance, f64),
 ) -> Verdict {
     let sure = sure(expected.iter().map(|pixel| pixel.margin), margin, 0.95)?;
     let labels: (Vec<u32>, Vec<u32>) = sure.iter().map(|&i| (u32::from(ids[i]), expected[i].label)).unzip();
     let sums: (Vec<f64>, Vec<f64>) = sure.iter().map(|&i| (f64::from(weights[i]), expected[i].weight)).unzip();
-    all([exact(&labels.0, &labels.1), close(&sums.0, &sums.1, tolerance)])
+    combine([exact(&labels.0, &labels.1), close(&sums.0, &sums.1, tolerance)])
 }
 
 /// Compares gradients of splats with a margin above `margin` (more than 70 % of all), each kind of float separately.
@@ -94,7 +94,7 @@ pub fn splat_gradients(
         ("opacity", |v| vec![v.opacity]),
         ("colour", |v| v.colour.to_vec()),
     ];
-    all(kinds.into_iter().map(|(name, floats)| {
+    combine(kinds.into_iter().map(|(name, floats)| {
         let of = |list: &[SplatGradient]| list.iter().flat_map(floats).collect::<Vec<f64>>();
         gradients(&of(&actual), &of(&expected), bounds).map_err(|text| format!("{name}: {text}"))
     }))
@@ -103,7 +103,7 @@ pub fn splat_gradients(
 /// Compares rows of gradients, each group of floats separately, because their magnitudes are unrelated.
 pub fn rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBounds) -> Verdict {
     let active = Group::ALL.into_iter().take(5 + degree as usize);
-    all(active.map(|group| {
+    combine(active.map(|group| {
         gradients(&flatten(actual, group), &flatten(expected, group), bounds)
             .map_err(|text| format!("{group:?}: {text}"))
     }))
@@ -112,7 +112,7 @@ pub fn rows(actual: &[Row], expected: &[Row], degree: u32, bounds: GradientBound
 /// Compares parameters and moments after an update. Errors are in units of the expected rounding error of an f32
 /// parameter and of its update (a few roundings, and the host's bias correction, which uses the nearest f32 of 0.999:
 /// 1.3e-5 of 1 - 0.999).
-pub fn updates(actual: &[Optimised], expected: &[Optimised], rates: &Rates) -> Verdict {
+pub fn updates(actual: &[AdamState], expected: &[AdamState], rates: &Rates) -> Verdict {
     let mut pairs = (Vec::new(), Vec::new());
     for (a, e) in actual.iter().zip(expected) {
         let (a, e) = ([a.row, a.m, a.u].map(|r| r.floats()), [e.row, e.m, e.u].map(|r| r.floats()));

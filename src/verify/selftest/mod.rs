@@ -29,7 +29,7 @@ use std::time::Instant;
 
 /// Vulkan allows `exp2`, division, square roots and similar functions an error of several units in the last place;
 /// lavapipe's error is about one. Bounds are this many times those of the tests on lavapipe.
-const LEEWAY: f64 = 8.0;
+const ERROR_FACTOR: f64 = 8.0;
 
 /// Compares what a device did with the reference under some rules.
 pub type Judge = Box<dyn Fn(&Rules) -> Verdict>;
@@ -60,7 +60,7 @@ pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
 
 /// Same as [`run`], against different rules, to prove that the checks can fail.
 pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -> Result<()> {
-    let kernels = KernelShape::of(gpu.capabilities());
+    let kernels = KernelShape::for_device(gpu.capabilities());
     let other = KernelShape { texel: !kernels.texel, ..kernels };
     passes(rules, gpu, kernels, "", &mut done)?;
     passes(rules, gpu, other, if other.texel { ", texel reads" } else { ", storage reads" }, &mut done)?;
@@ -69,13 +69,13 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
 }
 
 /// Passes checks on as they end.
-struct Clock<F> {
+struct CheckClock<F> {
     /// End of the check before.
     last: Instant,
     done: F,
 }
 
-impl<F: FnMut(Check)> Clock<F> {
+impl<F: FnMut(Check)> CheckClock<F> {
     fn new(done: F) -> Self {
         Self { last: Instant::now(), done }
     }
@@ -88,7 +88,7 @@ impl<F: FnMut(Check)> Clock<F> {
 
 /// Runs the checks of a long list and of a training.
 pub fn wholes(gpu: &Arc<Gpu>, kernels: KernelShape, done: impl FnMut(Check)) -> Result<()> {
-    let mut clock = Clock::new(done);
+    let mut clock = CheckClock::new(done);
     clock.ended("70,000 splats in a tile".to_owned(), checks::long_list(gpu, kernels)?);
     clock.ended("training twice, bit by bit".to_owned(), training::twice(gpu, kernels)?);
     Ok(())
@@ -102,7 +102,7 @@ pub fn passes(
     suffix: &str,
     done: impl FnMut(Check),
 ) -> Result<()> {
-    let mut clock = Clock::new(done);
+    let mut clock = CheckClock::new(done);
     let mut step = FinishedStep::new(rules, gpu, kernels)?;
     type Pass = fn(&mut FinishedStep) -> Result<Verdict>;
     let passes: [(&str, Pass); 14] = [
@@ -152,7 +152,7 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
     /// A densification of Gaussians below and above each threshold.
     fn densified(rig: &Rig, splits_long: bool) -> Result<Judge> {
         let before = population(710, 500);
-        let tolerance = Tolerance { absolute: 3.5e-7, relative: 3.5e-8 }.times(LEEWAY);
+        let tolerance = Tolerance { absolute: 3.5e-7, relative: 3.5e-8 }.times(ERROR_FACTOR);
         model::densification(&mut rig.fixture(scene_of(&before))?, before, (600, splits_long), tolerance)
     }
     type Change = fn(&Rig) -> Result<Judge>;
@@ -174,22 +174,22 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
         ("marks of fog", |rig| model::fog(&mut rig.fixture(model::large(63))?)),
         ("relocation", |rig| {
             let before = population(711, 200);
-            relocation::relocation(&mut rig.fixture(scene_of(&before))?, before, 300, LEEWAY)
+            relocation::relocation(&mut rig.fixture(scene_of(&before))?, before, 300, ERROR_FACTOR)
         }),
         ("random moves", relocation::random_moves),
         ("reset of opacities", |rig| {
             let before = population(120, 300);
-            model::reset(&mut rig.fixture(scene_of(&before))?, before, LEEWAY)
+            model::reset(&mut rig.fixture(scene_of(&before))?, before, ERROR_FACTOR)
         }),
         ("exposure of a photo", exposure::step),
         ("pose of a photo", pose::step),
         ("antialiased splats and their gradient", |rig| {
-            antialias::step(&mut rig.fixture(antialias::fine(93))?, LEEWAY)
+            antialias::step(&mut rig.fixture(antialias::fine(93))?, ERROR_FACTOR)
         }),
-        ("least sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), LEEWAY)),
+        ("least sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), ERROR_FACTOR)),
         ("lift of labels by the paper's rule", |rig| model::lift(&mut rig.fixture(model::dominant(131))?)),
     ];
-    let (mut clock, rig) = (Clock::new(done), Rig { gpu, kernels });
+    let (mut clock, rig) = (CheckClock::new(done), Rig { gpu, kernels });
     for (name, change) in changes {
         let judge = change(&rig)?;
         clock.ended(name.to_owned(), judge(rules));

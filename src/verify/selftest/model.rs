@@ -2,14 +2,14 @@
 
 use super::Judge;
 use super::compare::{Tolerance, Verdict, close, exact, pick, sure};
-use super::fixture::{Fixture, PARAMETERS};
+use super::fixture::{Fixture, PARAMETER_PLANES};
 use super::judge;
 use super::scenes::{Scene, Shape, scene};
 use crate::engine::ListKey;
 use crate::error::Result;
-use crate::reference::adam::{Optimised, Rates};
+use crate::reference::adam::{AdamState, Rates};
 use crate::reference::blend::blend_forward;
-use crate::reference::densify::{Densified, Origin, Population, densify, is_near, mark, opacity_reset};
+use crate::reference::densify::{DensifiedPopulation, Origin, Population, densify, is_near, mark, opacity_reset};
 use crate::reference::lift::{Masks, centres_of, lift_resolve};
 use crate::reference::model::floats;
 use crate::reference::random::normal_draw;
@@ -22,12 +22,12 @@ use crate::train::strategy::OPACITY_MIN;
 use crate::train::strategy::Strategy as _;
 use crate::train::strategy::adc::{CLONED_MAX, SCALE_MAX, prunes_large_at};
 use crate::train::strategy::budget::BudgetStrategy;
-use crate::train::strategy::passes::FREE_SPACE;
+use crate::train::strategy::passes::FREE_SPACE_BIT;
 use glam::DVec3;
 
 pub(super) const SEED: u32 = 0x1234_5678;
 /// Box in which Gaussians of the strategies budget and mcmc grow, turned against the world: a half of the populations.
-pub(super) const GROW: Zone = Zone {
+pub(super) const GROW_ZONE: Zone = Zone {
     axes: [DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.8, 0.6, 0.0), DVec3::Z],
     low: DVec3::new(0.0, f64::NEG_INFINITY, -64.0),
     high: DVec3::new(64.0, f64::INFINITY, 64.0),
@@ -45,9 +45,9 @@ pub fn adam(fixture: &mut Fixture, steps: u32) -> Result<Judge> {
     }
     fixture.input.update = false;
     Ok(Box::new(move |rules: &Rules| {
-        judge::all(done.iter().map(|(step, rates, before, gradients, after)| {
+        judge::combine(done.iter().map(|(step, rates, before, gradients, after)| {
             let mirror = |(state, gradient)| adam::adam(rules, rates, *step, state, gradient);
-            let expected: Vec<Optimised> = before.iter().zip(gradients).map(mirror).collect();
+            let expected: Vec<AdamState> = before.iter().zip(gradients).map(mirror).collect();
             judge::updates(after, &expected, rates)
         }))
     }))
@@ -61,10 +61,10 @@ pub(super) fn rates_of(fixture: &Fixture) -> Rates {
 }
 
 /// Parameters and moments of the trained Gaussians.
-pub(super) fn states(fixture: &mut Fixture) -> Result<Vec<Optimised>> {
+pub(super) fn states(fixture: &mut Fixture) -> Result<Vec<AdamState>> {
     let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
     let [rows, m, u] = fixture.planes(count, count)?;
-    Ok((0..count).map(|i| Optimised { row: rows[i], m: m[i], u: u[i] }).collect())
+    Ok((0..count).map(|i| AdamState { row: rows[i], m: m[i], u: u[i] }).collect())
 }
 
 /// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
@@ -95,7 +95,7 @@ pub(super) fn holding(
 }
 
 /// A population after a change of its number.
-pub(super) struct Changed {
+pub(super) struct ChangedPopulation {
     frozen: usize,
     /// Parameters, and both moments of the trained Gaussians.
     planes: [Vec<Row>; 3],
@@ -103,7 +103,7 @@ pub(super) struct Changed {
     stats: Vec<f32>,
 }
 
-impl Changed {
+impl ChangedPopulation {
     /// Reads back `count` Gaussians.
     pub(super) fn read(fixture: &mut Fixture, count: u32, frozen: usize) -> Result<Self> {
         let (count, trained) = (count as usize, count as usize - frozen);
@@ -113,7 +113,7 @@ impl Changed {
     }
 
     /// Compares with the reference. Everything must be equal, except that parameters may differ by `tolerance`.
-    pub(super) fn compare(&self, expected: &Densified, tolerance: Tolerance) -> Verdict {
+    pub(super) fn compare(&self, expected: &DensifiedPopulation, tolerance: Tolerance) -> Verdict {
         let nearest = expected.margins.iter().copied().fold(f64::INFINITY, f64::min);
         if nearest <= 1e-6 {
             return Err(format!("a decision of this seed is too close to a threshold: distance {nearest}"));
@@ -138,12 +138,12 @@ pub fn densification(
 ) -> Result<Judge> {
     let rows = before.model.rows.len();
     fixture.engine.make_room_for_gaussians(2 * rows as u64 + 1)?;
-    let grow_box = splits_long.then_some(GROW);
+    let grow_box = splits_long.then_some(GROW_ZONE);
     let uniforms = holding(fixture, &before, step, (splits_long, grow_box.as_ref()))?;
     let counted = fixture.engine.run(ListKey::DensifyCount, &uniforms)?.counters;
     let marks = fixture.get::<u32>(Buf::CHILDREN_COUNTS, rows)?;
     let applied = fixture.engine.run(ListKey::DensifyApply, &uniforms)?.counters;
-    let after = Changed::read(fixture, counted.densified_count, before.frozen)?;
+    let after = ChangedPopulation::read(fixture, counted.densified_count, before.frozen)?;
     Ok(Box::new(move |rules: &Rules| {
         let normal = |row: usize, child: u32, axis: usize| normal_draw(SEED, row as u32, 3 * child + axis as u32);
         let rules = &Rules { splits_long, grow_box, ..rules.clone() };
@@ -234,10 +234,10 @@ pub fn fog(fixture: &mut Fixture) -> Result<Judge> {
     fixture.view.near = NEAR;
     fixture.free_space = Some((other, OTHER_NEAR));
     fixture.input.update = true;
-    fixture.engine.set_extension(BudgetStrategy.extension(), FREE_SPACE);
-    fixture.train_with(FREE_SPACE)?;
+    fixture.engine.set_extension(BudgetStrategy.extension(), FREE_SPACE_BIT);
+    fixture.train_with(FREE_SPACE_BIT)?;
     let count = fixture.scene.gaussians.len();
-    let (stats, rows) = (fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?, fixture.rows(PARAMETERS, count)?);
+    let (stats, rows) = (fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?, fixture.rows(PARAMETER_PLANES, count)?);
     Ok(Box::new(move |rules: &Rules| {
         let rules = Rules { near: f64::from(NEAR), ..rules.clone() };
         let decide = |row: &Row| is_near(&rules, &camera, Some((centre, f64::from(OTHER_NEAR))), row);

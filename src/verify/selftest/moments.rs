@@ -2,25 +2,25 @@
 
 use super::Judge;
 use super::compare::{Summary, Tolerance, Verdict, close};
-use super::fixture::{Fixture, LAYOUT, MOMENTS_1, MOMENTS_2, PARAMETERS};
+use super::fixture::{Fixture, MOMENTS_1, MOMENTS_2, PARAMETER_PLANES, PLANE_LAYOUT};
 use super::judge;
 use super::model::rates_of;
 use super::scenes::Scene;
 use super::update::partly_frozen;
 use crate::error::Result;
-use crate::reference::adam::{Optimised, Rates};
+use crate::reference::adam::{AdamState, Rates};
 use crate::reference::densify::Population;
 use crate::reference::model::ROW_FLOATS;
 use crate::reference::moments::{draw, pack, unpack};
 use crate::reference::{Group, Row, Rules, adam, lazy};
 
 /// What a Gaussian draws to catch up, after what it draws in a step: planes of attributes.
-const PLANES: u32 = 7;
+const ATTRIBUTE_PLANES: u32 = 7;
 /// Share of the words that have the bits of the mirror: a logarithm is off by up to 2^-12 of a step.
-const EQUAL: f64 = 0.97;
+const EQUAL_SHARE_MIN: f64 = 0.97;
 
 /// Where a parameter is on the device.
-struct Place {
+struct ParameterSlot {
     plane: usize,
     /// Floats of a row of the plane.
     floats: usize,
@@ -29,9 +29,9 @@ struct Place {
     at: usize,
 }
 
-impl Place {
+impl ParameterSlot {
     fn all() -> impl Iterator<Item = Self> {
-        LAYOUT.into_iter().enumerate().flat_map(|(plane, (floats, runs))| {
+        PLANE_LAYOUT.into_iter().enumerate().flat_map(|(plane, (floats, runs))| {
             runs.iter().flat_map(move |&(from, to, length)| {
                 (0..length).map(move |i| Self { plane, floats, offset: from + i, at: to + i })
             })
@@ -41,7 +41,7 @@ impl Place {
     /// What its word draws in a step with this seed; `late`: when it catches up.
     fn draw(&self, seed: u32, row: usize, late: bool) -> u32 {
         let element = row * (self.floats / 4) + self.offset / 4;
-        let plane = self.plane as u32 + if late { PLANES } else { 0 };
+        let plane = self.plane as u32 + if late { ATTRIBUTE_PLANES } else { 0 };
         draw(seed, element as u32, plane, self.offset as u32 % 4)
     }
 }
@@ -69,9 +69,10 @@ impl Fixture {
     /// Words of packed moments of `count` Gaussians.
     fn words(&mut self, count: usize) -> Result<Vec<[u32; ROW_FLOATS]>> {
         let mut words = vec![[0; ROW_FLOATS]; count];
-        let planes = MOMENTS_1.into_iter().zip(LAYOUT).map(|(plane, (floats, _))| self.get(plane, count * floats));
+        let planes =
+            MOMENTS_1.into_iter().zip(PLANE_LAYOUT).map(|(plane, (floats, _))| self.get(plane, count * floats));
         let planes = planes.collect::<Result<Vec<Vec<u32>>>>()?;
-        for place in Place::all() {
+        for place in ParameterSlot::all() {
             let of_row = planes[place.plane].chunks_exact(place.floats);
             words.iter_mut().zip(of_row).for_each(|(row, all)| row[place.at] = all[place.offset]);
         }
@@ -95,9 +96,9 @@ impl Fixture {
             return self.put_rows(MOMENTS_2, u);
         }
         let words: Vec<[u32; ROW_FLOATS]> = m.iter().zip(u).map(|(m, u)| words_of(m, u)).collect();
-        for (index, (plane, (floats, _))) in MOMENTS_1.into_iter().zip(LAYOUT).enumerate() {
+        for (index, (plane, (floats, _))) in MOMENTS_1.into_iter().zip(PLANE_LAYOUT).enumerate() {
             let mut of_plane = vec![0; words.len() * floats];
-            for place in Place::all().filter(|place| place.plane == index) {
+            for place in ParameterSlot::all().filter(|place| place.plane == index) {
                 let rows = of_plane.chunks_exact_mut(floats).zip(&words);
                 rows.for_each(|(row, words)| row[place.offset] = words[place.at]);
             }
@@ -115,31 +116,31 @@ pub fn away(seed: u64) -> Scene {
 }
 
 /// Parameters, and the words of their moments.
-struct State {
+struct MomentState {
     rows: Vec<Row>,
     words: Vec<[u32; ROW_FLOATS]>,
 }
 
-impl State {
+impl MomentState {
     /// Reads that of `count` Gaussians.
     fn read(fixture: &mut Fixture, count: usize) -> Result<Self> {
-        Ok(Self { rows: fixture.rows(PARAMETERS, count)?, words: fixture.words(count)? })
+        Ok(Self { rows: fixture.rows(PARAMETER_PLANES, count)?, words: fixture.words(count)? })
     }
 
     /// Returns a Gaussian with its moments.
-    fn optimised(&self, rules: &Rules, row: usize) -> Optimised {
+    fn optimised(&self, rules: &Rules, row: usize) -> AdamState {
         let [m, u] = unpacked(rules, &self.words[row]);
-        Optimised { row: self.rows[row], m, u }
+        AdamState { row: self.rows[row], m, u }
     }
 }
 
 /// A step between two states.
-struct Done {
+struct StepChange {
     step: u32,
     seed: u32,
     rates: Rates,
     gradients: Vec<Row>,
-    states: [State; 2],
+    states: [MomentState; 2],
 }
 
 /// Runs steps with packed moments. With `split`, which has gradients of the same model, Gaussians may be late: then all catch up.
@@ -151,12 +152,12 @@ pub fn packed(fixture: &mut Fixture, mut split: Option<&mut Fixture>) -> Result<
     fixture.input.update = true;
     for step in 1..=4 {
         (fixture.input.step, fixture.input.updates) = (step, step);
-        let before = State::read(fixture, count)?;
+        let before = MomentState::read(fixture, count)?;
         let gradients = match &mut split {
             Some(split) => {
                 (split.input.step, split.input.updates) = (step, step);
-                let rows = fixture.rows(PARAMETERS, all)?;
-                split.put_rows(PARAMETERS, &rows)?;
+                let rows = fixture.rows(PARAMETER_PLANES, all)?;
+                split.put_rows(PARAMETER_PLANES, &rows)?;
                 split.train()?;
                 fixture.train()?;
                 fixture.engine.catch_up()?;
@@ -167,15 +168,15 @@ pub fn packed(fixture: &mut Fixture, mut split: Option<&mut Fixture>) -> Result<
                 fixture.gradient_rows()?
             }
         };
-        let (seed, states) = (fixture.uniforms().seed, [before, State::read(fixture, count)?]);
-        done.push(Done { step, seed, rates: rates_of(fixture), gradients, states });
+        let (seed, states) = (fixture.uniforms().seed, [before, MomentState::read(fixture, count)?]);
+        done.push(StepChange { step, seed, rates: rates_of(fixture), gradients, states });
     }
-    Ok(Box::new(move |rules: &Rules| judge::all(done.iter().map(|step| step.judge(rules, is_late)))))
+    Ok(Box::new(move |rules: &Rules| judge::combine(done.iter().map(|step| step.judge(rules, is_late)))))
 }
 
-impl Done {
+impl StepChange {
     /// Returns a Gaussian after the step, what it drew from, and whether it was late.
-    fn expected(&self, rules: &Rules, row: usize, is_late: bool) -> (Optimised, u32, bool) {
+    fn expected(&self, rules: &Rules, row: usize, is_late: bool) -> (AdamState, u32, bool) {
         let (state, gradient) = (self.states[0].optimised(rules, row), &self.gradients[row]);
         if is_late && *gradient == Row::default() {
             let missed = [lazy::corrected(rules, &self.rates, self.step)];
@@ -196,7 +197,7 @@ impl Done {
             let found = after.rows[row].floats();
             let mut rates = [0.0; ROW_FLOATS];
             Group::ALL.into_iter().zip(self.rates.0).for_each(|(g, rate)| rates[g.range()].fill(rate));
-            for place in Place::all() {
+            for place in ParameterSlot::all() {
                 let at = place.at;
                 let word = pack(rules, (first[at], second[at]), place.draw(seed, row, was_late));
                 let (m, u) = unpack(rules, after.words[row][at]);
@@ -215,10 +216,10 @@ impl Done {
             }
         }
         let share = f64::from(equal as u32) / f64::from(words.max(1) as u32);
-        if share < EQUAL || words == 0 || (is_late && late == 0) {
+        if share < EQUAL_SHARE_MIN || words == 0 || (is_late && late == 0) {
             return Err(format!("{share:.4} of {words} words are those of the mirror, {late} Gaussians were late"));
         }
         let worst = close(&errors, &vec![0.0; errors.len()], Tolerance { absolute: 1.0, relative: 0.0 })?;
-        Ok(Summary { whole: (1.0 - share) / (1.0 - EQUAL), ..worst })
+        Ok(Summary { whole: (1.0 - share) / (1.0 - EQUAL_SHARE_MIN), ..worst })
     }
 }

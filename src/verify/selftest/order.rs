@@ -17,7 +17,7 @@ pub struct DepthOrder {
 
 impl DepthOrder {
     /// Reads the order after a step.
-    pub fn of(fixture: &mut Fixture) -> Result<Self> {
+    pub fn read(fixture: &mut Fixture) -> Result<Self> {
         let visible = fixture.engine.report(0)?.counters.visible_count as usize;
         let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, visible)?;
         let splats = if fixture.engine.shape().group_walks {

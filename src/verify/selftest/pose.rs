@@ -3,7 +3,7 @@
 use super::compare::{Tolerance, close};
 use super::fixture::{Fixture, readable};
 use super::scenes::{Shape, scene};
-use super::{Judge, LEEWAY, Rig, judge};
+use super::{ERROR_FACTOR, Judge, Rig, judge};
 use crate::engine::SharedRow;
 use crate::error::Result;
 use crate::pass::{KernelShape, Update};
@@ -12,21 +12,21 @@ use crate::reference::{Row, Rules};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::POSE_PRIOR;
 use crate::train::shared::poses::{self, Poses};
-use crate::train::shared::{Place, SharedLayout, SharedParameters};
+use crate::train::shared::{RowOffsets, SharedLayout, SharedParameters};
 use glam::DVec3;
 use std::sync::Arc;
 
 /// The trained numbers of two photos; the step is on the second one, whose pose is settled by a quarter. The last is the unit
 /// of moves.
-const NUMBERS: [[[f32; 4]; 2]; 2] =
+const TRAINED_NUMBERS: [[[f32; 4]; 2]; 2] =
     [[[0.1, 0.2, 0.3, 0.0], [0.1, 0.0, 0.0, 2.0]], [[0.06, -0.11, 0.08, 0.25], [-0.02, 0.03, 0.05, 2.0]]];
-const FIRST: usize = poses::ROWS;
+const STEP_PHOTO_ROW: usize = poses::ROWS_PER_PHOTO;
 
 /// The rows of both photos, with preconditioners that mix all numbers.
 fn rows() -> Vec<[f32; 4]> {
     let mixed = |k: usize| if k.is_multiple_of(7) { 1.1 } else { 0.02 * (k % 5) as f32 - 0.03 };
     let matrix = (0..12).map(|row| [mixed(3 * row), mixed(3 * row + 1), mixed(3 * row + 2), 0.0]);
-    NUMBERS.iter().flat_map(|numbers| numbers.iter().copied().chain(matrix.clone())).collect()
+    TRAINED_NUMBERS.iter().flat_map(|numbers| numbers.iter().copied().chain(matrix.clone())).collect()
 }
 
 /// Runs a step on a photo whose pose is corrected. Compares the splats of the corrected camera and the gradient of the
@@ -38,24 +38,24 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let mut fixture = Fixture::with_room(Arc::clone(rig.gpu), scene, false, options, |room| {
         room.with_shared_rows(rows.len() as u32)
     })?;
-    let place = Place { all: SharedLayout { scene: 0, photo: FIRST as u32 }, ..Place::default() };
+    let place = RowOffsets { all: SharedLayout { scene: 0, photo: STEP_PHOTO_ROW as u32 }, ..RowOffsets::default() };
     fixture.engine.set_extension(Poses::default().extension(place), 1);
     fixture.engine.set_shared(&rows)?;
-    fixture.shared = (FIRST..rows.len()).map(|row| SharedRow { row: row as u32, rates: [0.0; 4] }).collect();
+    fixture.shared = (STEP_PHOTO_ROW..rows.len()).map(|row| SharedRow { row: row as u32, rates: [0.0; 4] }).collect();
     fixture.train_with(1)?;
     let (splats, v_model) = (fixture.splats()?, fixture.gradient_rows()?);
     let v_shared = fixture.get::<[f32; 4]>(Buf::V_SHARED, rows.len())?;
     let (model, camera) = (fixture.model(), fixture.scene.camera);
     Ok(Box::new(move |rules: &Rules| {
-        let of_step: PoseRows = std::array::from_fn(|k| rows[FIRST + k].map(f64::from));
+        let of_step: PoseRows = std::array::from_fn(|k| rows[STEP_PHOTO_ROW + k].map(f64::from));
         let posed = corrected(&camera, &of_step);
         // As for the projection, and the rounding errors of the corrected pose.
-        let tolerance = Tolerance { absolute: 6e-5 * LEEWAY, relative: 0.0 };
+        let tolerance = Tolerance { absolute: 6e-5 * ERROR_FACTOR, relative: 0.0 };
         let of_splats = judge::projection(rules, (&posed, &model), &splats, tolerance);
         let [v_turn, v_move] = backward(rules, &camera, &of_step, (&model, &v_model), f64::from(POSE_PRIOR));
         let mut expected = vec![[0.0; 4]; v_shared.len()];
-        expected[FIRST][..3].copy_from_slice(&v_turn);
-        expected[FIRST + 1][..3].copy_from_slice(&v_move);
+        expected[STEP_PHOTO_ROW][..3].copy_from_slice(&v_turn);
+        expected[STEP_PHOTO_ROW + 1][..3].copy_from_slice(&v_move);
         let found: Vec<f64> = v_shared.as_flattened().iter().map(|&value| f64::from(value)).collect();
         // Sums of terms that cancel: a few roundings of each.
         let size = |(row, v): (&Row, &Row)| {
@@ -63,7 +63,7 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
             DVec3::from(v.mean).length() * (distance + of_step[1][3]) + v.quat.iter().map(|of| of.abs()).sum::<f64>()
         };
         let terms: f64 = model.rows.iter().zip(&v_model).map(size).sum();
-        let tolerance = Tolerance { absolute: 5e-7 * terms * LEEWAY, relative: 0.0 };
-        judge::all([of_splats, close(&found, expected.as_flattened(), tolerance)])
+        let tolerance = Tolerance { absolute: 5e-7 * terms * ERROR_FACTOR, relative: 0.0 };
+        judge::combine([of_splats, close(&found, expected.as_flattened(), tolerance)])
     }))
 }

@@ -1,10 +1,10 @@
 //! The passes of the strategy mcmc against the reference: relocation, random moves, regularisation.
 
 use super::compare::{Tolerance, close, exact};
-use super::fixture::{Fixture, PARAMETERS};
-use super::model::{Changed, GROW, SEED, holding};
+use super::fixture::{Fixture, PARAMETER_PLANES};
+use super::model::{ChangedPopulation, GROW_ZONE, SEED, holding};
 use super::scenes::{Shape, scene};
-use super::{Judge, LEEWAY, Rig, judge};
+use super::{ERROR_FACTOR, Judge, Rig, judge};
 use crate::engine::ListKey;
 use crate::error::Result;
 use crate::reference::densify::{Origin, Population};
@@ -16,22 +16,22 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::constants::NO_SPLAT;
 use crate::shaders::structs::StepUniforms;
 use crate::train::StrategyKind;
-use crate::train::strategy::passes::EXPLORE;
-use crate::train::strategy::{At, of};
+use crate::train::strategy::passes::EXPLORE_BIT;
+use crate::train::strategy::{StepContext, make};
 
 /// Relocates with this many draws; the fixture's model is the population. Opacities and scales of copies may differ.
 pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway: f64) -> Result<Judge> {
     fixture.engine.make_room_for_gaussians(before.model.rows.len() as u64 + u64::from(draws))?;
-    let uniforms = holding(fixture, &before, 600, (false, Some(&GROW)))?;
+    let uniforms = holding(fixture, &before, 600, (false, Some(&GROW_ZONE)))?;
     let counted = fixture.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
     let draws_per_weight = draws as f32 / counted.densified_count as f32;
     let uniforms = StepUniforms { draws, draws_per_weight, ..uniforms };
     let applied = fixture.engine.run(ListKey::RelocateApply, &uniforms)?.counters;
-    let after = Changed::read(fixture, applied.densified_count, before.frozen)?;
+    let after = ChangedPopulation::read(fixture, applied.densified_count, before.frozen)?;
     // They are logarithms, some after a division by the number of copies.
     let tolerance = Tolerance { absolute: 1e-6, relative: 1e-6 }.times(leeway);
     Ok(Box::new(move |rules: &Rules| {
-        let rules = &Rules { grow_box: Some(GROW), ..rules.clone() };
+        let rules = &Rules { grow_box: Some(GROW_ZONE), ..rules.clone() };
         let weights: u32 = weights(rules, &before).iter().map(|weight| weight.0).sum();
         exact(&[counted.densified_count], &[weights])?;
         let expected = relocate(rules, &before, draws, uniform_draw(SEED, NO_SPLAT, 0));
@@ -51,7 +51,7 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
     let (mut uniforms, mut start, mut visible) = (StepUniforms::default(), Vec::new(), Vec::new());
     // Gradients and parameters after each step.
     let mut steps = Vec::new();
-    for without in [u32::MAX, EXPLORE, 0] {
+    for without in [u32::MAX, EXPLORE_BIT, 0] {
         let mut fixture = rig()?;
         let count = fixture.scene.gaussians.len();
         fixture.config.strategy = StrategyKind::Mcmc;
@@ -59,13 +59,13 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
         (fixture.config.opacity_weight, fixture.config.scale_weight) = (Some(1.0), Some(1.0));
         fixture.config.position_lr_init = 2e-5;
         fixture.input.update = true;
-        let strategy = of(StrategyKind::Mcmc);
-        let all = strategy.passes(At { step: 1, config: &fixture.config, extent: fixture.fixed.extent });
+        let strategy = make(StrategyKind::Mcmc);
+        let all = strategy.passes(StepContext { step: 1, config: &fixture.config, extent: fixture.fixed.extent });
         fixture.engine.set_extension(strategy.extension(), all);
         fixture.train_with(all & !without)?;
         visible = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count)?;
         (uniforms, start) = (fixture.uniforms(), fixture.model().rows);
-        steps.push((fixture.gradient_rows()?, fixture.rows(PARAMETERS, count)?));
+        steps.push((fixture.gradient_rows()?, fixture.rows(PARAMETER_PLANES, count)?));
     }
     let gradients = [0, 1].map(|step: usize| floats(&steps[step].0));
     let [before, after] = [1, 2].map(|step: usize| steps[step].1.clone());
@@ -97,6 +97,6 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
 /// Checks random moves and regularisation in a step.
 pub(super) fn random_moves(rig: &Rig) -> Result<Judge> {
     let scene = scene(65, &Shape { gaussians: 150, opacities: (-7.0, 3.0), ..Shape::default() });
-    let [moves, terms] = exploration(|| rig.fixture(scene.clone()), LEEWAY)?;
-    Ok(Box::new(move |rules: &Rules| judge::all([moves(rules), terms(rules)])))
+    let [moves, terms] = exploration(|| rig.fixture(scene.clone()), ERROR_FACTOR)?;
+    Ok(Box::new(move |rules: &Rules| judge::combine([moves(rules), terms(rules)])))
 }

@@ -10,7 +10,7 @@ use crate::synth::{self, Preset, SynthOptions};
 use crate::train::{TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
-const STEPS: u32 = 80;
+const TRAINING_STEPS: u32 = 80;
 
 /// Checks that 80 steps with votes and three densifications give the same bits twice, and a smaller loss.
 pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
@@ -19,7 +19,7 @@ pub(super) fn twice(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     let [before, after] = loss;
     if !(after < 0.7 * before) {
         return Ok(Err(format!(
-            "the loss changes from {before:.4} to {after:.4} in {STEPS} steps; expected a smaller loss"
+            "the loss changes from {before:.4} to {after:.4} in {TRAINING_STEPS} steps; expected a smaller loss"
         )));
     }
     let bits = |model: &Gaussians| -> Vec<u32> {
@@ -46,12 +46,12 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
     };
     let dataset = synth::dataset(&options, 0);
     let config = TrainConfig {
-        iterations: STEPS,
+        iterations: TRAINING_STEPS,
         start_size: Some(1.0),
         label_from: Some(10),
         vote_every: Some(20),
         densify_from: Some(15),
-        densify_until: Some(STEPS),
+        densify_until: Some(TRAINING_STEPS),
         densify_interval: Some(20),
         densify_grad_threshold: 5e-5,
         ..TrainConfig::default()
@@ -60,7 +60,7 @@ fn train(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<(Gaussians, [f64; 2])> 
     let options = TrainerOptions { shape: Some(kernels), ..TrainerOptions::default() };
     let mut trainer = Trainer::new(Arc::clone(gpu), config, &dataset, &model, options)?;
     let mut reports = Vec::new();
-    for _ in 0..STEPS {
+    for _ in 0..TRAINING_STEPS {
         reports.extend(trainer.step()?);
     }
     reports.extend(trainer.drain()?);

@@ -1,7 +1,7 @@
 //! Files of each benchmark, written here, with a known score.
 
 use super::{Columns, columns_file, layout, run_on};
-use labelgs::eval::protocol::{By, Prompt, Protocol};
+use labelgs::eval::protocol::{Prompt, Protocol, SelectBy};
 use tempfile::tempdir;
 
 #[test]
@@ -15,7 +15,7 @@ fn labelgs_takes_the_first_frame_as_the_prompt() {
     // Labels 1 and 4 lie in the prompt, 2 has half of its pixels there, which is not more than half.
     let columns = Columns::new([1, 4, 2, 2, 0, 3, 3, 3]);
     let found =
-        run_on((Protocol::Labelgs, false, By::Prompt), truth, (&["01.jpg", "05.jpg", "09.jpg"], 1), &[], columns)
+        run_on((Protocol::Labelgs, false, SelectBy::Prompt), truth, (&["01.jpg", "05.jpg", "09.jpg"], 1), &[], columns)
             .expect("scored");
     assert_eq!(found.objects["red cup"].labels, [1, 4]);
     assert_eq!(found.views.keys().collect::<Vec<_>>(), ["05", "09"], "the prompt is no test");
@@ -43,7 +43,7 @@ fn lerf_mask_chooses_by_name_and_averages_over_prompts() {
         let views = (&["a.jpg", "b.jpg", "c.jpg"][..], 1);
         let names = [(1, "Apple"), (9, "old camera")];
         let columns = Columns::new([1, 1, 0, 0, 0, 0, 2, 2]);
-        run_on((Protocol::LerfMask, compat, By::Name), truth, views, &names, columns).expect("scored")
+        run_on((Protocol::LerfMask, compat, SelectBy::Name), truth, views, &names, columns).expect("scored")
     };
     let found = run(false);
     assert_eq!(found.objects["apple"].labels, [1], "names differ in case only");
@@ -67,7 +67,7 @@ fn three_d_ovs_reads_its_classes() {
         columns_file(&truth.join("00").join(format!("{class}.png")), 0..2);
         columns_file(&truth.join("07").join(format!("{class}.png")), 0..2);
     }
-    let by_name = (Protocol::ThreeDOvs, false, By::Name);
+    let by_name = (Protocol::ThreeDOvs, false, SelectBy::Name);
     let views = (&["00.jpg", "07.jpg"][..], 0);
     std::fs::write(truth.join("classes.txt"), "gray sofa\npikachu\nghost\n").expect("written");
     let names = [(3, "gray sofa"), (4, "pikachu")];
@@ -77,7 +77,7 @@ fn three_d_ovs_reads_its_classes() {
     let listed = found.left_out.join("; ");
     assert!(listed.contains("stray") && listed.contains("ghost"), "{listed}");
     // By masks instead of names: the first frame is the prompt.
-    let by_prompt = (Protocol::ThreeDOvs, false, By::Prompt);
+    let by_prompt = (Protocol::ThreeDOvs, false, SelectBy::Prompt);
     let found = run_on(by_prompt, truth, views, &[], Columns::new([3, 3, 4, 0, 0, 0, 0, 0])).expect("scored");
     assert_eq!((found.headline.iou, found.mean.pair_count), (Some(1.0), 2));
 }
@@ -100,12 +100,12 @@ fn nvos_follows_the_strokes() {
     // Label 3 has a column under both kinds of strokes, and more under the other kind.
     let columns = Columns::new([1, 2, 2, 3, 3, 3, 4, 4]);
     let views = (&["IMG_1.JPG", "IMG_2.JPG"][..], 1);
-    let found = run_on((Protocol::Nvos, false, By::Prompt), truth, views, &[], columns).expect("scored");
+    let found = run_on((Protocol::Nvos, false, SelectBy::Prompt), truth, views, &[], columns).expect("scored");
     assert_eq!(found.objects.keys().collect::<Vec<_>>(), ["scene_centre", "scene_left"], "not the other scene");
     assert_eq!(found.objects["scene_left"].labels, [1, 2]);
     assert_eq!(found.objects["scene_centre"].labels, [4], "a mask of the reference view is used where there is one");
     assert_eq!((found.headline.iou, found.mean.pairs.accuracy), (Some(1.0), Some(1.0)));
-    let names = layout(Protocol::Nvos, truth, "other", By::Name).expect("a layout");
+    let names = layout(Protocol::Nvos, truth, "other", SelectBy::Name).expect("a layout");
     assert_eq!((names.tasks.len(), &names.tasks[0].prompt), (1, &Prompt::Name));
 }
 
@@ -121,13 +121,14 @@ fn binary_masks_are_of_one_object_or_of_several() {
     columns_file(&folder.path().join("many/cab/c.png"), 4..6);
     let views = (&["a.png", "b.png", "c.png"][..], 0);
     let columns = || Columns::new([2, 2, 0, 0, 5, 0, 0, 0]);
-    let found = run_on((Protocol::Binary, false, By::Prompt), &flat, views, &[], columns()).expect("scored");
+    let found = run_on((Protocol::Binary, false, SelectBy::Prompt), &flat, views, &[], columns()).expect("scored");
     assert_eq!((found.objects["truck"].labels.clone(), found.headline.iou), (vec![2], Some(0.75)));
     let many = folder.path().join("many");
-    let found = run_on((Protocol::Binary, false, By::Prompt), &many, views, &[], columns()).expect("scored");
+    let found = run_on((Protocol::Binary, false, SelectBy::Prompt), &many, views, &[], columns()).expect("scored");
     assert_eq!(found.views["c"]["cab"].iou, Some(0.5), "its own first frame is its prompt");
     assert!(!found.views["b"].contains_key("cab"));
     // A folder's name may be an id.
-    let found = run_on((Protocol::Binary, false, By::Name), &many, views, &[(5, "cab")], columns()).expect("scored");
+    let found =
+        run_on((Protocol::Binary, false, SelectBy::Name), &many, views, &[(5, "cab")], columns()).expect("scored");
     assert_eq!((found.objects["2"].labels.clone(), found.objects["2"].frames), (vec![2], 3));
 }

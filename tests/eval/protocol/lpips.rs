@@ -3,8 +3,8 @@
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::engine::Engine;
 use labelgs::eval::lpips::convolution::{Layer, Planes, convolve, halve};
-use labelgs::eval::lpips::{CHANNELS, STAGES, Weights};
-use labelgs::eval::{Distance, Rendering, Whole, evaluate};
+use labelgs::eval::lpips::{STAGE_CHANNELS, STAGE_CONVOLUTIONS, Weights};
+use labelgs::eval::{Distance, Rendering, WholeModel, evaluate};
 use labelgs::render::RenderOptions;
 use labelgs::scene::Photo;
 use labelgs::scenes::init::initial_gaussians;
@@ -44,7 +44,7 @@ fn a_convolution_equals_the_direct_sum() {
 fn write_weights(path: &Path, left_out: &str) {
     let mut tensors: Vec<(String, Vec<usize>, Vec<f32>)> = Vec::new();
     let mut inputs = 3;
-    for (stage, outputs) in STAGES.iter().zip(CHANNELS) {
+    for (stage, outputs) in STAGE_CONVOLUTIONS.iter().zip(STAGE_CHANNELS) {
         for number in *stage {
             let mut weight = vec![0.0; outputs * inputs * 9];
             (0..inputs.min(outputs)).for_each(|channel| weight[(channel * inputs + channel) * 9 + 4] = 1.0);
@@ -53,7 +53,7 @@ fn write_weights(path: &Path, left_out: &str) {
             inputs = outputs;
         }
     }
-    let linear = CHANNELS.iter().enumerate();
+    let linear = STAGE_CHANNELS.iter().enumerate();
     tensors
         .extend(linear.map(|(i, &count)| (format!("lin{i}.model.1.weight"), vec![1, count, 1, 1], vec![1.0; count])));
     tensors.retain(|(name, ..)| name != left_out);
@@ -131,10 +131,10 @@ fn held_out_views_have_a_perceptual_distance() {
     (views[0].photo, views[1].photo) = (Some(white(255).into()), Some(white(0).into()));
     views.iter_mut().for_each(|view| view.mask = None);
     let views: Vec<_> = views.iter().take(2).collect();
-    let mut engine = Engine::of_model(std::sync::Arc::clone(&gpu), &model, [(32, 24)]).expect("an engine");
+    let mut engine = Engine::for_model(std::sync::Arc::clone(&gpu), &model, [(32, 24)]).expect("an engine");
     let options = RenderOptions { background: [0.25; 3], ..RenderOptions::default() };
     let mut scores = |lpips: Option<&dyn Distance>| {
-        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: 0.0 };
+        let mut whole = WholeModel { engine: &mut engine, model: &model, min_confidence: 0.0 };
         evaluate(&mut whole, &views, Rendering { lpips, ..Rendering::new(options) }, &(), &mut ()).expect("scores")
     };
     let found = scores(Some(&Red));

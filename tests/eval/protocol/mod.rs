@@ -7,10 +7,10 @@ mod rules;
 
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::eval::Subject;
-use labelgs::eval::protocol::{Ask, Bench, By, Layout, Protocol, Report, run};
+use labelgs::eval::protocol::{Bench, Layout, LayoutInput, Protocol, Report, SelectBy, run};
 use labelgs::files::image::write_png_grey8;
 use labelgs::files::{LabelEntry, LabelTable};
-use labelgs::render::{RenderOptions, Rendered};
+use labelgs::render::{Render, RenderOptions};
 use labelgs::scene::{Camera, Photo, View};
 use labelgs::scenes::truth::{files_below, read_truth};
 use labelgs::{Error, Result};
@@ -44,12 +44,12 @@ impl Subject for Columns {
         Ok(true)
     }
 
-    fn render(&mut self, camera: &Camera, _: &RenderOptions) -> Result<Rendered> {
+    fn render(&mut self, camera: &Camera, _: &RenderOptions) -> Result<Render> {
         assert_eq!((camera.width, camera.height), (SIDE as u32, SIDE as u32));
         let labels = self.labels.repeat(SIDE);
         let shown = |id: &u32| self.shown.as_ref().is_none_or(|shown| shown.contains(id));
         let grey = |id: &u32| if self.dark.contains(id) { 0.0 } else { f32::from(GREY) / 255.0 };
-        Ok(Rendered {
+        Ok(Render {
             width: camera.width,
             height: camera.height,
             rgb: labels.iter().map(|id| if shown(id) { [grey(id); 3] } else { [0.0; 3] }).collect(),
@@ -93,14 +93,14 @@ pub fn columns_file(path: &Path, columns: std::ops::Range<usize>) {
 }
 
 /// The layout of the files in a folder.
-pub fn layout(protocol: Protocol, truth: &Path, scene: &str, by: By) -> Result<Layout> {
+pub fn layout(protocol: Protocol, truth: &Path, scene: &str, by: SelectBy) -> Result<Layout> {
     let classes = std::fs::read_to_string(truth.join("classes.txt")).ok();
-    protocol.layout(&files_below(truth)?, classes.as_deref(), Ask { truth, scene, by })
+    protocol.layout(&files_below(truth)?, classes.as_deref(), LayoutInput { truth, scene, by })
 }
 
 /// Runs a benchmark on views of these names; the views from index `test` on are held out.
 pub fn run_on(
-    (protocol, compat, by): (Protocol, bool, By),
+    (protocol, compat, by): (Protocol, bool, SelectBy),
     truth: &Path,
     (views, test): (&[&str], usize),
     names: &[(u32, &str)],

@@ -2,7 +2,7 @@
 
 use super::{Columns, columns_file, layout, message, run_on};
 use assert_cmd::Command;
-use labelgs::eval::protocol::{By, Protocol};
+use labelgs::eval::protocol::{Protocol, SelectBy};
 use labelgs::files::{LabelEntry, LabelTable};
 use labelgs::formats::write_model;
 use labelgs::scene::Gaussians;
@@ -14,7 +14,7 @@ fn folders_without_the_layout_say_what_is_expected() {
     let folder = tempdir().expect("folder");
     let truth = folder.path();
     let says = |protocol, expected: &str| {
-        let text = message(layout(protocol, truth, "fern", By::Prompt));
+        let text = message(layout(protocol, truth, "fern", SelectBy::Prompt));
         assert!(text.contains(expected), "{text}");
     };
     says(Protocol::Labelgs, "FRAME/OBJECT.png");
@@ -22,12 +22,14 @@ fn folders_without_the_layout_say_what_is_expected() {
     says(Protocol::ThreeDOvs, "no classes.txt");
     says(Protocol::Nvos, "masks/fern/FRAME_mask.png");
     says(Protocol::Binary, "OBJECT/FRAME.png");
-    assert!(message(layout(Protocol::Binary, &truth.join("nowhere"), "fern", By::Name)).contains("no such folder"));
+    assert!(
+        message(layout(Protocol::Binary, &truth.join("nowhere"), "fern", SelectBy::Name)).contains("no such folder")
+    );
     columns_file(&truth.join("masks/a/x_mask.png"), 0..1);
     columns_file(&truth.join("masks/b/x_mask.png"), 0..1);
     says(Protocol::Nvos, "a, b");
     columns_file(&truth.join("one/x/cup.png"), 0..1);
-    let text = message(layout(Protocol::Labelgs, &truth.join("one"), "fern", By::Prompt));
+    let text = message(layout(Protocol::Labelgs, &truth.join("one"), "fern", SelectBy::Prompt));
     assert!(text.contains("first frame is the prompt"), "{text}");
 }
 
@@ -36,7 +38,7 @@ fn the_truth_of_another_scene_is_refused() {
     let folder = tempdir().expect("folder");
     columns_file(&folder.path().join("x/cup.png"), 0..1);
     columns_file(&folder.path().join("y/cup.png"), 0..1);
-    let how = (Protocol::Labelgs, false, By::Prompt);
+    let how = (Protocol::Labelgs, false, SelectBy::Prompt);
     let text = message(run_on(how, folder.path(), (&["a.jpg"], 0), &[], Columns::new([1; 8])));
     assert!(text.contains("such as y") && text.contains("a.jpg"), "{text}");
 }

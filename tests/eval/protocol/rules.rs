@@ -3,8 +3,8 @@
 use super::{Columns, columns_file, run_on, view};
 use labelgs::cli::support::exit_status::exit_status;
 use labelgs::eval::page::Page;
-use labelgs::eval::protocol::{By, Protocol};
-use labelgs::eval::{Compared, Watch};
+use labelgs::eval::protocol::{Protocol, SelectBy};
+use labelgs::eval::{PictureObserver, ScoredPicture};
 use labelgs::files::image::{read_grey, write_png_grey8};
 use labelgs::scene::colour::{HEAT, HEAT_MAX, on_scale};
 use labelgs::scenes::truth::read_truth;
@@ -20,7 +20,7 @@ fn a_frame_without_a_view_counts_as_nothing_and_is_listed() {
         columns_file(&folder.path().join(frame).join("cup.png"), 0..2);
     }
     let columns = Columns::new([1, 1, 0, 0, 0, 0, 0, 0]);
-    let how = (Protocol::Labelgs, false, By::Prompt);
+    let how = (Protocol::Labelgs, false, SelectBy::Prompt);
     let found = run_on(how, folder.path(), VIEWS, &[], columns).expect("scored");
     assert_eq!((found.views["b"]["cup"].iou, found.views["zzz"]["cup"].iou), (Some(1.0), Some(0.0)));
     assert_eq!((found.headline.iou, found.views["zzz"]["cup"].psnr), (Some(0.5), Some(0.0)));
@@ -44,7 +44,7 @@ fn an_empty_selection_is_nothing_unless_the_papers_way_is_asked_for() {
     // Half of label 1 is in the prompt: that is not more than half.
     let run = |compat| {
         let columns = Columns::new([1, 1, 1, 1, 0, 0, 0, 0]);
-        run_on((Protocol::Labelgs, compat, By::Prompt), folder.path(), VIEWS, &[], columns).expect("scored")
+        run_on((Protocol::Labelgs, compat, SelectBy::Prompt), folder.path(), VIEWS, &[], columns).expect("scored")
     };
     let (strict, compat) = (run(false), run(true));
     assert_eq!(
@@ -72,7 +72,7 @@ fn dark_objects_are_lost_by_the_colour_rule_only() {
     }
     let run = |compat| {
         let columns = Columns { dark: vec![2], ..Columns::new([1, 2, 0, 0, 0, 0, 0, 0]) };
-        run_on((Protocol::Labelgs, compat, By::Prompt), folder.path(), VIEWS, &[], columns).expect("scored")
+        run_on((Protocol::Labelgs, compat, SelectBy::Prompt), folder.path(), VIEWS, &[], columns).expect("scored")
     };
     let (strict, compat) = (run(false), run(true));
     assert_eq!((strict.mean.pairs.iou, strict.mean.pairs.iou_colour), (Some(1.0), Some(0.5)));
@@ -114,15 +114,15 @@ fn the_page_shows_each_picture_and_needs_no_network() {
     let (found, truth) =
         ([[true; 32], [false; 32]].concat(), [[true; 16], [false; 16], [true; 16], [false; 16]].concat());
     let rgb = vec![[1.0, 0.5, 0.0]; 64];
-    let picture = Compared {
+    let picture = ScoredPicture {
         object: Some("<cup> & saucer".into()),
         masks: Some((&found, &truth)),
         numbers: vec![("iou", Some(0.25)), ("psnr", None)],
         note: "nothing \"chosen\"".into(),
-        ..Compared::new("a", &photo, &rgb)
+        ..ScoredPicture::new("a", &photo, &rgb)
     };
-    page.see(&picture).expect("written");
-    page.see(&Compared::new("b", &photo, &rgb)).expect("written");
+    page.observe(&picture).expect("written");
+    page.observe(&ScoredPicture::new("b", &photo, &rgb)).expect("written");
     let index = page.finish(&maud::html! { "mean <1>" }).expect("written");
     let html = std::fs::read_to_string(index).expect("HTML");
     assert!(html.contains("&lt;cup&gt; &amp; saucer") && html.contains("iou 0.250") && html.contains("mean &lt;1&gt;"));

@@ -38,7 +38,7 @@ pub struct Bed<'a> {
 impl<'a> Bed<'a> {
     /// Uploads the scene.
     pub fn new(gpu: &Arc<Gpu>, scene: Scene, modes: &'a [(Mode, Replacements)]) -> Result<Self> {
-        let shape = KernelShape::of(gpu.capabilities());
+        let shape = KernelShape::for_device(gpu.capabilities());
         // With a barrier before each item, times belong to their items; without aliasing, all can be read back.
         let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
         let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };

@@ -135,7 +135,7 @@ impl<'a> View<'a> {
             .map(|block| {
                 let pixels = block.size.0 * block.size.1;
                 let upstream: Vec<_> = (0..pixels).map(|index| v_image[self.pixel(block, index)]).collect();
-                let upstream = Upstream::of_colours(&upstream);
+                let upstream = Upstream::from_colours(&upstream);
                 blend::blend_backward(self.rules, &self.splats_of(block), block.size, background, &upstream)
             })
             .collect();

@@ -28,7 +28,7 @@ const SURE: f64 = 1e-5;
 
 /// Prints the errors of so many lists of each length, and returns them. Fails where those of the device are too large.
 pub fn run(gpu: &Arc<Gpu>, lists: usize) -> Result<Vec<Value>> {
-    let own = KernelShape { group_blend: None, ..KernelShape::of(gpu.capabilities()) };
+    let own = KernelShape { group_blend: None, ..KernelShape::for_device(gpu.capabilities()) };
     let groups = own.with_group_blend(gpu.capabilities());
     let (device, [sums, differences]) = errors(gpu, own, lists)?;
     let mut ways = vec![("device, by tiles", device)];
@@ -67,7 +67,7 @@ fn errors(gpu: &Arc<Gpu>, shape: KernelShape, lists: usize) -> Result<(Vec<f64>,
             let gradient = fixture.get::<[f32; 4]>(Buf::V_IMAGE, 1)?[0].map(f64::from);
             let gradient = [gradient[0], gradient[1], gradient[2]];
             let actual = fixture.splat_gradients(&splats)?;
-            let upstream = Upstream::of_colours(&[gradient]);
+            let upstream = Upstream::from_colours(&[gradient]);
             let expected = blend_backward(&rules, &splats, (1, 1), background, &upstream).values;
             let ray = trace(&rules, splats.iter().enumerate(), AT);
             if ray.margins.gradient() < SURE {

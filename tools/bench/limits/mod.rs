@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 /// Work of a stage.
 #[derive(Clone, Copy, Default)]
-struct Need {
+struct Requirement {
     /// Multiplications and additions.
     operations: f64,
     exp2: f64,
@@ -27,7 +27,7 @@ struct Need {
     bytes: f64,
 }
 
-impl Need {
+impl Requirement {
     /// Seconds at least.
     fn seconds(self, c: &Ceilings) -> f64 {
         let arithmetic = self.operations / c.operations + self.exp2 / c.exp2 + self.divisions / c.divisions;
@@ -49,58 +49,61 @@ struct Step {
 const HIGHER: f64 = 45.0 / 4.0;
 
 /// Work of each stage of a step, for colours of degree 3.
-fn need(stage: Stage, s: &Step, digit_bits: u32) -> Need {
+fn need(stage: Stage, s: &Step, digit_bits: u32) -> Requirement {
     let passes = |bits: u32| f64::from(bits.div_ceil(digit_bits));
     let tile_bits = u32::BITS - s.tiles.saturating_sub(1).leading_zeros();
     let vec4 = 16.0;
     match stage {
         // Means and scales of all; all planes in, three records out of the visible.
-        Stage::PROJECT => Need {
+        Stage::PROJECT => Requirement {
             operations: 40.0 * s.gaussians + 280.0 * s.splats,
             bytes: (2.0 * vec4 + 8.0) * s.gaussians + ((7.0 + HIGHER) * vec4 + 8.0) * s.splats,
-            ..Need::default()
+            ..Requirement::default()
         },
         // A pass reads the keys twice and keys and values once, and writes both.
-        Stage::SORT => {
-            Need { bytes: 20.0 * (passes(32) * s.splats + passes(tile_bits) * s.instances), ..Need::default() }
-        }
-        Stage::TILE => Need {
+        Stage::SORT => Requirement {
+            bytes: 20.0 * (passes(32) * s.splats + passes(tile_bits) * s.instances),
+            ..Requirement::default()
+        },
+        Stage::TILE => Requirement {
             operations: 35.0 * s.instances,
             bytes: (3.0 * vec4 + 8.0) * s.splats + 8.0 * s.instances,
-            ..Need::default()
+            ..Requirement::default()
         },
         // Exponent 6, weight and transmittance 3, colour 6 (method of 3DGS in base 2).
-        Stage::BLEND_FORWARD => Need {
+        Stage::BLEND_FORWARD => Requirement {
             operations: 15.0 * s.pairs,
             exp2: s.pairs,
             bytes: (3.0 * vec4 + 8.0) * s.instances + 20.0 * s.pixels,
-            ..Need::default()
+            ..Requirement::default()
         },
         // Exponent 6, transmittance 1, light 6, gradient of alpha 4, three moments 5, colour 6.
-        Stage::BLEND_BACKWARD => Need {
+        Stage::BLEND_BACKWARD => Requirement {
             operations: 28.0 * s.pairs,
             exp2: s.pairs,
             divisions: s.pairs,
             bytes: (6.0 * vec4 + 8.0) * s.instances + 52.0 * s.pixels,
         },
         // Two windows of 11 taps along both axes: over four moments and over three derivatives, three channels.
-        Stage::LOSS => Need {
+        Stage::LOSS => Requirement {
             operations: s.pixels * 3.0 * (2.0 * 2.0 * 11.0 * (4.0 + 3.0) + 30.0),
             bytes: 2.0 * (vec4 + 4.0) * s.pixels + 3.0 * 3.0 * 2.0 * vec4 * s.pixels + vec4 * s.pixels,
-            ..Need::default()
+            ..Requirement::default()
         },
-        Stage::GATHER => Need { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Need::default() },
+        Stage::GATHER => Requirement { bytes: 3.0 * vec4 * (s.instances + s.splats), ..Requirement::default() },
         // Coefficients in, and the gradients of them and of their directions out.
-        Stage::PROJECT_BACKWARD => {
-            Need { operations: 700.0 * s.splats, bytes: (11.0 + 2.0 * HIGHER) * vec4 * s.splats, ..Need::default() }
-        }
+        Stage::PROJECT_BACKWARD => Requirement {
+            operations: 700.0 * s.splats,
+            bytes: (11.0 + 2.0 * HIGHER) * vec4 * s.splats,
+            ..Requirement::default()
+        },
         // All planes of parameters with two moments, read and written, and the gradients of the visible.
-        Stage::OPTIMISE => Need {
+        Stage::OPTIMISE => Requirement {
             operations: 12.0 * 4.0 * (4.0 + HIGHER) * s.gaussians,
             bytes: (4.0 + HIGHER) * vec4 * (6.0 * s.gaussians + s.splats),
-            ..Need::default()
+            ..Requirement::default()
         },
-        _ => Need::default(),
+        _ => Requirement::default(),
     }
 }
 
@@ -112,7 +115,7 @@ pub fn run(common: &Common) -> Result<()> {
         (SynthOptions::default(), 1500, 60)
     };
     let gpu = device::open()?;
-    let shape = KernelShape::of(gpu.capabilities());
+    let shape = KernelShape::for_device(gpu.capabilities());
     let c = ceilings::measure(&gpu, shape.texel, common.small)?;
     println!("{}\n{}", gpu.capabilities().name, c.to_text());
     let model = plain_model(&gpu, &options, training)?;

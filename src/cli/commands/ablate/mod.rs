@@ -91,7 +91,7 @@ pub(crate) fn run(args: &AblateArgs, context: &Context) -> Result<()> {
     let text = table::table(&rows) + &quoted::table();
     let folders: Vec<PathBuf> =
         outcomes.iter().flat_map(|(row, runs)| runs.iter().map(|run| folder(args, row, run.seed))).collect();
-    let page = report::write_with(&folders, &args.output.join(report::FILE), &text)?;
+    let page = report::write_with(&folders, &args.output.join(report::REPORT_FILE), &text)?;
     tracing::info!("report: {}", page.display());
     context.show(&record, &text)
 }

@@ -11,8 +11,8 @@ use crate::eval::lpips::Weights;
 use crate::eval::protocol::bench::Bench;
 use crate::eval::protocol::run::{picture_count, run as run_bench};
 use crate::eval::protocol::score::Distance;
-use crate::eval::protocol::{Ask, By, Layout, Prompt, Protocol};
-use crate::eval::subject::Whole;
+use crate::eval::protocol::{Layout, LayoutInput, Prompt, Protocol, SelectBy};
+use crate::eval::subject::WholeModel;
 use crate::files::label_table::LabelTable;
 use crate::files::read;
 use crate::scene::{Dataset, UNLABELLED, View};
@@ -41,7 +41,7 @@ pub struct BenchmarkArgs {
     pub truth: PathBuf,
     /// How objects are chosen. Default: the rule of the benchmark, which is by name for lerf-mask and 3d-ovs.
     #[arg(long, value_name = "HOW", value_enum)]
-    pub by: Option<By>,
+    pub by: Option<SelectBy>,
     /// Score only these objects, names with commas between.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub objects: Vec<String>,
@@ -90,10 +90,10 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     bench.check(&layout, &root)?;
     let mut watcher = Watcher::new(picture_count(&layout), args.scoring.page.as_deref(), context)?;
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-    let size = EngineSize::of_model(&model, sizes);
+    let size = EngineSize::for_model(&model, sizes);
     let mut engine = Engine::new(open_gpu_for_long(context)?, size, args.scoring.memory.options())?;
     let min_confidence = args.scoring.sure.min_confidence;
-    let mut whole = Whole { engine: &mut engine, model: &model, min_confidence };
+    let mut whole = WholeModel { engine: &mut engine, model: &model, min_confidence };
     let report = run_bench(&layout, &bench, &mut whole, &mut watcher)?;
     let tables = tables(&report);
     watcher.finish(&tables)?;
@@ -101,14 +101,14 @@ pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     report.check(args.scoring.min_psnr, args.scoring.min_iou)
 }
 
-fn read_layout(protocol: Protocol, root: &Path, by: By, args: &BenchmarkArgs) -> Result<Layout> {
+fn read_layout(protocol: Protocol, root: &Path, by: SelectBy, args: &BenchmarkArgs) -> Result<Layout> {
     let files = files_below(root)?;
     let list = root.join("classes.txt");
     let classes = if list.is_file() { Some(read::text(&list)?) } else { None };
     // `--scene .` has no file name until it is resolved.
     let scene = std::fs::canonicalize(&args.scene).unwrap_or_else(|_| args.scene.clone());
     let scene = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    protocol.layout(&files, classes.as_deref(), Ask { truth: root, scene: &scene, by })
+    protocol.layout(&files, classes.as_deref(), LayoutInput { truth: root, scene: &scene, by })
 }
 
 /// Keeps the objects of `--objects`.

@@ -1,7 +1,7 @@
 //! Scores of a benchmark as tables.
 
 use crate::cli::support::tables::{Column, DB, Part, Parts, SHARE, Table, column, number};
-use crate::eval::protocol::report::{Absent, Report};
+use crate::eval::protocol::report::{MissingPrediction, Report};
 use crate::eval::protocol::score::PairScores;
 
 const COLUMNS: [Column<PairScores>; 7] = [
@@ -40,7 +40,7 @@ pub(super) fn tables(report: &Report) -> Parts {
     Parts(parts)
 }
 
-fn absence(kind: &str, absent: &Absent) -> String {
+fn absence(kind: &str, absent: &MissingPrediction) -> String {
     let frame = absent.frame.as_ref().map_or(String::new(), |frame| format!(" in {frame}"));
     format!("{kind}: {}{frame}: {}", absent.object, absent.reason)
 }

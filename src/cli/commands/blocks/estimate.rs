@@ -1,7 +1,7 @@
 //! `labelgs blocks estimate`.
 
 use crate::Result;
-use crate::blocks::{Estimate, Sketch, estimate};
+use crate::blocks::{Estimate, PlannedScene, estimate};
 use crate::cli::support::Context;
 use crate::cli::support::parsers::{Size, bytes, count, size};
 use crate::words::counted;
@@ -44,7 +44,7 @@ pub struct EstimateArgs {
 
 /// Shows the blocks of a scene on paper.
 pub(super) fn run(args: &EstimateArgs, context: &Context) -> Result<()> {
-    let found = estimate(&Sketch {
+    let found = estimate(&PlannedScene {
         card: args.card,
         gaussians: args.gaussians,
         coarse: args.coarse.unwrap_or(args.gaussians / 4),

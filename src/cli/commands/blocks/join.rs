@@ -1,7 +1,7 @@
 //! `labelgs blocks join`.
 
 use crate::Result;
-use crate::blocks::{BlockMasks, MergeOptions, Merged, merge};
+use crate::blocks::{BlockMasks, MergeOptions, MergeResult, merge};
 use crate::cli::support::{Context, open_gpu};
 use clap::Args;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ pub(super) fn run(args: &JoinArgs, context: &Context) -> Result<()> {
     context.show(&merged.to_json(), &sentence(&merged))
 }
 
-fn sentence(merged: &Merged) -> String {
+fn sentence(merged: &MergeResult) -> String {
     let (model, all, coarse) = (merged.model.display(), merged.gaussians(), merged.coarse);
     let blocks = merged.blocks.len();
     let mut text = format!("{model}: {all} Gaussians, {coarse} of them coarse, the others of {blocks} blocks\n");

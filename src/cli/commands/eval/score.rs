@@ -7,13 +7,13 @@ use crate::cli::support::{
     Context, TableArg, Watcher, largest, near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit,
 };
 use crate::engine::{Engine, EngineSize};
-use crate::eval::by_place;
 use crate::eval::evaluate::{AmodalTruth, Rendering, evaluate, picture_count};
 use crate::eval::lpips::Weights;
 use crate::eval::protocol::score::Distance;
 use crate::eval::removal::{self, RemovalTruth, removals};
+use crate::eval::score_by_place;
 use crate::eval::scores::Scores;
-use crate::eval::subject::{Subject, Whole};
+use crate::eval::subject::{Subject, WholeModel};
 use crate::files::image::read_rgba;
 use crate::files::label_table::LabelTable;
 use crate::formats::ModelRef;
@@ -21,7 +21,7 @@ use crate::gpu::Gpu;
 use crate::label::vote::model::{columns_of, limited_vote_engine};
 use crate::masks::mask::read_mask;
 use crate::render::RenderOptions;
-use crate::render::large::{Index, Painter, fits};
+use crate::render::large::{GaussianIndex, Painter, fits};
 use crate::run::models;
 use crate::scene::{Camera, Dataset, Photo, View};
 use crate::scheduler::SchedulerOptions;
@@ -108,8 +108,9 @@ impl Job<'_> {
         };
         let views = if args.refine_poses { refined.iter().collect() } else { views };
         let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
-        let mut engine = Engine::new(gpu.clone(), EngineSize::of_model(&model, sizes), memory)?;
-        let mut whole = Whole { engine: &mut engine, model: &model, min_confidence: args.scoring.sure.min_confidence };
+        let mut engine = Engine::new(gpu.clone(), EngineSize::for_model(&model, sizes), memory)?;
+        let mut whole =
+            WholeModel { engine: &mut engine, model: &model, min_confidence: args.scoring.sure.min_confidence };
         let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
         if args.removal {
             drop(engine);
@@ -132,7 +133,7 @@ impl Job<'_> {
             }
         }
         let mut watcher = Watcher::new(picture_count(views), args.scoring.page.as_deref(), self.context)?;
-        let (index, notes) = Index::of(model, args.scoring.sure.min_confidence, |_, _| true)?;
+        let (index, notes) = GaussianIndex::new(model, args.scoring.sure.min_confidence, |_, _| true)?;
         models::log_notes(&args.model, &notes);
         let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
         let scores = self.of(&mut painter, views, &mut watcher)?;
@@ -142,10 +143,10 @@ impl Job<'_> {
 
     fn of(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
         let mut scores = evaluate(subject, views, self.how, &self.wholes, watcher)?;
-        if let Some(seams) = Seams::of_model(&self.args.model)? {
+        if let Some(seams) = Seams::for_model(&self.args.model)? {
             subject.show(None)?;
             let draw = &mut |camera: &Camera, options: &RenderOptions| subject.render(camera, options);
-            scores.places = by_place(draw, views, self.how.options, &seams)?;
+            scores.places = score_by_place(draw, views, self.how.options, &seams)?;
         }
         Ok(scores)
     }

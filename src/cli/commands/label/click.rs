@@ -8,7 +8,7 @@ use crate::edit::add::add;
 use crate::edit::merge::Merged;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
-use crate::label::click::{Area, Click, Clicking, Hints, Photos, Progress};
+use crate::label::click::{Area, Click, Hints, ObjectFinder, Photos, Progress};
 use crate::scene::Dataset;
 use crate::stage::Stage;
 use crate::words::counted;
@@ -49,7 +49,7 @@ pub(super) fn run(args: &LabelArgs, scene: &Path, context: &Context) -> Result<(
     let (photos, typed) = open_photos((&args.model, &model), (scene, &args.reading), folder)?;
     let hints = hints(&args.clicks, &typed, &photos)?;
     let start = Instant::now();
-    let mut clicking = Clicking::new(open_gpu(context)?, &model, &photos, near)?;
+    let mut clicking = ObjectFinder::new(open_gpu(context)?, &model, &photos, near)?;
     let stage = Stage::new("asking the network", 0);
     let (mut questions, mut before) = (0, 0);
     let rows = clicking.object(&hints, &mut |progress| {

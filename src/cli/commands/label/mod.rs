@@ -14,8 +14,8 @@ use crate::edit::select::summarise;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
 use crate::gpu::Gpu;
-use crate::label::masks::agree::{Agreement, Ids, MIN_VIEWS, agree};
-use crate::label::vote::model::{Counting, ROUNDS, columns_of, label_by_lift, label_by_votes, vote_engine};
+use crate::label::masks::agree::{Agreement, Ids, OBJECT_VIEWS_MIN, agree};
+use crate::label::vote::model::{VOTE_ROUNDS, VoteOptions, columns_of, label_by_lift, label_by_votes, vote_engine};
 use crate::scene::{Gaussians, View};
 use crate::stage::Stage;
 use crate::train::LabelRule;
@@ -117,11 +117,11 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     };
     let views: Vec<&View> = dataset.train.iter().collect();
     let mut engine = vote_engine(gpu, &model, &views, columns_of(&views))?;
-    let mut progress = Progress::new(u64::from(ROUNDS), "rounds", &context.global);
+    let mut progress = Progress::new(u64::from(VOTE_ROUNDS), "rounds", &context.global);
     if args.rule == LabelRule::Main {
         label_by_lift(&mut engine, &mut model, &views, near)?;
     } else {
-        let how = Counting { near, mask_border: args.mask_border, min_confidence: args.min_confidence };
+        let how = VoteOptions { near, mask_border: args.mask_border, min_confidence: args.min_confidence };
         label_by_votes(&mut engine, &mut model, &views, &how, &mut |round| {
             progress.set(u64::from(round), String::new)
         })?;
@@ -166,7 +166,7 @@ fn make_agree(
 ) -> Result<LabelTable> {
     let borrowed: Vec<&View> = views.iter().collect();
     let mut engine = vote_engine(Arc::clone(gpu), model, &borrowed, columns_of(&borrowed))?;
-    let how = Agreement { near, ids, min_views: MIN_VIEWS, make_missing: false };
+    let how = Agreement { near, ids, min_views: OBJECT_VIEWS_MIN, make_missing: false };
     let stage = Stage::new("comparing masks", 2 * borrowed.len());
     let (masks, _) = agree(&mut engine, model, &borrowed, how, &mut || stage.count())?;
     let names = table(folder, true, &borrowed, &masks)?;

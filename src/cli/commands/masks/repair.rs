@@ -6,7 +6,7 @@ use crate::cli::support::parsers::near;
 use crate::cli::support::{Context, Progress, SceneArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::files::atomic;
 use crate::files::label_table::{FILE, LabelEntry, LabelTable};
-use crate::label::masks::agree::{Agreement, MIN_VIEWS, agree, follow};
+use crate::label::masks::agree::{Agreement, OBJECT_VIEWS_MIN, agree, follow};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
 use crate::label::vote::model::{columns_of, vote_engine};
@@ -96,7 +96,7 @@ pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Va
         done += 1;
         progress.set(done, String::new);
     };
-    let min_views = args.min_views.unwrap_or(MIN_VIEWS);
+    let min_views = args.min_views.unwrap_or(OBJECT_VIEWS_MIN);
     let how = Agreement { near, ids: folders.ids(args.per_view), min_views, make_missing: args.make_missing };
     let (mut masks, mut repairs) = agree(&mut engine, &model, &views, how, &mut tick)?;
     let others = follow(&mut engine, &held_out, how, (&masks, &mut repairs), &mut tick)?;
@@ -177,7 +177,7 @@ fn report(views: &[&View], masks: &[Option<LabelMap>], repairs: &Repairs, args: 
         text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
     }
     for &(view, id) in left_out.iter().filter(|_| !args.per_view) {
-        let least = args.min_views.unwrap_or(MIN_VIEWS);
+        let least = args.min_views.unwrap_or(OBJECT_VIEWS_MIN);
         text += &format!("{}: {id} is left out, fewer than {least} views show the object\n", name(view));
     }
     for &(view, id) in filled {

@@ -148,7 +148,7 @@ impl Profile {
     /// out.
     pub(crate) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window, views: usize, found: Measured) -> Self {
         let Measured { clocks, reports, mut times, counted, gaussians } = found;
-        let (device, shape) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
+        let (device, shape) = (gpu.capabilities(), KernelShape::for_device(gpu.capabilities()));
         let pixels = f64::from(shape.tile_pixels());
         let of_step = |report: &StepReport| step_json(report, times.iter().find(|t| t.step == report.step), pixels);
         let steps: Vec<Value> = reports.iter().map(of_step).collect();

@@ -11,8 +11,8 @@ use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{nothing_left, remove};
 use crate::files::video;
 use crate::formats::ModelRef;
-use crate::render::large::{Index, fits};
-use crate::render::pictures::{Format, What, frame, write_pictures};
+use crate::render::large::{GaussianIndex, fits};
+use crate::render::pictures::{Format, PictureKind, frame, write_pictures};
 use crate::render::{Parts, RenderOptions};
 use crate::run::models;
 use crate::scene::{Camera, Dataset, Gaussians, LABEL_MAX, stems};
@@ -48,7 +48,7 @@ pub struct RenderArgs {
     pub output: PathBuf,
     /// Pictures to write of each view, with commas between.
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', default_value = "rgb")]
-    pub what: Vec<What>,
+    pub what: Vec<PictureKind>,
     /// Render only these labels, such as 1,4-6,cup, or those that --name, --at, --box and --mask choose.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1, conflicts_with = "without")]
     pub only: Option<Option<Picks>>,
@@ -90,7 +90,7 @@ struct Shots {
 
 /// Renders views.
 pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
-    let exr_only = args.what.iter().find(|what| matches!(what, What::TopId | What::TopWeight));
+    let exr_only = args.what.iter().find(|what| matches!(what, PictureKind::TopId | PictureKind::TopWeight));
     if args.format == Format::Png && exr_only.is_some() {
         return Err(Error::usage("--what", "top-id and top-weight are 32-bit values; use --format exr"));
     }
@@ -162,11 +162,11 @@ fn check_video(args: &RenderArgs, shots: &Shots) -> Result<()> {
 
 /// Draws the views into files, and returns these.
 fn draw(args: &RenderArgs, shots: &Shots, drawer: &mut Drawer, near: f32) -> Result<Vec<PathBuf>> {
-    let asked = |of: &[What]| args.what.iter().any(|what| of.contains(what));
+    let asked = |of: &[PictureKind]| args.what.iter().any(|what| of.contains(what));
     let parts = Parts {
-        depth: asked(&[What::Depth]),
-        main: asked(&[What::TopId, What::TopWeight]),
-        labels: asked(&[What::Labels]),
+        depth: asked(&[PictureKind::Depth]),
+        main: asked(&[PictureKind::TopId, PictureKind::TopWeight]),
+        labels: asked(&[PictureKind::Labels]),
     };
     let clear_labels = args.reading.of_run(&args.model)?.masked_only;
     let options = RenderOptions { background: args.background, clear_labels, ..RenderOptions::new(near, parts) };
@@ -196,7 +196,7 @@ fn draw(args: &RenderArgs, shots: &Shots, drawer: &mut Drawer, near: f32) -> Res
 /// Returns true if ids of label maps need 32 bits; fails if a PNG was asked for, which has 16.
 fn wide_labels(args: &RenderArgs, largest: Option<u32>) -> Result<bool> {
     let Some(label) = largest.filter(|&label| label > LABEL_MAX) else { return Ok(false) };
-    if args.format == Format::Png && args.what.contains(&What::Labels) {
+    if args.format == Format::Png && args.what.contains(&PictureKind::Labels) {
         let problem = format!(
             "the model has label {label}, and a 16-bit PNG has no place for ids above {LABEL_MAX}; use --format exr, which \
              writes 32-bit ids, or give the labels smaller ids with `labelgs relabel`"
@@ -216,10 +216,10 @@ fn shown(args: &RenderArgs, context: &Context) -> Result<Gaussians> {
 }
 
 /// Returns the visible part of a model that is not read.
-fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<Index> {
+fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<GaussianIndex> {
     let least = args.sure.min_confidence;
     let Some(Choice { flag, picks, alone }) = chosen(args)? else {
-        let (index, notes) = Index::of(model, least, |_, _| true)?;
+        let (index, notes) = GaussianIndex::new(model, least, |_, _| true)?;
         models::log_notes(&args.model, &notes);
         return Ok(index);
     };
@@ -230,7 +230,7 @@ fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<Index>
         true => labels.contains(&label) && is_sure(share),
         false => !labels.contains(&label),
     };
-    let index = Index::of(model, least, keep)?.0;
+    let index = GaussianIndex::new(model, least, keep)?.0;
     match (index.is_empty(), alone) {
         (true, true) => Err(args.sure.nothing()),
         (true, false) => Err(nothing_left()),

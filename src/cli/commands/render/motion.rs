@@ -2,7 +2,7 @@
 
 use crate::cli::support::parsers::{Picks, Size, picks, seconds, size};
 use crate::error::{Error, Result};
-use crate::render::pictures::What;
+use crate::render::pictures::PictureKind;
 use crate::run::models::first_view;
 use crate::scene::overview::likely_up;
 use crate::scene::spread::quantiles;
@@ -55,9 +55,9 @@ pub(super) fn is_video(path: &Path) -> bool {
 }
 
 /// Returns the kind of picture in a video; fails for several, and for values that are no colours.
-pub(super) fn kind_of_video(what: &[What]) -> Result<What> {
+pub(super) fn kind_of_video(what: &[PictureKind]) -> Result<PictureKind> {
     match what {
-        [What::TopId | What::TopWeight] => {
+        [PictureKind::TopId | PictureKind::TopWeight] => {
             Err(Error::usage("--what", "top-id and top-weight are no pictures; name a folder in -o, with --format exr"))
         }
         [one] => Ok(*one),

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &SelftestArgs, context: &Context) -> Result<()> {
 /// Runs the checks, and collects them.
 fn checked(context: &Context, checks: &mut Vec<Check>) -> Result<()> {
     let gpu = open_gpu(context)?;
-    let (found, kernels) = (gpu.capabilities(), KernelShape::of(gpu.capabilities()));
+    let (found, kernels) = (gpu.capabilities(), KernelShape::for_device(gpu.capabilities()));
     let as_json = context.json;
     if !as_json {
         stdout::print(&format!(

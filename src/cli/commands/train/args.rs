@@ -6,7 +6,7 @@ use crate::cli::support::FileArgs;
 use crate::cli::support::parsers::bytes;
 use crate::cli::support::settings::{Assignment, assignment, by_key};
 use crate::options::typed::Typed;
-use crate::run::{Changed, Inputs, Request, RunOptions, Settings, Start};
+use crate::run::{Inputs, Request, ResumeSettings, RunOptions, Settings, Start};
 use crate::scenes::ReadOptions;
 use crate::train::{Occlusion, Preset, TrainConfig};
 use crate::{Error, Result, Setting};
@@ -142,7 +142,7 @@ impl TrainFlags {
         &self,
         (scene, output): (&Path, &Path),
         masks: Option<PathBuf>,
-        settings: &'a Changed,
+        settings: &'a ResumeSettings,
     ) -> Result<Request<'a>> {
         let start = if self.resume { Start::Newest(settings) } else { Start::New(settings(None)?) };
         let occluders = self.occluders.clone();

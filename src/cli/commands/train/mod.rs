@@ -9,7 +9,7 @@ use crate::cli::commands::view::Typed;
 use crate::cli::support::shell_words::typed;
 use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted, signals};
 use crate::report::text::duration;
-use crate::run::{self, Event, Flow, Live, Observer, Request, Settings, Summary};
+use crate::run::{self, Event, Flow, LiveScene, Observer, Request, Settings, Summary};
 use crate::viewer::Watched;
 use crate::words::{brief, counted};
 
@@ -67,7 +67,7 @@ struct Terminal<'a> {
 }
 
 impl Observer for Terminal<'_> {
-    fn on(&mut self, event: &Event<'_>, live: &mut Live<'_>) -> Result<Flow> {
+    fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow> {
         match *event {
             Event::Started { steps, .. } => {
                 // From here on the run has work to save.

@@ -64,7 +64,7 @@ fn masks(
     }
     // Nothing is lost from here on: what is there is used again.
     signals::end_at_once()?;
-    let poses = Settings::of_model(plain)?.map(|settings| settings.read.poses);
+    let poses = Settings::for_model(plain)?.map(|settings| settings.read.poses);
     let read = ReadArgs { poses, ..make.read.clone() };
     tracing::info!("2 of 4: making masks");
     let (_, text) = make::make(&MakeArgs { read: read.clone(), ..make.clone() }, context)?;

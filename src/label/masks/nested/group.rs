@@ -1,6 +1,6 @@
 //! Masks of several views that show one thing: a candidate for an object.
 
-use super::sight::Sight;
+use super::sight::ViewSight;
 use crate::label::masks::associate::{Overlap, Segment, join};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -34,7 +34,7 @@ pub(super) struct Group {
 
 /// The masks of all views.
 pub(super) struct Scene {
-    pub sights: Vec<Sight>,
+    pub sights: Vec<ViewSight>,
     /// Rows of the masks of each view.
     rows: Vec<Vec<Vec<(u32, f32)>>>,
     /// Pixels of each Gaussian in all views.
@@ -42,12 +42,12 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    pub(super) fn new(sights: Vec<Sight>, gaussians: usize) -> Self {
+    pub(super) fn new(sights: Vec<ViewSight>, gaussians: usize) -> Self {
         let mut weights = vec![0.0; gaussians];
         for &(row, weight) in sights.iter().flat_map(|sight| &sight.seen) {
             weights[row as usize] += f64::from(weight);
         }
-        let rows = sights.par_iter().map(Sight::rows_of_masks).collect();
+        let rows = sights.par_iter().map(ViewSight::rows_of_masks).collect();
         Self { sights, rows, weights }
     }
 
@@ -170,6 +170,6 @@ impl Scene {
 }
 
 /// Returns the share of a view that some Gaussians have.
-fn visible(sight: &Sight, rows: &[u32]) -> f64 {
+fn visible(sight: &ViewSight, rows: &[u32]) -> f64 {
     rows.iter().map(|&row| f64::from(sight.weight(row))).sum::<f64>() / sight.pixels
 }

@@ -15,12 +15,12 @@ use crate::error::Result;
 use crate::render::{RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, View};
 use group::Scene;
-use sight::Sight;
+use sight::ViewSight;
 
 pub use crate::masks::nested::NestedMasks;
 
 /// Fewest views with a mask of an object where nothing else is asked for, if as many have masks.
-pub const MIN_VIEWS: usize = 3;
+pub const OBJECT_VIEWS_MIN: usize = 3;
 
 /// An object: the best mask of it in each view that has one.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Object {
 }
 
 /// Finds the objects in nested masks of views, of the size of the views; `None` for views without. Those that lie on top of
-/// others come last. Each has masks in `min_views` views or more, else in [`MIN_VIEWS`]. `engine` holds the model; `tick` is
+/// others come last. Each has masks in `min_views` views or more, else in [`OBJECT_VIEWS_MIN`]. `engine` holds the model; `tick` is
 /// called once per view.
 pub fn objects(
     engine: &mut Engine,
@@ -42,14 +42,14 @@ pub fn objects(
     let mut sights = Vec::with_capacity(views.len());
     for (view, masks) in views {
         sights.push(match masks {
-            Some(masks) => Sight::new(&render(engine, &view.camera, &RenderOptions::of_main(near))?.top_id, masks),
-            None => Sight::default(),
+            Some(masks) => ViewSight::new(&render(engine, &view.camera, &RenderOptions::for_main(near))?.top_id, masks),
+            None => ViewSight::default(),
         });
         tick();
     }
     let scene = Scene::new(sights, model.len());
     let with_masks = views.iter().filter(|(_, masks)| masks.is_some()).count();
-    let least = min_views.unwrap_or(MIN_VIEWS.min(with_masks));
+    let least = min_views.unwrap_or(OBJECT_VIEWS_MIN.min(with_masks));
     // Masks of one view alone are many, and no object unless they are asked for.
     let groups = choose::confirmed(scene.groups(least.min(2)), least);
     let groups = pattern::without_patterns(&scene, groups, &model.means);
@@ -88,7 +88,7 @@ mod tests {
                 layers: masks.iter().enumerate().map(layer).collect(),
                 qualities: masks.iter().map(|(_, quality)| *quality).collect(),
             };
-            Sight::new(&(0..gaussians as i32).collect::<Vec<_>>(), &nested)
+            ViewSight::new(&(0..gaussians as i32).collect::<Vec<_>>(), &nested)
         });
         Scene::new(sights.collect(), gaussians)
     }
@@ -122,7 +122,7 @@ mod tests {
         let two = all[..2].to_vec();
         // What lies at 20 is seen by two views, what lies at 40 by one: others show nothing there.
         let mut scene = scene(50, &[all, two, one]);
-        let hide = |sight: &mut Sight, from: u32| sight.seen.retain(|&(row, _)| row < from);
+        let hide = |sight: &mut ViewSight, from: u32| sight.seen.retain(|&(row, _)| row < from);
         hide(&mut scene.sights[1], 40);
         hide(&mut scene.sights[2], 20);
         assert_eq!(chosen(&scene, 3), vec![0..10]);

@@ -35,7 +35,7 @@ struct Piece {
 }
 
 impl Piece {
-    fn of(scene: &Scene, group: &Group, means: &[[f32; 3]]) -> Self {
+    fn from_group(scene: &Scene, group: &Group, means: &[[f32; 3]]) -> Self {
         let points = || {
             let point =
                 |&row: &u32| (DVec3::from_array(means[row as usize].map(f64::from)), scene.weights[row as usize]);
@@ -75,7 +75,7 @@ impl Piece {
 
 /// Leaves out the pieces of patterns. `means` are the positions of the Gaussians.
 pub(super) fn without_patterns(scene: &Scene, groups: Vec<Group>, means: &[[f32; 3]]) -> Vec<Group> {
-    let pieces: Vec<Piece> = groups.iter().map(|group| Piece::of(scene, group, means)).collect();
+    let pieces: Vec<Piece> = groups.iter().map(|group| Piece::from_group(scene, group, means)).collect();
     let shared = scene.shared(&groups);
     let overlap = |a: usize, b: usize| {
         let both = shared.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0);

@@ -8,7 +8,7 @@ const OWNED_SHARE_MIN: f32 = 0.5;
 
 /// The Gaussians that are the main ones of pixels of a view.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sight {
+pub(crate) struct ViewSight {
     /// Row and number of pixels, by row.
     pub seen: Vec<(u32, f32)>,
     /// For each of these, where its masks begin in `owners`; one more at the end.
@@ -21,7 +21,7 @@ pub(crate) struct Sight {
     pub pixels: f64,
 }
 
-impl Sight {
+impl ViewSight {
     /// Reads a view: the main Gaussian of each pixel, -1 for none, and masks of that size.
     pub(crate) fn new(main: &[i32], masks: &NestedMasks) -> Self {
         let mut seen: Vec<(u32, f32)> = Vec::new();
