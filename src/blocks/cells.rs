@@ -1,27 +1,27 @@
-//! The cores of the blocks: a tree of halves along the ground.
+//! Divides the ground into block cores by repeated halving.
 
 use crate::error::{Error, Result, Setting};
 use crate::records::block_file::Bounds;
 use glam::DVec3;
 
-/// Share of a core's side by which the zone is larger, each way.
+/// Margin of the zone on each side of the core, as a share of the core's side.
 const ZONE_MARGIN_SHARE: f64 = 0.1;
-/// Share of the Gaussians at each end that do not count for the sides of a core.
+/// Share of the Gaussians at each end of an axis that is ignored when a core is measured.
 const OUTLIER_SHARE: f64 = 0.01;
 
 /// A core with the Gaussians in it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cell {
-    /// Sides; those at the border of the scene are open.
+    /// Bounds of the core; open at the border of the scene.
     pub core: Bounds,
     /// Rows of the coarse model, ascending.
     pub rows: Vec<usize>,
-    /// Sides of most of these Gaussians, where the core is open too.
+    /// Box of these Gaussians without outliers. Unlike the core, it is closed on all sides.
     pub inside: [DVec3; 2],
 }
 
 impl Cell {
-    /// Makes the cell of all Gaussians; `places` are their rows and places in the frame of the ground.
+    /// Makes one cell of all Gaussians. `places` are their rows and positions in the ground frame.
     pub(super) fn whole(places: &[(usize, DVec3)]) -> Self {
         Self::new(Bounds::ALL, places.to_vec())
     }
@@ -40,7 +40,7 @@ impl Cell {
         Self { core, rows: places.into_iter().map(|(row, _)| row).collect(), inside }
     }
 
-    /// Returns the zone: the core, larger by a margin where it is not open.
+    /// Returns the zone: the core plus a margin on its closed sides.
     pub(super) fn zone(&self) -> Bounds {
         let mut zone = self.core;
         for axis in 0..2 {
@@ -51,14 +51,14 @@ impl Cell {
         zone
     }
 
-    /// Halves the cell across its longer side along the ground, so that both halves have as many Gaussians. `place` gives
-    /// the place of a row. Gaussians that are all at one place cannot be halved.
+    /// Halves the cell across its longer ground axis, with equally many Gaussians in both halves. `place` gives the
+    /// position of a row. Fails if all Gaussians have the same position.
     pub(super) fn halves(&self, place: impl Fn(usize) -> DVec3) -> Result<[Self; 2]> {
         let size = self.inside[1] - self.inside[0];
         let axes = if size.x >= size.y { [0, 1] } else { [1, 0] };
         let mut places: Vec<(usize, DVec3)> = self.rows.iter().map(|&row| (row, place(row))).collect();
         for axis in axes {
-            // Rows are ascending and the sort is stable, so that equal places have one order.
+            // Ties are broken by row, so the order is deterministic.
             places.sort_by(|a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.0.cmp(&b.0)));
             let cut = places.get(places.len() / 2).map_or(0.0, |(_, at)| at[axis]);
             let (mut low, mut high): (Vec<_>, Vec<_>) = places.iter().copied().partition(|(_, at)| at[axis] < cut);
@@ -71,10 +71,10 @@ impl Cell {
             (before.high[axis], after.low[axis]) = (Some(cut), Some(cut));
             return Ok([Self::new(before, low), Self::new(after, high)]);
         }
-        let problem = format!("{} Gaussians of a block are at one place and cannot be halved", self.rows.len());
+        let problem = format!("{} Gaussians of a block have the same position and cannot be halved", self.rows.len());
         Err(Error::usage(
             Setting("blocks"),
-            format!("{problem}; ask for fewer blocks, or train the coarse model better"),
+            format!("{problem}; request fewer blocks, or train the coarse model for longer"),
         ))
     }
 }
@@ -85,7 +85,7 @@ mod tests {
     use crate::scene::Zone;
     use std::collections::BTreeSet;
 
-    /// Scattered places, some of them equal and some on the later borders.
+    /// Scattered positions, with some duplicates and some exactly on later borders.
     fn places(count: usize) -> Vec<(usize, DVec3)> {
         let at = |i: usize| DVec3::new((i * 7 % 16) as f64, (i * 5 % 12) as f64, (i % 3) as f64);
         (0..count).map(|i| (i, at(i))).collect()

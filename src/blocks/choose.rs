@@ -1,4 +1,4 @@
-//! The photos of each block: one render of the coarse model for each photo.
+//! Chooses the photos of each block, with one render of the coarse model per photo.
 
 use super::cells::Cell;
 use super::coarse::CoarseModel;
@@ -10,38 +10,38 @@ use crate::scene::{Camera, View, Zone};
 use crate::train::strategy::weights::weights;
 use glam::{DVec2, DVec3};
 
-/// Share of a photo's weight that the core has, for the photo to be taken.
+/// Smallest share of a photo's blending weight from the core for the photo to be chosen.
 const CORE_WEIGHT_SHARE_MIN: f64 = 0.02;
-/// Share that the zone has, if the camera stands in it.
+/// The same for the zone, if the camera is inside the zone.
 const ZONE_WEIGHT_SHARE_MIN: f64 = 0.01;
-/// Share of the picture in which the core's box is seen, from the ground to the top: what floats in its air would be seen
-/// there.
+/// Smallest share of the image that the core's box covers for the photo to be chosen. Such a photo would show floaters
+/// in the empty part of the box.
 const BOX_IMAGE_SHARE_MIN: f64 = 0.25;
-/// Rays of a picture along its longer side that are followed for that.
+/// Rays cast along the longer image side to measure that share.
 const RAYS_PER_LONG_SIDE: u32 = 24;
 
-/// The photos of a block and what they show.
+/// The photos of a block, and which coarse Gaussians they show.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BlockPhotos {
-    /// Indices of training views with the share of the core, in the order of the views.
+    /// Indices of training views, each with the core's share of its weight, in view order.
     pub train: Vec<(usize, f64)>,
     /// Indices of held-out views.
     pub test: Vec<usize>,
-    /// Coarse Gaussians with a weight in one of the training views.
+    /// For each coarse Gaussian, whether a chosen training view shows it.
     pub is_seen: Vec<bool>,
 }
 
-/// A block in the frame of the ground.
+/// A block in the ground frame.
 struct Block<'a> {
     cell: &'a Cell,
     zone: Zone,
-    /// The box of most of its Gaussians.
+    /// Box of its Gaussians without outliers.
     inside: Zone,
-    /// Rows in the zone, besides those of the core.
+    /// Rows in the zone but not in the core.
     margin: Vec<usize>,
 }
 
-/// Chooses the photos of some cells.
+/// Chooses the photos of each cell.
 pub(super) fn choose(
     engine: &mut Engine,
     coarse: &CoarseModel,
@@ -78,7 +78,8 @@ impl<'a> Block<'a> {
         Self { cell, zone, inside, margin: margin.collect() }
     }
 
-    /// Returns the share of the core in a photo that is taken; `weights` are those of all coarse Gaussians.
+    /// Returns the core's share of a photo's weight, or `None` if the photo is not chosen. `weights` has one entry per
+    /// coarse Gaussian.
     fn takes(&self, view: &View, weights: &[f32]) -> Option<f64> {
         let sum = |rows: &mut dyn Iterator<Item = f32>| rows.map(f64::from).sum::<f64>();
         let all = sum(&mut weights.iter().copied());
@@ -95,7 +96,7 @@ impl<'a> Block<'a> {
     }
 }
 
-/// Returns the share of a picture whose rays pass through a box.
+/// Returns the share of the image rays that pass through a box.
 fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
     let longest = camera.width.max(camera.height);
     let count = |side: u32| (side * RAYS_PER_LONG_SIDE).div_ceil(longest).max(1);
@@ -109,7 +110,7 @@ fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
     hits.count() as f64 / f64::from(rows * columns)
 }
 
-/// Returns true if a ray along the axes of a box meets it.
+/// Returns true if a ray, given along the box axes, hits the box.
 fn passes(from: DVec3, along: DVec3, zone: &Zone) -> bool {
     let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
     for axis in 0..3 {

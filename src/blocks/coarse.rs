@@ -1,4 +1,4 @@
-//! The coarse training of a scene, from which the blocks start.
+//! The coarse model of a scene, from which all blocks start.
 
 use super::frame::Frame;
 use crate::error::{Error, Result};
@@ -15,19 +15,19 @@ use std::path::{Path, PathBuf};
 pub(super) struct CoarseModel {
     pub dataset: Dataset,
     pub model: Gaussians,
-    /// Rows of the model that are near, ascending.
+    /// Rows of the near Gaussians, ascending.
     pub near_rows: Vec<usize>,
-    /// CRC-32 of the file of the model.
+    /// CRC-32 of the model file.
     pub crc: u32,
     /// Near plane, world units.
     pub near: f32,
-    /// Settings of its training.
+    /// Settings that the model was trained with.
     pub settings: Settings,
-    /// Names of the labels.
+    /// Label names.
     pub names: Option<LabelTable>,
-    /// Matrices of the photos' colours, if they were trained.
+    /// Exposure matrix of each photo, if exposures were trained.
     pub exposures: BTreeMap<String, ColourMatrix>,
-    /// Seconds of a step, if the training has noted them.
+    /// Seconds per training step, if known.
     pub pace: Option<f64>,
 }
 
@@ -36,11 +36,11 @@ impl CoarseModel {
     pub(super) fn open(scene: &Path, model: &Path, options: LoadOptions) -> Result<Self> {
         let path = latest_model(model)?;
         let Some(settings) = Settings::for_model(&path)? else {
-            let problem = "has no config.toml; the coarse model is a folder that a training wrote";
+            let problem = "has no config.toml; name the output folder of a finished run";
             return Err(Error::data(model, "", problem));
         };
         let metrics: Value =
-            read::json(&model.join(summary::METRICS_FILE), "expected the folder of a finished training")?;
+            read::json(&model.join(summary::METRICS_FILE), "expected the output folder of a finished run")?;
         let (seconds, steps) = (metrics["seconds"].as_f64(), metrics["steps"].as_f64().unwrap_or(0.0));
         let options = LoadOptions {
             max_resolution: (settings.read.max_resolution > 0).then_some(settings.read.max_resolution),
@@ -52,7 +52,7 @@ impl CoarseModel {
         let dataset = crate::scenes::open_logged(scene, &options)?;
         let found = models::open(&path)?.gaussians;
         if found.is_empty() || dataset.train.is_empty() {
-            return Err(Error::data(&path, "", "the model has no Gaussians, or the scene no view to train on"));
+            return Err(Error::data(&path, "", "the model has no Gaussians, or the scene has no training views"));
         }
         Ok(Self {
             dataset,
@@ -67,7 +67,7 @@ impl CoarseModel {
         })
     }
 
-    /// Notes which rows are near; returns their places.
+    /// Finds the near rows, keeps them, and returns them with their positions.
     pub(super) fn settle(&mut self, frame: &Frame) -> Vec<(usize, glam::DVec3)> {
         let near = frame.near(&self.model);
         self.near_rows = near.iter().map(|(row, _)| *row).collect();
@@ -84,9 +84,9 @@ fn exposures(folder: &Path) -> Result<BTreeMap<String, ColourMatrix>> {
     if !path.is_file() {
         return Ok(BTreeMap::new());
     }
-    let file: Value = read::json(&path, "expected the exposures that a training wrote")?;
+    let file: Value = read::json(&path, "expected the exposures of a run")?;
     serde_json::from_value(file["matrices"].clone()).map_err(|error| {
-        let problem = format!("expected the exposures that a training of this version wrote, train again: {error}");
+        let problem = format!("exposures of another labelgs version ({error}); train the coarse model again");
         Error::data(&path, "matrices", problem)
     })
 }

@@ -1,18 +1,18 @@
-//! Blocks on paper: how many, how large and how long, of a scene that is not there yet.
+//! Estimates number, size and training time of the blocks of a planned scene.
 
 use super::need::{BlockNeed, CommonNeed, TargetGpu};
 use super::plan::BLOCKS_MAX;
 use crate::error::{Error, Result, Setting};
 
-/// Gaussians in the zone of a block, in those of its core: a margin of a tenth on all four sides.
+/// Gaussians in a block's zone per Gaussian in its core: a margin of a tenth on all four sides.
 const ZONE_PER_CORE_GAUSSIANS: f64 = 1.44;
-/// Views of all blocks together, in those of the scene: the photos at a border are in the blocks on both sides.
+/// Sum of the blocks' views per view of the scene: photos at a border belong to the blocks on both sides.
 const BLOCK_VIEWS_PER_SCENE_VIEW: f64 = 2.0;
 
-/// A scene on paper.
+/// A scene that may not exist yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedScene {
-    /// Memory of a card, bytes.
+    /// GPU memory, bytes.
     pub card: u64,
     /// Gaussians of the whole scene.
     pub gaussians: u64,
@@ -24,33 +24,33 @@ pub struct PlannedScene {
     pub image: (u32, u32),
     /// Largest label; `None` without labels.
     pub max_label: Option<u32>,
-    /// Steps of a block of up to 300 views.
+    /// Steps of a block with up to 300 views.
     pub steps: u32,
-    /// Measured time of a step, s, with this many Gaussians, on photos of this size.
+    /// Measured step time, s, and the number of Gaussians it was measured with, at this photo size.
     pub pace: Option<(f64, u64)>,
 }
 
-/// Its blocks, all alike.
+/// The blocks of a planned scene, all of equal size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Number of blocks.
     pub blocks: usize,
-    /// Gaussians that a block trains.
+    /// Gaussians that each block trains.
     pub gaussians: u64,
-    /// Gaussians of the surroundings.
+    /// Frozen Gaussians of the surroundings.
     pub frozen: u64,
-    /// Views of a block.
+    /// Views per block.
     pub views: u64,
-    /// What a block needs.
+    /// Resources that each block needs.
     pub need: BlockNeed,
 }
 
-/// Divides a scene on paper into the fewest equal blocks that fit the card. Half of the coarse Gaussians outside of a block
-/// are expected in its photos, or all of three blocks around it if that is less.
+/// Divides a planned scene into the fewest equal blocks that fit the GPU. A block's photos are assumed to show half of
+/// the coarse Gaussians outside of it, but at most those of three neighbours.
 ///
 /// # Errors
 ///
-/// A card too small for any number of blocks.
+/// The GPU is too small for any number of blocks.
 pub fn estimate(sketch: &PlannedScene) -> Result<Estimate> {
     let card = TargetGpu::new(sketch.card);
     let pixels = u64::from(sketch.image.0) * u64::from(sketch.image.1);
@@ -104,7 +104,7 @@ mod tests {
             assert!(found.gaussians * found.blocks as u64 >= CITY.gaussians, "{found:?}");
             assert!(found.views * found.blocks as u64 >= CITY.views && found.need.minutes.is_some(), "{found:?}");
         }
-        // One fewer would not fit.
+        // One block fewer would not fit.
         assert!(usual.need.device as f64 <= 0.8 * f64::from(24 << 20) * 1024.0, "{usual:?}");
     }
 

@@ -1,4 +1,4 @@
-//! One id for an object whose masks were made for each block on its own.
+//! Merges the label ids of objects whose masks were made for each block separately.
 
 use super::trained::TrainedBlock;
 use crate::engine::Engine;
@@ -14,23 +14,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Fewest pixels that two ids share, over all photos of both blocks.
+/// Fewest pixels that two ids must share over all common photos.
 const PIXELS_MIN: u64 = 200;
-/// Least share of these in the pixels of the id that has fewer.
+/// Smallest ratio of the shared pixels to the pixels of the smaller id.
 const SHARE_MIN: f64 = 0.5;
 
-/// Masks that agree within a block only.
+/// Masks whose ids agree within a block, but not between blocks.
 #[derive(Clone, Copy)]
 pub struct BlockMasks<'a> {
     /// The scene.
     pub scene: &'a Path,
-    /// A folder of id masks for each block, with its name.
+    /// Folder with a subfolder of id masks per block, named like the block.
     pub masks: &'a Path,
-    /// Opens the device that draws what two blocks share.
+    /// Opens the device that renders the overlap of two blocks.
     pub open: &'a dyn Fn() -> Result<Arc<Gpu>>,
 }
 
-/// An id of a block: its place in the list of blocks, and the id in its masks.
+/// A label id of a block: index of the block, and id in its masks.
 type Node = (usize, u32);
 
 /// Pixels that two ids of two blocks share.
@@ -40,7 +40,7 @@ struct SharedPixels {
     pixels: u64,
 }
 
-/// The ids of the merged model.
+/// Label ids of the merged model.
 pub(super) struct JoinedIds {
     /// The new id of each id, by block.
     pub of: Vec<BTreeMap<u32, u32>>,
@@ -48,8 +48,8 @@ pub(super) struct JoinedIds {
     pub names: LabelTable,
 }
 
-/// Finds which ids of blocks are one object, in the photos that two blocks share: where the nearest Gaussian is in both
-/// zones, the masks of both show it.
+/// Finds ids of different blocks that are the same object. It compares the masks of both blocks in their common photos,
+/// at pixels whose main Gaussian is in both zones.
 pub(super) fn join(blocks: &Path, trained: &[&TrainedBlock], how: &BlockMasks) -> Result<JoinedIds> {
     let gpu = (how.open)()?;
     let mut found = Vec::new();
@@ -60,7 +60,7 @@ pub(super) fn join(blocks: &Path, trained: &[&TrainedBlock], how: &BlockMasks) -
     Ok(numbered(&ids, &unions(found), trained))
 }
 
-/// Returns the names of the photos of two blocks.
+/// Returns the names of the photos that two blocks share.
 fn common(a: &TrainedBlock, b: &TrainedBlock) -> BTreeSet<String> {
     let own: BTreeSet<&String> = a.block.views.iter().collect();
     b.block.views.iter().filter(|name| own.contains(name)).cloned().collect()
@@ -76,7 +76,7 @@ fn views(trained: &TrainedBlock, only: BTreeSet<String>, how: &BlockMasks) -> Re
     Ok(open_logged(how.scene, &options)?.train)
 }
 
-/// Compares a block with the later ones that share photos with it.
+/// Compares a block with the later blocks that share photos with it.
 fn join_block(
     gpu: &Arc<Gpu>,
     blocks: &Path,
@@ -111,7 +111,7 @@ fn join_block(
     Ok(found)
 }
 
-/// Adds the pixels of two masks whose main Gaussian is common.
+/// Counts the pixels of each id pair where the main Gaussian is in both zones.
 fn count(counts: &mut BTreeMap<[u32; 2], u64>, tops: &[i32], is_common: &[bool], [a, b]: [&LabelMap; 2]) {
     for ((&top, &a), &b) in tops.iter().zip(&a.ids).zip(&b.ids) {
         if usize::try_from(top).is_ok_and(|row| is_common[row]) {
@@ -120,14 +120,14 @@ fn count(counts: &mut BTreeMap<[u32; 2], u64>, tops: &[i32], is_common: &[bool],
     }
 }
 
-/// Returns the pairs of ids of which each is the other's best and that share enough; 0 is no id.
+/// Returns the pairs of ids that are each other's best match and share enough pixels. 0 is not an id.
 fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<SharedPixels> {
     let mut totals = [BTreeMap::<u32, u64>::new(), BTreeMap::new()];
     let mut best = [BTreeMap::<u32, (u64, u32)>::new(), BTreeMap::new()];
     for (ids, &pixels) in counts {
         for side in 0..2 {
             *totals[side].entry(ids[side]).or_default() += pixels;
-            // The smaller id of equals comes first.
+            // Ties go to the smaller id.
             let most = best[side].entry(ids[side]).or_insert((0, 0));
             if pixels > most.0 {
                 *most = (pixels, ids[1 - side]);
@@ -144,8 +144,8 @@ fn best(counts: &BTreeMap<[u32; 2], u64>, blocks: [usize; 2]) -> Vec<SharedPixel
     counts.iter().filter_map(is_one).collect()
 }
 
-/// Joins pairs, those that share most first, but never two ids of one block: a wrong pair would make a chain of objects.
-/// Returns the first id of the group of each id that is in one.
+/// Joins pairs in descending order of shared pixels. It never joins two ids of one block, because one wrong pair could
+/// chain many objects. Returns the first id of the group for each grouped id.
 fn unions(mut found: Vec<SharedPixels>) -> BTreeMap<Node, Node> {
     found.sort_by(|a, b| b.pixels.cmp(&a.pixels).then(a.nodes.cmp(&b.nodes)));
     let mut groups: Vec<BTreeSet<Node>> = Vec::new();
@@ -156,7 +156,7 @@ fn unions(mut found: Vec<SharedPixels>) -> BTreeMap<Node, Node> {
         let blocks: BTreeSet<usize> = joint.iter().map(|(block, _)| *block).collect();
         if blocks.len() < joint.len() {
             tracing::warn!(
-                "ids {} and {} overlap, but their groups have other ids of one block",
+                "ids {} and {} overlap, but joining them would join two ids of one block",
                 nodes[0].1,
                 nodes[1].1
             );
@@ -216,10 +216,10 @@ mod tests {
     fn only_mutual_best_pairs_with_enough_pixels_count() {
         let counts = [
             ([1, 7], 900),
-            // 2 is best with 7, which is best with 1.
+            // The best match of 2 is 7, whose best match is 1.
             ([2, 7], 500),
             ([2, 8], 100),
-            // Too few, and less than half of the smaller.
+            // Too few pixels; then less than half of the smaller id.
             ([3, 9], 150),
             ([4, 10], 300),
             ([4, 0], 200),
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn groups_span_blocks_and_never_hold_two_ids_of_one() {
-        // One object through four blocks, and a bad pair that would chain two of them.
+        // One object in four blocks, and a wrong pair that would join two objects.
         let found = vec![
             pair([(0, 1), (1, 5)], 800),
             pair([(1, 5), (2, 3)], 700),

@@ -1,4 +1,4 @@
-//! Joins the models of the blocks into one.
+//! Merges the block models into one.
 
 use super::join::{BlockMasks, join};
 use super::trained::{TrainedBlock, compare, core};
@@ -14,15 +14,15 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Name of the file with the result, which is written last.
+/// File with the result, written last.
 const MERGE_FILE: &str = "merge.json";
 
-/// How blocks are merged.
+/// Options of a merge.
 #[derive(Clone, Copy, Default)]
 pub struct MergeOptions<'a> {
-    /// Takes the coarse Gaussians where a block has no finished training.
+    /// Uses the coarse Gaussians for blocks without a finished run.
     pub allow_missing: bool,
-    /// Masks whose ids agree within a block only: objects get new ids, and coarse Gaussians none.
+    /// Masks whose ids agree within a block only. Objects then get new ids, and coarse Gaussians no label.
     pub masks: Option<BlockMasks<'a>>,
 }
 
@@ -33,9 +33,9 @@ pub struct MergeResult {
     pub model: PathBuf,
     /// Gaussians of each block in the model, by name.
     pub blocks: Vec<(String, u64)>,
-    /// Coarse Gaussians in it.
+    /// Number of coarse Gaussians in the model.
     pub coarse: u64,
-    /// Names of blocks without a finished training.
+    /// Names of blocks without a finished run.
     pub missing: Vec<String>,
     /// Devices that trained the blocks.
     pub devices: Vec<String>,
@@ -52,17 +52,17 @@ impl MergeResult {
 enum MergePart {
     /// The core of a training.
     Trained(Box<TrainedBlock>),
-    /// The core of the first model of a block, or all of what is coarse everywhere.
+    /// The core of a block's first model, or the Gaussians that are coarse everywhere.
     Coarse(Option<Box<BlockFile>>, PathBuf),
 }
 
-/// Joins the models that were trained in `models`, a folder for each block of the folder `blocks`, into the folder `out`:
-/// from each the Gaussians of its core, then the coarse ones. It holds one model at a time.
+/// Merges the runs in `models`, one folder per block of the folder `blocks`, into the folder `out`. Takes the core
+/// Gaussians of each run, then the coarse ones. Only one model is in memory at a time.
 ///
 /// # Errors
 ///
-/// Blocks without a finished training, with one of another split, of other settings, another version of labelgs or other
-/// names of labels: one error lists all.
+/// Blocks without a finished run, or with a run that has another split, other settings, another labelgs version or
+/// other label names. One error lists all problems.
 pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -> Result<MergeResult> {
     let (file, crc) = BlocksFile::read(blocks)?;
     let mut problems = Vec::new();
@@ -72,7 +72,7 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
         let folder = blocks.join(&row.id);
         let block = BlockFile::read(&folder)?;
         if block.blocks != crc {
-            problems.push(format!("{}: is of another split than {}", folder.display(), block_file::BLOCKS_FILE));
+            problems.push(format!("{}: belongs to another split than {}", folder.display(), block_file::BLOCKS_FILE));
             continue;
         }
         match TrainedBlock::open(&block, &models.join(&row.id)) {
@@ -98,7 +98,7 @@ pub fn merge(blocks: &Path, models: &Path, out: &Path, options: &MergeOptions) -
     write(&file, &parts, (names.as_ref(), has_ids), out, merged)
 }
 
-/// Returns one error for all problems.
+/// Combines all problems into one error.
 fn refuse(models: &Path, problems: &[String]) -> Result<()> {
     let problem = match problems {
         [] => return Ok(()),
@@ -115,7 +115,7 @@ fn devices(trained: &[&TrainedBlock]) -> Vec<String> {
     devices
 }
 
-/// Returns the union of the tables of names; a name with two ids or an id with two names is a problem.
+/// Merges the label tables. A name with two ids, or an id with two names, is a problem.
 fn names(blocks: &Path, trained: &[&TrainedBlock], problems: &mut Vec<String>) -> Result<Option<LabelTable>> {
     let coarse = LabelTable::of_folder(blocks)?;
     let mut of_id = BTreeMap::new();
@@ -149,7 +149,7 @@ impl MergePart {
         if let Self::Trained(trained) = self { Some(trained) } else { None }
     }
 
-    /// Reads the rows. Where trainings have new ids, the labels of coarse Gaussians mean nothing.
+    /// Reads the rows. If blocks got new ids, labels of coarse Gaussians are meaningless and dropped.
     fn read(&self, has_ids: bool) -> Result<Gaussians> {
         let (block, path) = match self {
             Self::Trained(trained) => return trained.core(),
@@ -177,7 +177,7 @@ fn write(
         std::fs::remove_file(&result).map_err(Error::write(&result))?;
     }
     let steps = parts.iter().filter_map(MergePart::trained).map(|trained| trained.steps).max().unwrap_or(0);
-    // The header has the number of rows, so that all parts are read twice.
+    // The header needs the number of rows, so all parts are read twice.
     let mut like = None;
     for part in parts {
         let rows = part.read(has_ids)?;
@@ -194,7 +194,7 @@ fn write(
     write_joined(&merged.model, &like, merged.gaussians() as usize, parts.iter().map(|part| part.read(has_ids)))?;
     to.note_saved(steps);
     if merged.missing.is_empty() && merged.coarse != file.rest {
-        let problem = format!("has {} coarse Gaussians, {} were split off", merged.coarse, file.rest);
+        let problem = format!("has {} coarse Gaussians; expected {}", merged.coarse, file.rest);
         return Err(Error::data(&merged.model, "", problem));
     }
     write_records(file, parts, names, out)?;
@@ -202,7 +202,7 @@ fn write(
     Ok(merged)
 }
 
-/// Returns a model without rows that has the columns of another and of a part.
+/// Returns an empty model with the columns of `like` and `part`.
 fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
     let like = like.unwrap_or_else(|| part.picked(&[]));
     let (labels, confidence) = (part.labels.is_some(), part.label_confidence.is_some());
@@ -214,7 +214,7 @@ fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
     }
 }
 
-/// Writes settings, names and blocks beside the model, so that other commands find them.
+/// Writes settings, label names and blocks next to the model, where other commands expect them.
 fn write_records(file: &BlocksFile, parts: &[MergePart], names: Option<&LabelTable>, out: &Path) -> Result<()> {
     if let Some(first) = parts.iter().find_map(MergePart::trained) {
         let from = first.folder.join(run_folder::CONFIG);

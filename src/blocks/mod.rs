@@ -1,13 +1,13 @@
 //! A scene larger than a device: split into blocks, each trained on its own, and merged into one model.
 //!
-//! [`plan`] divides a coarse model of the whole scene by the memory of a card, and chooses the photos of each block;
-//! [`split`] writes a folder for each. [`run::train`](crate::run::train) trains one of them at a time, anywhere, with
-//! [`run::Request::block`](crate::run::Request::block), and [`merge`] joins the models. Nothing of it needs another
-//! block to be there: files in, files out. [`guide::large_scenes`](crate::guide) shows it step by step.
+//! [`plan`] divides a coarse model of the whole scene so that each block fits the GPU memory, and chooses each block's
+//! photos. [`split`] writes a folder per block. [`run::train`](crate::run::train) trains one block with
+//! [`run::Request::block`](crate::run::Request::block), and [`merge`] joins the models. Blocks train independently, in
+//! sequence or on several machines. [`guide::large_scenes`](crate::guide) shows it step by step.
 //!
 //! A block has a core, which the merged model takes from it, and a zone around the core, in which it grows Gaussians.
-//! The cores are half-open boxes that cover space without overlap. What its photos show beside the zone is there too, as
-//! frozen Gaussians of the coarse model.
+//! The cores are half-open boxes that cover space without overlap. Gaussians outside of the zone that its photos show
+//! are included as frozen Gaussians of the coarse model.
 
 mod cells;
 mod choose;

@@ -1,20 +1,20 @@
-//! Memory and time that a block needs.
+//! Predicts the memory and time that a block needs.
 
 use crate::engine::{EngineSize, LabelSize, card, predict_for};
 use crate::error::{Error, Result};
 use crate::gpu::limits::PlanLimits;
 use crate::pass::KernelShape;
 
-/// Share of a card's memory that the plan may take: pairs of splats and tiles grow beyond the plan where views are full.
+/// Largest share of the GPU memory that a plan may use. Crowded views need more (splat, tile) pairs than planned.
 const PLANNED_MEMORY_SHARE_MAX: f64 = 0.8;
-/// Steps of a block with up to this many views; more views have more steps in proportion.
+/// Views up to which a block has the given number of steps. Blocks with more views have proportionally more steps.
 const VIEWS_PER_RUN: f64 = 300.0;
-/// Memory of the program itself and of the driver, bytes: 236 MiB measured with a small block on lavapipe.
+/// Host memory of the program and driver, bytes (measured: 236 MiB with a small block on lavapipe).
 const PROGRAM_BYTES: u64 = 256 << 20;
-/// Objects of a step with object layers.
+/// Objects per step with object layers.
 const LAYERS_PER_STEP: u32 = 10;
 
-/// The card that trains the blocks.
+/// The GPU that trains the blocks.
 #[derive(Clone, Debug)]
 pub(super) struct TargetGpu {
     shape: KernelShape,
@@ -23,34 +23,34 @@ pub(super) struct TargetGpu {
     memory: u64,
 }
 
-/// What all blocks have in common.
+/// Inputs of the prediction that all blocks share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CommonNeed {
     /// Largest photo, px.
     pub image: (u32, u32),
-    /// Largest label; `None` for a scene without.
+    /// Largest label; `None` for a scene without labels.
     pub max_label: Option<u32>,
-    /// Seconds of a step of the coarse training.
+    /// Seconds per step of the coarse run.
     pub pace: Option<f64>,
-    /// Pixels and Gaussians of the coarse training.
+    /// Pixels per photo and Gaussians of the coarse run.
     pub coarse: (u64, u64),
 }
 
 /// What a block needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockNeed {
-    /// Memory of the device, bytes.
+    /// Device memory, bytes.
     pub device: u64,
-    /// Memory of the host, bytes.
+    /// Host memory, bytes.
     pub host: u64,
     /// Number of steps.
     pub steps: u32,
-    /// Minutes, if the pace is known.
+    /// Training time in minutes, if the pace is known.
     pub minutes: Option<f64>,
 }
 
 impl TargetGpu {
-    /// Takes a typical card.
+    /// Assumes a typical GPU with this much memory.
     pub(super) fn new(memory: u64) -> Self {
         let (shape, limits) = card(memory);
         Self { shape, limits, memory }
@@ -62,8 +62,8 @@ impl TargetGpu {
 }
 
 impl CommonNeed {
-    /// Predicts the need of a block with this many Gaussians at the end of growth, frozen ones and views, and `steps` for
-    /// a run of few views.
+    /// Predicts the need of a block from its Gaussians after growth, frozen Gaussians and views. `steps` are the steps
+    /// of a run with few views.
     pub(super) fn need(
         &self,
         card: &TargetGpu,
@@ -80,7 +80,7 @@ impl CommonNeed {
         let frozen = u32::try_from(frozen).unwrap_or(u32::MAX);
         let size = EngineSize::new(all, self.image).for_training().with_labels(labels).with_frozen(frozen);
         let device = match predict_for(&card.shape, &card.limits, &size) {
-            // A buffer beyond the largest binding.
+            // A buffer exceeds the largest binding.
             Err(Error::OutOfMemory { .. }) => u64::MAX,
             other => other?.total,
         };
@@ -88,7 +88,7 @@ impl CommonNeed {
         let pixels = u64::from(self.image.0) * u64::from(self.image.1);
         let larger = (pixels as f64 / self.coarse.0.max(1) as f64).max(all as f64 / self.coarse.1.max(1) as f64);
         let minutes = self.pace.map(|seconds| f64::from(steps) * (seconds * larger.max(1.0)) / 60.0);
-        // A photo has 4 bytes a pixel and a mask 2; a checkpoint is written from a copy.
+        // A photo takes 4 bytes per pixel, a mask 2. Checkpoints are written from a copy.
         let host = PROGRAM_BYTES + (views as u64 * pixels * 6).min(crate::scenes::PHOTO_MEMORY) + 800 * gaussians;
         Ok(BlockNeed { device, host, steps, minutes })
     }

@@ -1,4 +1,4 @@
-//! Decides on the blocks of a scene: as few as the card allows.
+//! Divides a scene into as few blocks as the GPU allows.
 
 use super::cells::Cell;
 use super::choose::{BlockPhotos, choose};
@@ -15,36 +15,37 @@ use glam::DVec3;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Fewest views of a block: this many, or this share of all if that is less.
+/// Fewest views of a block: this many, or this share of all views if that is less.
 const VIEWS_MIN: usize = 32;
 const VIEWS_MIN_SHARE: f64 = 0.25;
-/// Gaussians of the whole scene by default, in those of the coarse model.
+/// Default number of Gaussians of the whole scene, per Gaussian of the coarse model.
 const GAUSSIANS_PER_COARSE: u64 = 4;
-/// Share of the coarse Gaussians outside of a zone that its photos are first expected to show.
+/// Share of the coarse Gaussians outside a zone that its photos are initially assumed to show.
 const CONTEXT_SHARE: f64 = 0.25;
-/// Most rounds of the division; each renders every photo once.
+/// Most rounds of dividing; each round renders every photo once.
 const DIVISION_ROUNDS_MAX: usize = 6;
-/// Most blocks: their names have three digits.
+/// Most blocks: block names have three digits.
 pub(super) const BLOCKS_MAX: usize = 1000;
 
-/// How a scene is divided.
+/// Options of [`plan`].
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
-    /// Memory of the card that trains the blocks, bytes.
+    /// Memory of the GPU that trains the blocks, bytes.
     pub card: u64,
     /// Gaussians of the whole scene at the end of growth; 0 takes four times those of the coarse model.
     pub gaussians: u64,
     /// Fewest blocks.
     pub blocks: usize,
-    /// Most views of a block; those with the largest shares of it are taken.
+    /// Most views per block; views with the largest share of the core are preferred.
     pub max_views: usize,
-    /// Longest side of the photos in the training of the blocks, px; 0 for their full size.
+    /// Longest photo side in block training, px; 0 for full size.
     pub max_resolution: u32,
-    /// Steps of a block of up to 300 views; 0 for those of the coarse training. More views have more in proportion.
+    /// Steps of a block with up to 300 views; 0 takes those of the coarse run. Blocks with more views have
+    /// proportionally more steps.
     pub steps: u32,
-    /// Direction of up in the world; `None` finds it by the cameras.
+    /// Up direction in the world; `None` derives it from the cameras.
     pub up: Option<DVec3>,
-    /// How the scene is read. Size and split of its views are those of the coarse training.
+    /// How to read the scene. Photo size and held-out views are those of the coarse run.
     pub load: LoadOptions,
 }
 
@@ -63,7 +64,7 @@ impl Default for PlanOptions {
     }
 }
 
-/// A block to be.
+/// A planned block.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedBlock {
     /// False if too few photos see it.
@@ -71,10 +72,10 @@ pub(super) struct PlannedBlock {
     /// Gaussians at the end of growth.
     pub gaussians: u64,
     pub cell: Cell,
-    /// Coarse Gaussians in the zone, and those of the surroundings.
+    /// Coarse Gaussians in the zone, then frozen ones of the surroundings.
     pub zone_rows: Vec<usize>,
     pub frozen_rows: Vec<usize>,
-    /// Indices of its training views and held-out views.
+    /// Indices of its training views, then of its held-out views.
     pub train: Vec<usize>,
     pub test: Vec<usize>,
     pub need: BlockNeed,
@@ -82,7 +83,7 @@ pub(super) struct PlannedBlock {
 
 /// The blocks of a scene.
 pub struct Plan {
-    /// Gaussians of the coarse model that no block has in its core: far ones.
+    /// Far Gaussians of the coarse model, which are in no block's core.
     pub far: u64,
     pub(super) blocks: Vec<PlannedBlock>,
     pub(super) coarse: CoarseModel,
@@ -90,13 +91,13 @@ pub struct Plan {
     pub(super) extent: f64,
 }
 
-/// Divides the scene at `scene` by its coarse model in the folder `model`: into the fewest blocks that fit the card. `open`
-/// opens the device that renders the coarse model.
+/// Divides the scene at `scene` into the fewest blocks that fit the GPU, using its coarse model in the folder `model`.
+/// `open` opens the device that renders the coarse model.
 ///
 /// # Errors
 ///
-/// A model that is not that of a finished training of this scene; a card too small for what the photos show; a device
-/// too small for the coarse model.
+/// The model is not from a finished run of this scene; the target GPU is too small for what the photos show; the device
+/// is too small for the coarse model.
 pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -> Result<Arc<Gpu>>) -> Result<Plan> {
     if options.blocks == 0 || options.blocks > BLOCKS_MAX {
         return Err(Error::usage(Setting("blocks"), format!("is {}, needs 1 to {BLOCKS_MAX}", options.blocks)));
@@ -107,7 +108,7 @@ pub fn plan(scene: &Path, model: &Path, options: &PlanOptions, open: &dyn Fn() -
     let frame = Frame::from_cameras(&cameras, extent, options.up);
     let places = coarse.settle(&frame);
     if places.is_empty() {
-        let problem = format!("has no Gaussian within {:.3} of the cameras, in world units", frame.far);
+        let problem = format!("has no Gaussian within {:.3} world units of the cameras", frame.far);
         return Err(Error::data(model, "", problem));
     }
     let card = TargetGpu::new(options.card);
@@ -157,7 +158,7 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// Divides until all blocks fit, first by an estimate of what their photos show, then by what these do show.
+    /// Divides until all blocks fit: first by estimating what their photos show, then by rendering it.
     fn blocks(&self, engine: &mut Engine, places: &[(usize, DVec3)]) -> Result<Vec<PlannedBlock>> {
         let mut guessed = vec![self.guessed(Cell::whole(places))?];
         while let Some(at) = self.next_to_halve(&guessed) {
@@ -180,15 +181,15 @@ impl Planner<'_> {
             }
         }
         let problem = format!(
-            "is {} bytes, too little for what the photos of a block show around it; name a larger card, a lower {}, or a \
-             smaller coarse model",
+            "is {} bytes, too little for the surroundings that a block's photos show; use a GPU with more memory, a \
+             lower {}, or a smaller coarse model",
             self.options.card,
             Setting("gaussians")
         );
         Err(Error::usage(Setting("card"), problem))
     }
 
-    /// Returns a cell, and whether it would not fit by an estimate of what its photos show.
+    /// Returns a cell, and true if it is estimated not to fit.
     fn guessed(&self, cell: Cell) -> Result<(Cell, bool)> {
         let zone = self.zone_rows(&cell).len();
         let outside = self.coarse.model.len() - zone;
@@ -196,7 +197,7 @@ impl Planner<'_> {
         Ok((cell, !self.card.fits(&need)))
     }
 
-    /// Returns the largest cell of those that do not fit, or of all while they are too few.
+    /// Returns the largest cell that does not fit, or the largest of all cells while there are too few.
     fn next_to_halve(&self, cells: &[(Cell, bool)]) -> Option<usize> {
         let few = cells.len() < self.options.blocks;
         let candidates = (0..cells.len()).filter(|&at| cells[at].1 || few);
@@ -218,7 +219,7 @@ impl Planner<'_> {
         self.coarse.near_rows.iter().copied().filter(|&row| zone.contains(self.coarse.model.world(row))).collect()
     }
 
-    /// Returns the number of Gaussians at the end of growth for this many coarse ones.
+    /// Returns the number of Gaussians after growth from this many coarse Gaussians.
     fn grown(&self, start: usize) -> u64 {
         let all = self.coarse.model.len() as f64;
         let total =

@@ -1,4 +1,4 @@
-//! The places of a merged model: its blocks, and the seams between them.
+//! Score groups of a merged model: its blocks, and the seams between them.
 
 use crate::error::Result;
 use crate::eval::PlaceGroups;
@@ -7,10 +7,10 @@ use crate::scene::Zone;
 use glam::DVec3;
 use std::path::Path;
 
-/// Groups besides the blocks: what is coarse everywhere, or empty; where zones of blocks overlap; and all else.
+/// Groups besides the blocks: far or empty space, overlaps of zones, and everything else.
 const EXTRA_GROUP_NAMES: [&str; 3] = ["far", "seams", "off the seams"];
 
-/// The blocks of a merged model, as groups of places.
+/// The blocks of a merged model, as score groups.
 pub struct Seams {
     file: BlocksFile,
     cores: Vec<Zone>,
@@ -18,11 +18,11 @@ pub struct Seams {
 }
 
 impl Seams {
-    /// Finds the blocks of the model in a folder; none if it was not merged.
+    /// Reads the blocks of the model in a folder; `None` if the model was not merged.
     ///
     /// # Errors
     ///
-    /// A file of blocks that cannot be read.
+    /// The block file cannot be read.
     pub fn for_model(folder: &Path) -> Result<Option<Self>> {
         if !folder.join(BLOCKS_FILE).is_file() {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Writes the folders of the blocks.
+//! Writes the block folders.
 
 use super::plan::{Plan, PlannedBlock};
 use crate::error::Result;
@@ -17,11 +17,11 @@ const POSITION_RATE_FACTOR: f64 = 0.4;
 const SCALE_RATE_FACTOR: f64 = 0.8;
 const BYTES_PER_MIB: u64 = 1 << 20;
 
-/// Writes a folder for each block into the new folder `out`, then what no block trains, and the list of all last.
+/// Writes a folder per block into the new folder `out`, then the untrained rest, and finally the list of all blocks.
 ///
 /// # Errors
 ///
-/// A folder that is not empty; a file that cannot be written.
+/// The folder is not empty, or a file cannot be written.
 pub fn split(plan: &Plan, out: &Path) -> Result<()> {
     atomic::require_empty("output", out)?;
     let train = &plan.coarse.dataset.train;
@@ -45,7 +45,7 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
     let crc = crc32fast::hash(&text);
     for (index, block) in plan.blocks.iter().enumerate().filter(|(_, block)| block.trained) {
         let folder = out.join(name(index));
-        // Trained rows first: only they have moments.
+        // Trained rows come first: only these have moments.
         let rows: Vec<usize> = block.zone_rows.iter().chain(&block.frozen_rows).copied().collect();
         write_model(BlockFile::init(&folder), &plan.coarse.model.picked(&rows))?;
         plan.file(index, block, crc).write(&folder)?;
@@ -77,12 +77,12 @@ fn row((index, block): (usize, &PlannedBlock)) -> BlockRow {
 }
 
 impl Plan {
-    /// Returns the blocks, as [`split`] lists them.
+    /// Returns the block list as [`split`] writes it.
     pub fn rows(&self) -> Vec<BlockRow> {
         self.blocks.iter().enumerate().map(row).collect()
     }
 
-    /// Returns which coarse Gaussians the merged model has: far ones, and those in cores that are not trained.
+    /// Returns which coarse Gaussians the merged model keeps: far ones, and those in untrained cores.
     fn is_rest(&self) -> Vec<bool> {
         let mut is_rest = vec![true; self.coarse.model.len()];
         for block in self.blocks.iter().filter(|block| block.trained) {
@@ -120,7 +120,7 @@ impl Plan {
     }
 }
 
-/// Returns the seed of a block: TOML holds 63 bits.
+/// Returns the seed of a block, at most 63 bits because of TOML.
 fn seed(run: u64, index: usize) -> u64 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&run.to_le_bytes());

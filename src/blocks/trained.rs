@@ -1,4 +1,4 @@
-//! The finished training of a block.
+//! The finished run of a block.
 
 use crate::Setting;
 use crate::files::label_table::LabelTable;
@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Settings that a block decides, or that change no Gaussian.
+/// Settings that may differ between blocks: the block decides them, or they do not affect Gaussians.
 const SETTINGS_THAT_MAY_DIFFER: [&str; 9] = [
     "seed",
     "iterations",
@@ -25,7 +25,7 @@ const SETTINGS_THAT_MAY_DIFFER: [&str; 9] = [
     "photo_memory",
 ];
 
-/// A training that can be merged.
+/// A block's run that can be merged.
 pub(super) struct TrainedBlock {
     pub block: BlockFile,
     pub folder: PathBuf,
@@ -34,20 +34,20 @@ pub(super) struct TrainedBlock {
     pub device: String,
     pub names: Option<LabelTable>,
     pub settings: Settings,
-    /// New ids of its labels, where those of the trainings do not agree.
+    /// New label ids, if the runs' ids do not agree.
     pub ids: Option<BTreeMap<u32, u32>>,
     labelgs: String,
 }
 
-/// Why a training cannot be merged.
+/// The reason why a run cannot be merged.
 pub(super) struct Problem {
     pub text: String,
-    /// There is no finished training, rather than a wrong one.
+    /// The run is missing or unfinished, rather than wrong.
     pub is_missing: bool,
 }
 
 impl TrainedBlock {
-    /// Reads the Gaussians of its core, with the new ids.
+    /// Reads the core's Gaussians, with the new ids.
     pub(super) fn core(&self) -> crate::Result<Gaussians> {
         let mut model = core(&self.block, &self.model)?;
         if let (Some(ids), Some(labels)) = (&self.ids, &mut model.labels) {
@@ -56,32 +56,32 @@ impl TrainedBlock {
         Ok(model)
     }
 
-    /// Looks at the folder of a training.
+    /// Checks the folder of a run.
     pub(super) fn open(block: &BlockFile, folder: &Path) -> Result<Self, Problem> {
         let problem = |text: String, is_missing| Problem { text: format!("{}: {text}", folder.display()), is_missing };
         let missing = |what: &str| problem(format!("{what}; train block {} into it", block.id), true);
         let odd = |error: crate::Error| problem(error.to_string(), false);
         if !folder.join(block_file::BLOCK_FILE).is_file() {
-            return Err(missing("no training of a block is there"));
+            return Err(missing("no block was trained there"));
         }
         if BlockFile::read(folder).map_err(odd)? != *block {
-            let text = "was trained for another block or split; train it anew in an empty folder";
+            let text = "was trained for another block or split; train it again in an empty folder";
             return Err(problem(text.to_owned(), false));
         }
         let (metrics, config) = (folder.join(summary::METRICS_FILE), folder.join(run_folder::CONFIG));
         if !metrics.is_file() || !config.is_file() {
-            return Err(missing("the training is not finished"));
+            return Err(missing("the run is not finished"));
         }
-        let expected = "expected a file that a training wrote";
+        let expected = "expected a file of a run";
         let steps = read::json::<Value>(&metrics, expected).map_err(odd)?["steps"].as_u64().unwrap_or(0) as u32;
         let settings = Settings::read(&config).map_err(odd)?;
         if steps < settings.train.iterations {
-            let text = format!("the training was stopped after {steps} of {} steps", settings.train.iterations);
+            let text = format!("the run stopped after {steps} of {} steps", settings.train.iterations);
             return Err(missing(&text));
         }
         let model = model_path(folder, steps);
         if !model.is_file() {
-            return Err(missing(&format!("its model of step {steps} is gone")));
+            return Err(missing(&format!("its model of step {steps} is missing")));
         }
         let run: Info = read::json(&folder.join(info::RUN_FILE), expected).map_err(odd)?;
         let last = run.parts.last().cloned().unwrap_or_default();
@@ -92,7 +92,7 @@ impl TrainedBlock {
             steps,
             device: last.device,
             names: LabelTable::of_folder(folder).map_err(odd)?,
-            // The version alone: any commit of it may have written a part.
+            // Compare the version only: each part may come from another commit.
             labelgs: last.labelgs.split(' ').next().unwrap_or_default().to_owned(),
             settings,
             ids: None,
@@ -100,15 +100,15 @@ impl TrainedBlock {
     }
 }
 
-/// Returns the Gaussians of the model at `path` that are in the core of a block.
+/// Reads the Gaussians of the model at `path` that are in a block's core.
 pub(super) fn core(block: &BlockFile, path: &Path) -> crate::Result<Gaussians> {
     let (model, core) = (models::open(path)?.gaussians, block.core.zone(block.axes));
-    // Frozen rows come last; far ones of them may be in the core.
+    // Frozen rows come last; far ones may lie in the core.
     let count = model.len().saturating_sub(block.frozen as usize);
     Ok(model.filtered(|row| row < count && core.contains(model.world(row))))
 }
 
-/// Returns in what trainings differ from the first that must be equal.
+/// Lists the settings in which runs differ from the first run but must not.
 pub(super) fn compare(trained: &[&TrainedBlock]) -> Vec<String> {
     let Some((first, others)) = trained.split_first() else { return Vec::new() };
     let mut problems = Vec::new();

@@ -1,31 +1,31 @@
-//! A photo with the depths of the model.
+//! A photo with model depths.
 
 use crate::files::resize::shrink_photo;
 use crate::scene::{Camera, Photo};
 
-/// Longest side of a frame, px: places in it are known to a hundredth of a pixel.
+/// Longest side of a frame, px. Positions are found to a hundredth of a pixel.
 const SIDE_MAX: u32 = 640;
-/// Most bytes of all frames; those of many photos are smaller.
+/// Most bytes of all frames together; with many photos, frames are smaller.
 const BYTES_MAX: f64 = (1_u64 << 30) as f64;
-/// Bytes of a pixel: its colour with derivatives, and its depth.
+/// Bytes per pixel: colour with derivatives, and depth.
 const PIXEL_BYTES: f64 = 40.0;
-/// Least opacity of the model where its depth is that of a surface.
+/// Smallest opacity at which the model's depth counts as a surface.
 const ALPHA_MIN: f32 = 0.98;
 
-/// A photo with the depths of the model, row-major.
+/// A photo with model depths, row-major.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
-    /// Camera of the frame's size.
+    /// Camera at the frame's size.
     pub(super) camera: Camera,
-    /// Colours, 0 to 1, and their derivatives by x and y, 1 / px. Those of two pixels apart: they have less noise than those
-    /// between neighbours, and poses need fewer rounds.
+    /// Colours, 0 to 1, and their derivatives by x and y, 1 / px. Differences of pixels two apart have less noise than
+    /// neighbours, and poses converge in fewer rounds.
     pub(super) colours: Vec<[[f32; 3]; 3]>,
-    /// Depths along the axis of the camera, world units; NaN where the photo does not count or nothing is opaque.
+    /// Depths along the camera axis, world units; NaN at invalid photo pixels and where the model is not opaque.
     pub(super) depth: Vec<f32>,
 }
 
 impl Frame {
-    /// Returns the camera of a frame, one of `count`, of a photo.
+    /// Returns the camera of a photo's frame, given the number of frames.
     pub(crate) fn camera_of(photo: &Camera, count: usize) -> Camera {
         let pixels = f64::from(photo.width) * f64::from(photo.height);
         let by_side = f64::from(SIDE_MAX) / f64::from(photo.width.max(photo.height));
@@ -33,8 +33,8 @@ impl Frame {
         photo.shrunk(by_side.min(by_bytes).min(1.0))
     }
 
-    /// Makes the frame of a camera, from [`Self::camera_of`], of a photo and of a picture of the model: the sums of depth and of
-    /// opacity along each pixel's ray.
+    /// Makes a frame. `camera` comes from [`Self::camera_of`]; `depth` and `alpha` are the model's summed depth and
+    /// opacity of each pixel.
     pub(crate) fn new(camera: Camera, photo: &Photo, depth: &[f32], alpha: &[f32]) -> Self {
         let photo = shrink_photo(photo, camera.width, camera.height);
         let rgb: Vec<_> =
@@ -46,7 +46,7 @@ impl Frame {
         Self::from_colours(camera, &rgb, depth)
     }
 
-    /// Makes the frame of these colours.
+    /// Makes a frame from colours.
     pub(super) fn from_colours(camera: Camera, rgb: &[[f32; 3]], depth: Vec<f32>) -> Self {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let slope = |before: usize, after: usize| std::array::from_fn(|k| 0.5 * (rgb[after][k] - rgb[before][k]));
@@ -63,7 +63,7 @@ impl Frame {
         self.camera.width.max(self.camera.height)
     }
 
-    /// Returns the frame at half the size: means of two by two pixels, without a last odd row or column.
+    /// Returns the frame at half size: means of 2 x 2 pixels. An odd last row or column is dropped.
     pub(super) fn halved(&self) -> Self {
         let Camera { width, height, .. } = self.camera;
         let (columns, rows) = (width / 2, height / 2);
@@ -77,13 +77,14 @@ impl Frame {
         let rgb = |index| {
             [0, 1, 2].map(|channel| four(index).map(|from| self.colours[from][0][channel]).iter().sum::<f32>() / 4.0)
         };
-        // The mean with a NaN is one.
+        // A NaN makes the mean NaN.
         let depth = |index| four(index).map(|from| self.depth[from]).iter().sum::<f32>() / 4.0;
         let (rgb, depth): (Vec<_>, _) = (pixels().map(rgb).collect(), pixels().map(depth).collect());
         Self::from_colours(camera, &rgb, depth)
     }
 
-    /// Returns the colours and their derivatives by x and y, 1 / px, at a place, px; `None` at the border and beyond.
+    /// Returns the interpolated colour and its derivatives by x and y, 1 / px, at a position in px; `None` at the
+    /// border and outside.
     pub(super) fn colours(&self, x: f64, y: f64) -> Option<[[f64; 3]; 3]> {
         let (column, row) = ((x - 0.5).floor(), (y - 0.5).floor());
         let is_inside = column >= 0.0
@@ -110,7 +111,7 @@ impl Frame {
         Some(found)
     }
 
-    /// Returns the depth of the pixel at a place, px; NaN where there is none.
+    /// Returns the depth of the pixel at a position in px; NaN if unknown.
     pub(super) fn depth_at(&self, x: f64, y: f64) -> f64 {
         let is_inside =
             (0.0..f64::from(self.camera.width)).contains(&x) && (0.0..f64::from(self.camera.height)).contains(&y);
@@ -131,7 +132,7 @@ mod tests {
     fn colours_between_pixels_are_mixed() {
         let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
         let camera = Camera { rotation, translation, fx: 5.0, fy: 5.0, cx: 2.5, cy: 2.0, width: 5, height: 4 };
-        // A slope in one channel, which has the same derivatives everywhere but at the border.
+        // A linear ramp in one channel: its derivatives are constant except at the border.
         let rgb: Vec<[f32; 3]> =
             (0..20_u8).map(|k| [0.1 * f32::from(k % 5) + 0.02 * f32::from(k / 5), 0.5, 0.5]).collect();
         let frame = Frame::from_colours(camera, &rgb, vec![1.0; 20]);

@@ -1,14 +1,14 @@
-//! Bundle adjustment of poses by the photos themselves.
+//! Bundle adjustment of poses by comparing photos with each other.
 //!
-//! The gradient of the photo loss moves a camera until the picture of the model fits its photo. That picture is not quite where
-//! the things are, and all cameras of a ring turn down by up to half a pixel, although their poses were exact: probably
-//! because splats in front cover parts of those behind, so that what lies aslant seems to be farther away. Photos compared with
-//! each other do not have this error, and need only depths from the model. As in direct sparse odometry (Engel et al. 2018), small patches
-//! of a photo are looked up in other photos, through the poses and the depth of the patch, and all poses and depths are solved
-//! for the least difference of colours (Gauss and Newton, with the depths eliminated).
+//! The gradient of the photo loss moves a camera until the render fits its photo. Renders are slightly biased: in a
+//! ring of cameras, exact poses all turn down by up to half a pixel. The likely cause is that front splats occlude
+//! parts of those behind, so slanted surfaces appear farther away. Comparing photos with each other avoids this bias,
+//! and needs only depths from the model. As in direct sparse odometry (Engel et al. 2018), small patches of a photo are
+//! projected into other photos by pose and patch depth. Gauss-Newton then minimises the colour differences over all
+//! poses and depths, with the depths eliminated.
 //!
-//! A [`Frame`] is a photo with the depths of the model, a [`Patch`](patch::Patch) a few of its pixels. [`pair`] compares a patch
-//! with another frame, [`system`] sums the equations of all patches, and [`adjusted`] repeats that, from coarse to fine.
+//! A [`Frame`] is a photo with model depths; a [`Patch`](patch::Patch) is a few of its pixels. [`pair`] compares a
+//! patch with another frame, [`system`] sums the equations of all patches, and [`adjusted`] iterates, coarse to fine.
 
 mod frame;
 mod pair;
@@ -23,28 +23,29 @@ use crate::stage::Stage;
 use patch::Patch;
 use system::{Counts, FrameEquations, System};
 
-/// Largest number of photos: the equations of more need gigabytes.
+/// Most photos: the equations of more photos take gigabytes.
 pub(crate) const PHOTOS_MAX: usize = 1000;
-/// Photos are halved until the longer side has at most this many pixels. Smaller ones have too few patches.
+/// Photos are halved until their longer side has at most this many pixels. Smaller photos have too few patches.
 const COARSEST_SIDE_MAX: u32 = 400;
 /// Largest number of iterations at each size.
 const ROUNDS_MAX: usize = 16;
-/// Converged: the root mean square of the turns of an iteration is below this, radians.
+/// Converged if the root mean square rotation of an iteration is below this, radians.
 const TURN_MIN: f64 = 5e-5;
-/// A photo with fewer patches that match in other photos keeps its pose. Photos of 160 px have 200 to 350 at first, and
-/// iterate to and fro by a tenth of a degree; those of 320 px have 2,000.
+/// A photo with fewer matching patches keeps its pose. Photos of 160 px have only 200 to 350 and oscillate by a tenth
+/// of a degree; photos of 320 px have 2,000.
 const MATCHES_MIN: usize = 400;
-/// A photo of whose comparisons a smaller share matches keeps its pose: it is off by more than a patch.
+/// A photo with a smaller share of matching comparisons keeps its pose: it is off by more than a patch.
 const PHOTO_MATCHES_MIN: f64 = 0.4;
-/// All poses stay if a smaller share of all comparisons matches. Where things shine, move or have detail finer than pixels, the
-/// result would be worse than a good reconstruction. The made scene has 0.85, a photo set of 260 px with fine detail 0.5.
+/// All poses stay if a smaller share of all comparisons matches. With reflections, motion or sub-pixel detail, the
+/// result would be worse than a good reconstruction. A synthetic scene has 0.85, a capture of 260 px with fine detail
+/// 0.5.
 const ALL_MATCHES_MIN: f64 = 0.7;
-/// All poses stay if fewer comparisons are possible than this share of those at first: the poses have drifted off the model,
-/// whose surfaces then hide patches. The made scene has 0.94 and more, a photo set of smooth things, where a bend of all
-/// cameras hardly shows, 0.68.
+/// All poses stay if fewer than this share of the initial comparisons remain possible: the poses have drifted off the
+/// model, whose surfaces then hide patches. A synthetic scene has 0.94 or more. A capture of smooth objects has 0.68,
+/// because it hardly constrains a common bend of the cameras.
 const COMPARABLE_MIN: f64 = 0.85;
 
-/// Returns the camera of each frame with its pose adjusted; `None` for a frame that shares too little with others, and for all
+/// Returns the adjusted camera of each frame; `None` for a frame that shares too little with others, and for all frames
 /// if they agree too little.
 pub(crate) fn adjusted(frames: Vec<Frame>) -> Vec<Option<Camera>> {
     let _stage = Stage::new("comparing photos for their poses", 0);
@@ -93,7 +94,7 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
         let turn = (square / frames.len() as f64).sqrt();
         let (side, count) = (frames[0].side(), patches.iter().map(Vec::len).sum::<usize>());
         tracing::debug!(
-            "poses, {side} px, round {round}: {count} patches, {} of {} comparisons alike, turns of {:.4} degrees",
+            "poses, {side} px, round {round}: {count} patches, {} of {} comparisons match, rotation {:.4} degrees",
             all.matching / 2,
             all.compared / 2,
             turn.to_degrees()
@@ -105,12 +106,12 @@ fn solved(frames: &mut [Frame]) -> Vec<bool> {
     if is_sound(last, before.compared) { is_known } else { vec![false; frames.len()] }
 }
 
-/// Returns true if all comparisons, and their number `before` the first step, tell poses.
+/// Returns true if the comparisons are sound. `before` is the number of comparisons before the first step.
 fn is_sound(all: Counts, before: usize) -> bool {
     let (compared, matching) = (all.compared as f64, all.matching as f64);
     let is_sound = matching >= ALL_MATCHES_MIN * compared && compared >= COMPARABLE_MIN * before as f64;
     if !is_sound {
-        let numbers = format!("{} of {} comparisons of photos agree", all.matching / 2, all.compared / 2);
+        let numbers = format!("{} of {} photo comparisons match", all.matching / 2, all.compared / 2);
         tracing::info!("poses: {numbers}, {} were possible before; too few", before / 2);
     }
     is_sound
@@ -124,7 +125,7 @@ mod tests {
 
     const SIZE: (u32, u32) = (160, 120);
 
-    /// A camera on a ring around the middle.
+    /// A camera on a ring around the origin.
     fn camera(k: usize) -> Camera {
         let angle = 0.2 + 0.14 * k as f64;
         let forward = DVec3::new(-angle.cos(), -angle.sin(), -0.6 - 0.3 * (k % 2) as f64).normalize();
@@ -136,7 +137,7 @@ mod tests {
         Camera { rotation, translation: -(rotation * centre), fx, fy: fx, cx, cy, width, height }
     }
 
-    /// Three walls of a room with waves of colours, seen from `truth`; `depth` is the factor of the known depths.
+    /// Three walls of a room with wavy colours, seen from `truth`; `depth` scales the known depths.
     fn photo(truth: &Camera, given: &Camera, depth: f64) -> Frame {
         let (mut rgb, mut depths) = (Vec::new(), Vec::new());
         for index in 0..(truth.width * truth.height) as usize {
@@ -155,7 +156,7 @@ mod tests {
         Frame::from_colours(given.clone(), &rgb, depths)
     }
 
-    /// Errors of the turns between neighbours, degrees: those of all together are open.
+    /// Rotation errors between neighbours, degrees: the rotation of the whole ring is undetermined.
     fn errors(truth: &[Camera], found: &[Camera]) -> f64 {
         let between = |cameras: &[Camera], k: usize| cameras[k + 1].rotation * cameras[k].rotation.transpose();
         let apart = |k: usize| glam::DQuat::from_mat3(&(between(truth, k) * between(found, k).transpose()));
@@ -172,11 +173,11 @@ mod tests {
             camera.corrected(turn, DVec3::new(0.5 * sign(k / 2), sign(k / 4), sign(1)) * 0.01)
         };
         let given: Vec<Camera> = truth.iter().enumerate().map(off).collect();
-        // The depths of one photo are all too large, those of the next too small.
+        // Depths are too large and too small in alternate photos.
         let depth = |k: usize| if k.is_multiple_of(2) { 1.01 } else { 0.99 };
         let frame = |k: usize| photo(&truth[k], &given[k], depth(k));
         let mut frames: Vec<Frame> = (0..truth.len()).map(frame).collect();
-        // One photo shows nothing that others do.
+        // One photo has no texture to match.
         frames[4].colours.fill([[0.5; 3], [0.0; 3], [0.0; 3]]);
         let found = adjusted(frames);
         assert!(found[4].is_none());
@@ -189,7 +190,7 @@ mod tests {
         assert!(after < 0.05 * before, "{after} of {before} degrees");
     }
 
-    /// A pose comes back from six pixels aside and above, and is not told by chance from twenty.
+    /// A pose is recovered from six pixels off, and not guessed by chance from twenty.
     #[test]
     fn a_pose_far_off_is_found_or_unknown() {
         let truth: Vec<Camera> = (0..9).map(camera).collect();

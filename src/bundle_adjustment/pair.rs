@@ -1,39 +1,40 @@
-//! Comparison of a patch with another photo.
+//! Compares a patch with another photo.
 
 use super::Frame;
 use super::patch::{PATCH_CENTRE, PATCH_PIXELS, Patch, without_mean};
 use crate::scene::Camera;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-/// Numbers of a pose: a turn and a move in camera space.
+/// Parameters of a pose: rotation and translation in camera space.
 pub(super) const POSE_PARAMETERS: usize = 6;
-/// Numbers that a comparison depends on: the pose of the other photo, that of the patch's own, the logarithm of its depth.
+/// Parameters of a comparison: pose of the other photo, pose of the patch's own photo, logarithm of the patch depth.
 pub(super) const COMPARISON_PARAMETERS: usize = 2 * POSE_PARAMETERS + 1;
-/// Most photos with which the patches of one are compared.
+/// Most partner photos per photo.
 const PARTNERS_MAX: usize = 12;
-/// Least cosine of the angle between the axes of two of them: 60 degrees.
+/// Smallest cosine of the angle between the view axes of partners (60 degrees).
 const AXES_COSINE_MIN: f64 = 0.5;
-/// Least share of the patches of a photo that a partner shows.
+/// Smallest share of a photo's patches that a partner must show.
 const SHOWN_SHARE_MIN: f64 = 0.25;
-/// About this many patches tell which photos are partners.
+/// Number of patches sampled to find partners, approximately.
 const SAMPLE_PATCHES: usize = 100;
-/// Largest difference of the depth of a patch and that of the model in its place, as a share.
+/// Largest relative difference between a patch's depth and the model's depth at its projection.
 const DEPTH_DIFFERENCE_MAX: f64 = 0.03;
-/// Least correlation of the colours of a patch and those in its place. With more, just the patches that are off most are left
-/// out in the first rounds.
+/// Smallest correlation between a patch and the pixels at its projection. A higher bound would drop the patches with
+/// the largest errors in the first rounds.
 const CORRELATION_MIN: f64 = 0.5;
-/// Difference of colours from which a patch counts less.
+/// Colour difference above which a patch is down-weighted.
 const COLOUR_NOISE: f64 = 0.02;
 
-/// Returns a camera after a step of its pose: a place y in camera space comes to y + w x y + s, for a small turn w and move s.
+/// Returns a camera after a pose step: a camera-space point y moves to y + w x y + s, for a small rotation w and
+/// translation s.
 pub(super) fn moved(camera: &Camera, step: &[f64; POSE_PARAMETERS]) -> Camera {
     let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::from_slice(&step[..3])));
     let translation = turn * camera.translation + DVec3::from_slice(&step[3..]);
     Camera { rotation: turn * camera.rotation, translation, ..camera.clone() }
 }
 
-/// Returns the frames with which the patches of each frame are compared. They see a good part of the same things, from near
-/// and far: two photos from almost one place tell no depth.
+/// Returns the partner frames of each frame. Partners overlap well and have different baselines: two photos from almost
+/// the same place do not determine depth.
 pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usize>> {
     let of = |host: usize| {
         let every = patches[host].len().div_ceil(SAMPLE_PATCHES).max(1);
@@ -55,13 +56,13 @@ pub(super) fn partners(frames: &[Frame], patches: &[Vec<Patch>]) -> Vec<Vec<usiz
     (0..frames.len()).map(of).collect()
 }
 
-/// Returns true if a frame shows a place of its camera space.
+/// Returns true if a frame shows a point of its camera space.
 fn shows(frame: &Frame, place: DVec3) -> bool {
     let at = frame.camera.project(place);
     place.z > 0.0 && (frame.depth_at(at.x, at.y) - place.z).abs() <= DEPTH_DIFFERENCE_MAX * place.z
 }
 
-/// The way from one camera space to another.
+/// Transform from one camera space to another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CameraTransform {
     turn: DMat3,
@@ -79,19 +80,19 @@ impl CameraTransform {
     }
 }
 
-/// What a comparison adds to the equations: second moments of the derivatives of the difference by place, their product
-/// with the difference, and the derivatives of the place.
+/// The contribution of a comparison to the equations: second moments of the colour gradient, its product with the
+/// difference, and the derivatives of the projected position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Comparison {
     /// Of xx, xy and yy, 1 / px^2.
     pub(super) moments: [f64; 3],
     /// Of x and y, 1 / px.
     pub(super) pull: [f64; 2],
-    /// Derivatives of x and y, px, by the numbers.
+    /// Derivatives of x and y, px, by the parameters.
     pub(super) places: [[f64; COMPARISON_PARAMETERS]; 2],
 }
 
-/// Compares a patch with a frame. `None` if the frame does not show it, `Some(None)` if it shows something else there.
+/// Compares a patch with a frame. `None` if the frame does not show the patch, `Some(None)` if the pixels do not match.
 pub(super) fn compare(transform: &CameraTransform, patch: &Patch, frame: &Frame) -> Option<Option<Comparison>> {
     let middle = transform.apply(patch.places[PATCH_CENTRE]);
     if !shows(frame, middle) {
@@ -131,7 +132,7 @@ pub(super) fn compare(transform: &CameraTransform, patch: &Patch, frame: &Frame)
     }))
 }
 
-/// Returns the derivatives of the place of a patch in the other photo.
+/// Returns the derivatives of a patch's position in the other photo.
 fn derivatives(transform: &CameraTransform, other: &Camera, own: DVec3) -> [[f64; COMPARISON_PARAMETERS]; 2] {
     let there = transform.apply(own);
     let mut found = [[0.0; COMPARISON_PARAMETERS]; 2];

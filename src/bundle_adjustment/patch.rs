@@ -1,37 +1,37 @@
-//! Small parts of a photo that other photos show too.
+//! Small patches of a photo, to be found in other photos.
 
 use super::Frame;
 use glam::{DVec2, DVec3};
 
-/// Pixels on each side of the middle of a patch. Larger patches reach over contours more often.
+/// Pixels on each side of a patch's centre. Larger patches cross contours more often.
 const PATCH_REACH_PX: u32 = 2;
-/// Pixels of a patch.
+/// Pixels per patch.
 pub(super) const PATCH_PIXELS: usize = ((2 * PATCH_REACH_PX + 1) * (2 * PATCH_REACH_PX + 1)) as usize;
-/// Index of the middle.
+/// Index of the centre pixel.
 pub(super) const PATCH_CENTRE: usize = PATCH_PIXELS / 2;
-/// Smallest side of the cells of a frame, px, each of which has at most one patch.
+/// Smallest cell side, px. Each cell of a frame has at most one patch.
 const CELL_MIN: u32 = 8;
-/// Most cells of a frame.
+/// Most cells per frame.
 const CELLS_MAX: f64 = 2000.0;
-/// Least mean square of the derivatives of colours, 1 / px^2, all channels together.
+/// Smallest mean square of the colour derivatives, 1 / px^2, summed over channels.
 const CONTRAST_MIN: f32 = 0.03 * 0.03;
-/// Largest range of depths in a patch, as a share of them: it lies on one surface.
+/// Largest relative depth range of a patch, so that it lies on one surface.
 const DEPTH_RANGE_MAX: f32 = 0.04;
 
 /// A patch of a frame, with its pixels in rows.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
-    /// Places of the pixels, camera space, world units.
+    /// Pixel positions in camera space, world units.
     pub(super) places: [DVec3; PATCH_PIXELS],
-    /// Their colours, with the mean of each channel taken away.
+    /// Pixel colours minus the mean of each channel.
     pub(super) colours: [[f64; 3]; PATCH_PIXELS],
 }
 
-/// Returns the patches of a frame: in each cell where the colours change most.
+/// Returns the patches of a frame: one per cell, where the colour gradient is largest.
 pub(super) fn frame_patches(frame: &Frame) -> Vec<Patch> {
     let (width, height) = (frame.camera.width, frame.camera.height);
     let cell = CELL_MIN.max((f64::from(width) * f64::from(height) / CELLS_MAX).sqrt().ceil() as u32);
-    // The square of the derivatives of each pixel, all channels together.
+    // Squared gradient of each pixel, summed over channels.
     let square = |[_, by_x, by_y]: &[[f32; 3]; 3]| by_x.iter().chain(by_y).map(|value| value * value).sum::<f32>();
     let change: Vec<f32> = frame.colours.iter().map(square).collect();
     let margin = PATCH_REACH_PX + 1;
@@ -71,7 +71,7 @@ fn patch(frame: &Frame, x: u32, y: u32) -> Option<Patch> {
     (farthest - nearest <= DEPTH_RANGE_MAX * nearest).then_some(Patch { places, colours })
 }
 
-/// Takes the mean of each channel away.
+/// Subtracts the mean of each channel.
 pub(super) fn without_mean(colours: &mut [[f64; 3]; PATCH_PIXELS]) {
     for k in 0..3 {
         let mean = colours.iter().map(|colour| colour[k]).sum::<f64>() / PATCH_PIXELS as f64;

@@ -5,21 +5,22 @@ use super::pair::{COMPARISON_PARAMETERS, CameraTransform, Comparison, POSE_PARAM
 use super::patch::Patch;
 use rayon::prelude::*;
 
-/// Share of its diagonal that is added to the equations of poses: place, turn and size of the whole are open.
+/// Share of the diagonal that is added to the pose equations, because position, rotation and scale of the whole are
+/// undetermined.
 const POSE_DAMPING: f64 = 1e-7;
 /// The same for depths.
 const DEPTH_DAMPING: f64 = 1e-3;
 /// Largest step of the logarithm of a depth.
 const DEPTH_STEP_MAX: f64 = 0.02;
-/// Fewest rows of a matrix that are worth another thread.
+/// Fewest matrix rows that are worth another thread.
 const ROWS_MIN: usize = 64;
 
-/// Comparisons of a frame.
+/// Comparison counts of a frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
-    /// Patches that were looked up in places that show them by their depth.
+    /// Comparisons with frames that show the patch, judged by depth.
     pub(super) compared: usize,
-    /// Those that found something alike.
+    /// Comparisons that match.
     pub(super) matching: usize,
 }
 
@@ -36,13 +37,13 @@ impl std::ops::Add for Counts {
 struct DepthEquation {
     /// Second derivative.
     curvature: f64,
-    /// First derivative, with its sign changed.
+    /// Negative first derivative.
     pull: f64,
-    /// Mixed derivatives by poses: the index of the frame among host and partners, and its six numbers.
+    /// Mixed derivatives with poses: index of the frame among host and partners, and six parameters.
     mixed: Vec<(usize, [f64; POSE_PARAMETERS])>,
 }
 
-/// The equations of the patches of one frame, by the poses of the frame itself and its partners, in this order. Depths are
+/// The equations of one frame's patches, in the poses of the frame and its partners, in this order. Depths are
 /// eliminated.
 #[derive(Clone, Debug)]
 pub(super) struct FrameEquations {
@@ -72,7 +73,7 @@ pub(super) fn sums(frames: &[Frame], patches: &[Vec<Patch>], partners: &[Vec<usi
     (0..frames.len()).into_par_iter().map(of).collect()
 }
 
-/// Returns the steps of a frame and its partners.
+/// Returns the pose steps of a frame and its partners.
 pub(super) fn steps_of(
     host: usize,
     partners: &[usize],
@@ -92,7 +93,7 @@ impl FrameEquations {
         }
     }
 
-    /// Adds a patch, by its comparison with each partner.
+    /// Adds a patch, given its comparison with each partner.
     fn add(&mut self, each: impl Iterator<Item = Option<Option<Comparison>>>) {
         let mut own = [0.0; POSE_PARAMETERS];
         let mut depth = DepthEquation { curvature: 0.0, pull: 0.0, mixed: Vec::new() };
@@ -141,7 +142,7 @@ impl FrameEquations {
         }
     }
 
-    /// Moves the depths of the patches after the steps of the frame and its partners.
+    /// Updates the patch depths after the pose steps of the frame and its partners.
     pub(super) fn move_depths(&self, patches: &mut [Patch], steps: &[[f64; POSE_PARAMETERS]]) {
         for (patch, depth) in patches.iter_mut().zip(&self.depths).filter(|(_, depth)| depth.curvature > 0.0) {
             let by_poses: f64 = depth.mixed.iter().map(|(frame, by)| dot(by, &steps[*frame])).sum();
@@ -151,12 +152,12 @@ impl FrameEquations {
     }
 }
 
-/// Returns the place of a number of a comparison with a partner in [`FrameEquations`].
+/// Returns the index in [`FrameEquations`] of a parameter of a comparison with a partner.
 fn index(partner: usize, number: usize) -> usize {
     if number < POSE_PARAMETERS { POSE_PARAMETERS * partner + number } else { number - POSE_PARAMETERS }
 }
 
-/// Returns the matrix and the right side of a comparison.
+/// Returns the matrix and the right-hand side of a comparison.
 fn products(
     compared: &Comparison,
 ) -> ([[f64; COMPARISON_PARAMETERS]; COMPARISON_PARAMETERS], [f64; COMPARISON_PARAMETERS]) {
@@ -201,7 +202,7 @@ impl System {
         all
     }
 
-    /// Returns the step of each frame, 0 for those that are not told; `None` if the equations have no solution.
+    /// Returns the step of each frame, 0 for frames that are not constrained; `None` if the equations have no solution.
     pub(super) fn solved(mut self, is_told: &[bool]) -> Option<Vec<[f64; POSE_PARAMETERS]>> {
         let side = self.right.len();
         for row in 0..side {
@@ -221,8 +222,8 @@ impl System {
     }
 }
 
-/// Solves symmetric positive equations (Cholesky). The matrix becomes the lower factor, the right side the solution. `None` if
-/// there is none.
+/// Solves symmetric positive equations (Cholesky). The matrix is replaced by the lower factor, the right-hand side by
+/// the solution. `None` if there is no solution.
 pub(crate) fn solve(matrix: &mut [f64], right: &mut [f64]) -> Option<()> {
     let side = right.len();
     for column in 0..side {

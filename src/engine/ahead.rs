@@ -1,4 +1,4 @@
-//! Kernels of later steps, compiled while the first ones run.
+//! Compiles the kernels of later steps while the first steps run.
 
 use crate::gpu::Gpu;
 use crate::scheduler::plan::PassList;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-/// A thread that compiles kernels, until it is dropped.
+/// A background thread that compiles kernels until it is dropped.
 #[derive(Debug)]
 pub(super) struct KernelCompiler {
     is_over: Arc<AtomicBool>,
@@ -14,7 +14,8 @@ pub(super) struct KernelCompiler {
 }
 
 impl KernelCompiler {
-    /// Begins to compile the kernels of these lists, in their order. A failure is that of the list which needs the kernel.
+    /// Starts to compile the kernels of these lists, in order. Failures are ignored here: the list that needs the
+    /// kernel reports them.
     pub(super) fn new(gpu: &Arc<Gpu>, lists: Vec<PassList>) -> Self {
         let (gpu, is_over) = (Arc::clone(gpu), Arc::new(AtomicBool::new(false)));
         let ends = Arc::clone(&is_over);
@@ -25,7 +26,7 @@ impl KernelCompiler {
                 }
             }
         };
-        // Without a thread, lists compile their kernels on first use.
+        // If no thread can be started, lists compile their kernels on first use.
         Self { is_over, thread: thread::Builder::new().name("kernels".to_owned()).spawn(compile).ok() }
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures with more tiles than a device can walk, in bands of rows.
+//! Draws pictures in bands of rows, if they have more tiles than a device can process at once.
 
 use super::Engine;
 use super::uniforms::with_slopes_of;
@@ -15,18 +15,18 @@ pub(crate) struct Band {
 }
 
 impl Band {
-    /// Returns the range of its pixels in a row-major picture.
+    /// Returns the band's pixel range in a row-major picture.
     pub(crate) fn pixels(self, width: u32) -> std::ops::Range<usize> {
         let (first, width) = (self.first as usize, width as usize);
         first * width..(first + self.rows as usize) * width
     }
 
-    /// Returns the camera of its rows of a picture.
+    /// Returns the camera of the band's rows.
     pub(crate) fn camera(self, whole: &Camera) -> Camera {
         Camera { cy: whole.cy - f64::from(self.first), height: self.rows, ..whole.clone() }
     }
 
-    /// Returns the bands of a picture, all but the last with `most` rows.
+    /// Splits a picture into bands of `most` rows; the last may be smaller.
     pub(crate) fn split(height: u32, most: u32) -> Vec<Self> {
         let most = most.max(1);
         (0..height.div_ceil(most)).map(|at| Self { first: at * most, rows: most.min(height - at * most) }).collect()
@@ -34,17 +34,18 @@ impl Band {
 }
 
 impl Engine {
-    /// Returns the bands in which a picture of the camera is drawn: one, unless the device cannot walk its tiles at once.
+    /// Returns the bands in which a picture of the camera is drawn: one, unless it has too many tiles for the device.
     pub(crate) fn bands(&self, camera: &Camera) -> Vec<Band> {
         Band::split(camera.height, self.size.band(&self.shape).unwrap_or(camera.height))
     }
 
-    /// Returns the camera's part of the uniforms for a band. Slopes keep the limits of the whole picture.
+    /// Returns the camera's part of the uniforms for a band. The slope limits are those of the whole picture.
     pub(crate) fn band_uniforms(&self, camera: &Camera, band: Band, near: f32, background: [f32; 3]) -> StepUniforms {
         self.part_uniforms(&band.camera(camera), Some(camera), near, background)
     }
 
-    /// Returns the camera's part of the uniforms; for a part of a picture, with the limits of slopes of the `whole` one.
+    /// Returns the camera's part of the uniforms. For a part of a picture, the slope limits are those of the `whole`
+    /// picture.
     pub(crate) fn part_uniforms(
         &self,
         camera: &Camera,

@@ -1,4 +1,4 @@
-//! Predictions of memory for a device that is not here.
+//! Predicts the memory use on a device that is not present.
 
 use super::growth::vote_capacity;
 use super::{Engine, EngineSize, capacity};
@@ -8,8 +8,8 @@ use crate::pass::buffers::TABLE;
 use crate::pass::{GroupBlend, KernelShape, Update};
 use crate::scheduler::plan::{MemoryReport, PlanOptions};
 
-/// Returns kernels and limits of a typical graphics card with some bytes of memory: subgroups of 32, bindings and
-/// allocations of 4 GiB.
+/// Returns kernels and limits of a typical GPU with `memory` bytes: subgroups of 32, bindings and allocations of up to
+/// 4 GiB.
 pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     const BINDING_BYTES_MAX: u64 = u32::MAX as u64 & !0xffff;
     let limits = PlanLimits {
@@ -18,7 +18,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
         max_memory: memory,
         ..PlanLimits::default()
     };
-    // Cards bind far more buffers than is usual elsewhere.
+    // GPUs bind far more buffers than the default limits allow.
     let limits = PlanLimits { max_storage_buffers: 1 << 20, ..limits };
     let own = KernelShape::new(32, false);
     let shape = KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys: true, ..own };
@@ -30,7 +30,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
 ///
 /// # Errors
 ///
-/// A buffer or the whole beyond the limits.
+/// A buffer or the total exceeds the limits.
 pub(crate) fn predict_for(shape: &KernelShape, limits: &PlanLimits, size: &EngineSize) -> Result<MemoryReport> {
     let size = &size.in_bands(shape);
     let capacity = capacity(shape, size);
@@ -40,7 +40,7 @@ pub(crate) fn predict_for(shape: &KernelShape, limits: &PlanLimits, size: &Engin
     Ok(votes.unwrap_or(steps))
 }
 
-/// Predicts the memory of a training while it counts votes; `None` if it never needs other memory than its steps.
+/// Predicts the memory of a training while it counts votes; `None` if counting needs no other memory than steps.
 pub(crate) fn predict_votes(
     shape: &KernelShape,
     limits: &PlanLimits,

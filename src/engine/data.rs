@@ -1,4 +1,4 @@
-//! Typed access to the buffers on the device. No list may be in flight.
+//! Typed access to device buffers. No list may be in flight.
 
 use super::{Engine, late, model};
 use crate::error::Result;
@@ -15,12 +15,12 @@ impl Engine {
         Ok(rows.as_chunks::<4>().0.iter().map(|&[x, y, z, _]| [x, y, z]).collect())
     }
 
-    /// Bytes that it uses on the device.
+    /// Bytes in use on the device.
     pub fn memory(&self) -> u64 {
         self.sched.memory_total()
     }
 
-    /// Bytes between host and device so far.
+    /// Bytes transferred between host and device so far.
     pub(crate) fn traffic(&self) -> Traffic {
         self.sched.traffic()
     }
@@ -99,7 +99,7 @@ impl Engine {
         Ok(labels)
     }
 
-    /// Sets a coordinate of the first position to NaN, as a faulty device would.
+    /// Sets a coordinate of the first position to NaN, to simulate a faulty device.
     pub(crate) fn spoil(&mut self) -> Result<()> {
         self.sched.upload(Buf::MEANS, 0, 0, &[f32::NAN])
     }

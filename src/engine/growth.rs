@@ -1,4 +1,4 @@
-//! Memory of an engine: initial capacities from known sizes, then growth to what the scene needs.
+//! Sizes of an engine's memory: initial capacities from known sizes, then growth on demand.
 
 use super::{Engine, EngineSize, LabelSize, Report, predict_for};
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use crate::shaders::constants::{LABEL_ROUNDS, MISSED_ROWS};
 use crate::shaders::structs::Counters;
 use serde::{Deserialize, Serialize};
 
-/// Grown sizes of an engine's memory. Under a memory bound, the room that is left depends on them.
+/// Grown sizes of an engine's memory. Under a memory limit, they determine the remaining room.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GrownSizes {
     /// Gaussians that fit.
@@ -20,13 +20,13 @@ pub struct GrownSizes {
     pub instances: u32,
     /// Occupied tiles of object layers.
     pub layer_tiles: u32,
-    /// Segments of the longest list of a tile.
+    /// Segments of the longest tile list.
     pub segments: u32,
 }
 
-/// Pairs (Gaussian, label) that one sweep of votes counts, of 8 bytes: 128 MiB.
+/// Most (Gaussian, label) pairs per vote sweep. At 8 bytes each, they take 128 MiB.
 const VOTE_CELLS_MAX: u64 = 1 << 24;
-/// Labels that one sweep counts whatever the number of Gaussians.
+/// Fewest labels per vote sweep, however many Gaussians there are.
 const VOTE_COLUMNS_MIN: u64 = 16;
 
 /// Returns initial capacities for `size`, before any measurement.
@@ -37,9 +37,9 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     let layers = size.labels.map_or(0, |labels| u64::from(labels.layers));
     let labels = size.labels.map_or(0, |labels| u64::from(labels.max_label) + 1);
     let label_words = if labels > 0 { labels.div_ceil(32) * (layers + 1) } else { 0 };
-    // Lists bind the model's buffers even if the model is empty.
+    // Lists bind the model buffers even if the model is empty.
     let gaussians = size.gaussians.max(1);
-    // About what trained scenes have: larger tiles share fewer Gaussians.
+    // Typical for trained scenes: larger tiles share fewer Gaussians.
     let instances = if shape.tile_pixels() >= 256 { gaussians * 5 / 2 } else { gaussians * 6 }.max(tiles * 16);
     let trained = if size.trained { gaussians.saturating_sub(u64::from(size.frozen)) } else { 0 };
     let late = if shape.update == Update::Split { 0 } else { trained };
@@ -71,26 +71,26 @@ pub fn capacity(shape: &KernelShape, size: &EngineSize) -> Capacity {
     capacity
 }
 
-/// Returns the capacities of a training that counts votes, and the list that does so; `None` where nothing changes.
+/// Returns the capacities and the list with which a training counts votes; `None` if its usual capacities suffice.
 pub(super) fn vote_capacity(
     shape: &KernelShape,
     capacity: &Capacity,
     size: &EngineSize,
 ) -> Option<(Capacity, PassList)> {
     let mut counting = Capacity { vote_cells: vote_columns(size) * capacity.gaussians, ..*capacity };
-    // Nor is there a gradient.
+    // Counting votes needs no gradients.
     derive(shape, &mut counting, capacity.instances, false);
     let list = || pass::vote_view(shape, &counting, 1, false);
     (size.trained && counting.vote_cells > 0).then(|| (counting, list()))
 }
 
-/// Returns the labels that one sweep of votes counts: all, if they fit in [`VOTE_CELLS_MAX`], and always [`VOTE_COLUMNS_MIN`].
+/// Returns the labels per vote sweep: all if they fit in [`VOTE_CELLS_MAX`], but at least [`VOTE_COLUMNS_MIN`].
 fn vote_columns(size: &EngineSize) -> u64 {
     let fit = (VOTE_CELLS_MAX / size.gaussians.max(1)).max(VOTE_COLUMNS_MIN);
     size.labels.map_or(0, |labels| u64::from(labels.vote_columns)).min(fit)
 }
 
-/// Sets the capacities that follow from the numbers of instances and of layer tiles.
+/// Sets the capacities that depend on the numbers of instances and layer tiles.
 fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained: bool) {
     capacity.instances = instances;
     capacity.key_words = if shape.has_narrow_keys(capacity.virtual_tiles) { instances.div_ceil(2) } else { instances };
@@ -117,7 +117,7 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
 
 /// The training step with the most buffers.
 fn widest(size: &EngineSize) -> Variant {
-    // Layers need more memory than a disagreement; a size without layers has none.
+    // Layers need more memory than a disagreement.
     let supervision = match size.labels {
         Some(labels) if labels.layers > 0 => Supervision::Layers { lift: true },
         Some(_) => Supervision::Disagreement,
@@ -128,7 +128,7 @@ fn widest(size: &EngineSize) -> Variant {
 }
 
 impl Engine {
-    /// Labels that one sweep of votes counts; 0 without memory for votes.
+    /// Labels per vote sweep; 0 without memory for votes.
     pub(crate) fn vote_columns(&self) -> usize {
         vote_columns(&self.size) as usize
     }
@@ -151,7 +151,7 @@ impl Engine {
         lists
     }
 
-    /// Grows the model's buffers if `count` Gaussians do not fit. All lists are then recorded again.
+    /// Grows the model buffers if `count` Gaussians do not fit. All lists are then recorded again.
     #[doc(hidden)]
     pub fn make_room_for_gaussians(&mut self, count: u64) -> Result<()> {
         if count <= self.size.gaussians {
@@ -181,7 +181,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Raises the largest image size to at least `width` x `height` px and keeps the model. No list may be in flight.
+    /// Grows the image buffers to at least `width` x `height` px and keeps the model. No list may be in flight.
     /// All lists are then recorded again.
     pub fn grow_image(&mut self, width: u32, height: u32) -> Result<()> {
         let image = (self.size.image.0.max(width), self.size.image.1.max(height));
@@ -196,7 +196,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Returns the largest number of Gaussians, up to `wanted`, that fits in memory; at least the present room.
+    /// Returns the largest number of Gaussians, up to `wanted`, that fits in memory; at least the current room.
     pub(crate) fn most_gaussians(&self, wanted: u64) -> Result<u64> {
         let (mut fits, mut too_many) = (self.size.gaussians, wanted + 1);
         if wanted <= fits || self.fits(&self.with_gaussians(wanted))? {
@@ -248,8 +248,8 @@ impl Engine {
         Ok(fit(capacity, &lists)? && counting.map_or(Ok(true), |(counting, list)| fit(&counting, &[list]))?)
     }
 
-    /// Begins a sweep of votes, all of which are 0. A training has memory for them only until [`Engine::end_votes`], where
-    /// gradients and scratch of its steps were. No list may be in flight.
+    /// Begins a vote sweep with all votes at 0. During training, votes take the memory of gradients and scratch until
+    /// [`Engine::end_votes`]. No list may be in flight.
     pub(crate) fn begin_votes(&mut self) -> Result<()> {
         self.check_idle()?;
         match vote_capacity(&self.shape, &self.capacity, &self.size) {
@@ -258,7 +258,7 @@ impl Engine {
         }
     }
 
-    /// Ends a sweep of votes.
+    /// Ends a vote sweep.
     pub(crate) fn end_votes(&mut self) -> Result<()> {
         if !self.trades_votes() {
             return Ok(());
@@ -274,7 +274,7 @@ impl Engine {
     }
 
     /// Grows the buffers that were too small for a failed list, and clears the failure. Returns true if a buffer grew;
-    /// lists that were in flight have then changed nothing.
+    /// the lists in flight then had no effect.
     #[doc(hidden)]
     pub fn recover(&mut self, report: &Report) -> Result<bool> {
         if report.counters.failure == 0 {
@@ -283,7 +283,7 @@ impl Engine {
         self.abandon()?;
         let needed = &report.counters;
         let grown = self.capacity_of(needed, |current, needed| self.grown(current, needed));
-        // If reserves do not fit, allocate exactly what is needed.
+        // If growth with reserves does not fit, allocate exactly what is needed.
         let least = self.capacity_of(needed, |_, needed| needed);
         let new = if self.fits(&grown)? { grown } else { least };
         if new == self.capacity {
@@ -306,7 +306,7 @@ impl Engine {
         Ok(true)
     }
 
-    /// Returns the present capacities, grown where they were too small.
+    /// Returns the current capacities, grown where they were too small.
     fn capacity_of(&self, needed: &Counters, grown: impl Fn(u64, u64) -> u64) -> Capacity {
         let mut new = self.capacity;
         let follow = |have: &mut u64, needed: u32| {

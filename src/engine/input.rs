@@ -24,15 +24,15 @@ pub(crate) enum Input<'a> {
 pub(crate) struct TrainInput<'a> {
     /// Uniforms.
     pub uniforms: StepUniforms,
-    /// Names photo and labels of the view, if they come again.
+    /// Key of the view's photo and labels, if they will be used again.
     pub key: Option<DataKey>,
     /// The photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.
     pub photo: Cow<'a, [[u8; 4]]>,
     /// Labels, in a step with object layers.
     pub layers: Option<LayerInput<'a>>,
-    /// Visible object of each pixel, `[P]`, in a step that compares it with the labels of the splats.
+    /// Visible object of each pixel, `[P]`, in a step that compares it with splat labels.
     pub disagreement: Option<&'a [u32]>,
-    /// 1 / depth of each pixel that the photo is known to have, `[P]`, 0 for unknown, in a step that compares them.
+    /// Known 1 / depth of each pixel, `[P]`, 0 for unknown, in a step that compares depths.
     pub depths: Option<&'a [f32]>,
     /// Rows of shared parameters that the step uses; its passes refer to them by index in this order.
     pub shared: Vec<SharedRow>,
@@ -58,7 +58,7 @@ pub(crate) struct LayerInput<'a> {
     pub label_from_layer: Vec<u32>,
     /// Weight of each layer's label loss.
     pub weights: Vec<f32>,
-    /// A bit per label id for each layer; set if that object hides the layer's object.
+    /// For each layer, one bit per label id; set if that object hides the layer's object.
     pub occluders: Vec<u32>,
 }
 
@@ -107,15 +107,15 @@ impl Engine {
     pub(crate) fn write(&mut self, frame: usize, input: Input) -> Result<()> {
         let uniforms = input.uniforms();
         self.size.check_image(uniforms.width, uniforms.height)?;
-        // A record of a (splat, tile) pair is valid only if it carries the stamp of its submit.
+        // The record of a (splat, tile) pair is valid only if it carries the stamp of the current submit.
         self.stamp = self.stamp.wrapping_add(1).max(1);
         if let Input::Train(train) = input {
             self.write_shared(frame, &train.shared)?;
         }
         let (gaussian_count, trained_count) = (self.gaussian_count, self.trained_count());
         let word = |room: u64| u32::try_from(room).unwrap_or(u32::MAX);
-        // Uniforms of a step may be older than a densification after it. Capacities are here and not in the kernels, so that
-        // growth compiles nothing.
+        // A step's uniforms may be older than the latest densification. Capacities are uniforms rather than kernel
+        // constants, so that growth does not recompile kernels.
         let counts = StepUniforms {
             gaussian_count,
             trained_count,
@@ -132,7 +132,7 @@ impl Engine {
         match input {
             Input::Uniforms(_) => Ok(()),
             Input::Train(train) => {
-                // A photo that was made for this step does not come again.
+                // A photo made for this step is not used again.
                 let key = train.key.filter(|_| matches!(train.photo, Cow::Borrowed(_)));
                 sched.load(Buf::TARGET, frame, key, || Cow::Borrowed(&train.photo))?;
                 train.depths.map_or(Ok(()), |depths| sched.upload(Buf::DEPTHS, frame, 0, depths))?;
@@ -153,7 +153,7 @@ impl Engine {
         }
     }
 
-    /// Writes the rows of a step and marks the end of their list. Each row may occur once.
+    /// Writes the rows of a step and a terminator. Each row may occur once.
     fn write_shared(&mut self, frame: usize, shared: &[SharedRow]) -> Result<()> {
         let mut rows: Vec<u32> = shared.iter().map(|step| step.row).collect();
         let mut sorted = rows.clone();

@@ -1,14 +1,14 @@
-//! Labels of models on the device: ids that passes cannot hold have numbers there.
+//! Maps label ids that are too large for the passes to smaller numbers on the device.
 
 use crate::error::{Error, Result};
 use crate::scene::{LABEL_MAX, UNLABELLED};
 use std::borrow::Cow;
 
-/// The id of each number, sorted, so that numbers have the order of ids; empty if the device holds the ids themselves.
+/// The id of each number, sorted, so that numbers and ids have the same order; empty if the device holds ids directly.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LabelIds(Vec<u32>);
 
-/// Returns the error with which a device does not tell labels apart, or `None` if it does.
+/// Returns an error if the labels are too many to be distinguished on the device.
 pub(crate) fn tell_apart(labels: impl Iterator<Item = u32> + Clone) -> Option<Error> {
     if labels.clone().all(|label| label <= LABEL_MAX) {
         return None;
@@ -16,7 +16,7 @@ pub(crate) fn tell_apart(labels: impl Iterator<Item = u32> + Clone) -> Option<Er
     let count = ids_of(labels).len() - 1;
     let problem = || {
         format!(
-            "{count} different labels with ids above {LABEL_MAX} are more than the device tells apart in one picture, \
+            "the model has {count} different labels with ids above {LABEL_MAX}, too many for one picture, \
              {LABEL_MAX}; take a part of the model, or merge labels"
         )
     };
@@ -32,7 +32,7 @@ fn ids_of(labels: impl Iterator<Item = u32>) -> Vec<u32> {
 }
 
 impl LabelIds {
-    /// Returns the ids of some labels, and the labels for the device. Fails with more different labels than there are numbers.
+    /// Returns the id table and the labels for the device. Fails if there are more different labels than numbers.
     pub(super) fn pack(labels: &[u32]) -> Result<(Self, Cow<'_, [u32]>)> {
         if labels.iter().all(|&label| label <= LABEL_MAX) {
             return Ok((Self::default(), Cow::Borrowed(labels)));
@@ -45,14 +45,14 @@ impl LabelIds {
         Ok((Self(ids), Cow::Owned(numbers)))
     }
 
-    /// Replaces numbers from the device by ids.
+    /// Replaces device numbers by label ids.
     pub(super) fn unpack(&self, labels: &mut [u32]) {
         if !self.0.is_empty() {
             labels.iter_mut().for_each(|label| *label = self.0.get(*label as usize).copied().unwrap_or(UNLABELLED));
         }
     }
 
-    /// Returns true if labels on the device are numbers, not ids.
+    /// Returns true if the device holds numbers instead of ids.
     pub(super) fn are_packed(&self) -> bool {
         !self.0.is_empty()
     }

@@ -1,5 +1,5 @@
-//! Late Gaussians on the host: a model or a state is read without a change of what is on the device, so that a training has
-//! the same bits whoever reads it.
+//! Applies missed updates on the host when a model or state is read. The device is not changed, so reading does not
+//! affect the training, bit for bit.
 
 use super::Engine;
 use super::missed::{MissedUpdates, Weights};
@@ -12,19 +12,19 @@ use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::ADAM_EPSILON;
 
-/// Name of the plane with the weights of missed updates, after a row with the numbers of updates.
+/// Plane with the weights of missed updates; its first row has the update numbers.
 const MISSED_PLANE: &str = "missed_updates";
-/// Words of its rows.
+/// Words per row of that plane.
 const MISSED_ROW_WORDS: u32 = 8;
 
-/// Which of the eight rates each component of a vec4 has, by the rate of its attribute.
+/// Index of the learning rate (of eight) of each vec4 component, by the attribute's rate.
 const COMPONENT_RATES: [[usize; 4]; 5] = [[0, 1, 2, 3], [4; 4], [5; 4], [6, 6, 6, 7], [7; 4]];
 
-/// What each Gaussian has missed.
+/// The updates that each Gaussian has missed.
 pub(super) struct PendingUpdates {
-    /// Number of updates, of each trained Gaussian.
+    /// Number of missed updates of each trained Gaussian.
     ages: Vec<usize>,
-    /// By number of updates: sums for the eight rates, factors of first and second moments.
+    /// For each number of missed updates: sums for the eight rates, and factors of both moments.
     sums: Vec<(Weights, [f32; 2])>,
     /// The moments are packed.
     half: bool,
@@ -36,7 +36,7 @@ impl PendingUpdates {
         Self { ages, sums: missed.sums(), half }
     }
 
-    /// Catches up the values of a plane of parameters, given with its moments, which it catches up too.
+    /// Applies missed updates to the values of a parameter plane and to its moments.
     fn settle(&self, plane: Buf, [values, m, u]: [&mut [f32]; 3]) {
         let Some(attribute) = MODEL_ATTRIBUTES.iter().find(|attribute| attribute.planes[0] == plane) else { return };
         let (rates, floats) = (COMPONENT_RATES[attribute.rate as usize], 4 * attribute.stride as usize);
@@ -51,7 +51,7 @@ impl PendingUpdates {
     }
 }
 
-/// Reads floats of a plane of parameters; `late`, with the updates that Gaussians have missed.
+/// Reads floats of a parameter plane; with `late`, after applying missed updates.
 pub(super) fn read(
     sched: &mut Scheduler,
     late: Option<&PendingUpdates>,
@@ -71,7 +71,7 @@ pub(super) fn read(
     Ok(values)
 }
 
-/// Returns the planes of a state without the updates that Gaussians have missed, and with these where no Gaussian may be late.
+/// Returns the planes of a state with all missed updates applied; `None` if there are none.
 pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
     let find = |name: &str| planes.iter().find(|plane| plane.name == name);
     let (missed, touched_at) = (find(MISSED_PLANE)?, find(TABLE[Buf::TOUCHED_AT.index()].name)?);
@@ -98,7 +98,7 @@ pub(super) fn settled(planes: &[Plane]) -> Option<Vec<Plane>> {
     Some(all)
 }
 
-/// Checks the planes of late Gaussians in a state; `take` removes a plane from those that were given.
+/// Checks the planes of missed updates in a state; `take` removes a plane from the given ones.
 pub(super) fn check<'a>(mut take: impl FnMut(&str) -> Option<&'a Plane>, trained: u32) -> Result<(), String> {
     match (take(TABLE[Buf::TOUCHED_AT.index()].name), take(MISSED_PLANE)) {
         (None, None) => Ok(()),
@@ -117,19 +117,19 @@ pub(super) fn check<'a>(mut take: impl FnMut(&str) -> Option<&'a Plane>, trained
 }
 
 impl MissedUpdates {
-    /// The plane of a state.
+    /// Returns the state's plane of missed updates.
     pub(super) fn plane(&self) -> Plane {
         Plane { name: MISSED_PLANE.to_owned(), words: MISSED_ROW_WORDS, data: self.words() }
     }
 
-    /// Finds it.
+    /// Finds the missed updates in a state.
     pub(super) fn find(planes: &[Plane]) -> Option<Self> {
         planes.iter().find(|plane| plane.name == MISSED_PLANE).map(|plane| Self::from_words(&plane.data))
     }
 }
 
 impl Engine {
-    /// Returns what Gaussians have missed; `None` if nothing.
+    /// Returns the missed updates of all Gaussians; `None` if there are none.
     pub(super) fn late(&mut self) -> Result<Option<PendingUpdates>> {
         if !self.missed.is_late() {
             return Ok(None);

@@ -1,6 +1,6 @@
-//! What Gaussians have missed while no step touched them (glsl/include/caught_up.glsl).
+//! Tracks the updates that Gaussians missed while no step touched them (glsl/include/caught_up.glsl).
 //!
-//! The engine numbers the updates itself, from the upload of a model or a state on.
+//! The engine numbers updates itself, starting when a model or state is uploaded.
 
 use super::{Engine, Input, ListKey};
 use crate::error::Result;
@@ -11,22 +11,22 @@ use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use std::collections::VecDeque;
 
-/// Learning rates of an update with the corrections of its moments: position and opacity, then scales, rotations, colours of
-/// degree 0 and of higher ones.
+/// Learning rates of an update with bias correction: position, opacity, scales, rotations, colours of degree 0, and of
+/// higher degrees.
 pub(super) type Weights = [f32; 8];
 
 /// A row of the table on the device.
 type Row = [[u32; 4]; 3];
 
-/// Updates that a failure may take back: more than there are steps in flight.
+/// Most updates that a failure can undo; more than there are steps in flight.
 const UNDONE_UPDATES_MAX: usize = 32;
 
-/// Numbers of updates.
+/// Update counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct UpdateMark {
     /// All updates so far.
     now: u32,
-    /// The last one that no Gaussian has missed.
+    /// Number of the last update that no Gaussian missed.
     whole: u32,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct UpdateMark {
 #[derive(Debug, Default)]
 pub(super) struct MissedUpdates {
     mark: UpdateMark,
-    /// Weights of the newest updates, the last one at the end.
+    /// Weights of the newest updates, the latest last.
     weights: VecDeque<Weights>,
 }
 
@@ -44,12 +44,12 @@ impl MissedUpdates {
         self.mark.now > self.mark.whole
     }
 
-    /// Returns how many updates a Gaussian has missed, the last of which was that of this number.
+    /// Returns how many updates a Gaussian has missed, given the number of its last update.
     pub(super) fn age(&self, touched_at: u32) -> u32 {
         self.mark.now.saturating_sub(touched_at.max(self.mark.whole)).min(MISSED_MOST)
     }
 
-    /// Returns true if the weights of all updates that such a Gaussian has missed are known.
+    /// Returns true if the weights of all updates that such a Gaussian missed are known.
     pub(super) fn knows(&self, touched_at: u32) -> bool {
         touched_at <= self.mark.now && self.age(touched_at) as usize <= self.weights.len()
     }
@@ -65,7 +65,7 @@ impl MissedUpdates {
     fn rows(&self) -> impl Iterator<Item = ([f64; 8], [f64; 3])> {
         let [beta1, beta2] = [ADAM_BETA1, ADAM_BETA2].map(f64::from);
         let ratio = beta1 / beta2.sqrt();
-        // Before the first update there was none.
+        // Before the first update, weights are 0.
         let newest = self.weights.iter().rev().copied().chain(std::iter::repeat(Weights::default()));
         let start = ([0.0; 8], [1.0; 3]);
         let older = newest.scan(start, move |(sums, powers), weights| {
@@ -76,7 +76,7 @@ impl MissedUpdates {
         std::iter::once(start).chain(older).take(MISSED_MOST as usize + 1)
     }
 
-    /// Returns the table for a step that moves parameters by `next`, or that works `after_failure`.
+    /// Returns the table for a step with update weights `next`. `after_failure` repeats a failed step.
     fn table(&self, next: Weights, after_failure: bool) -> Vec<Row> {
         let halves = |of: Weights| {
             let word = |at: usize| of[at].to_bits();
@@ -92,7 +92,7 @@ impl MissedUpdates {
         std::iter::once(head).chain(rows).collect()
     }
 
-    /// Words of a state: the numbers of updates, then the weights.
+    /// Words of a saved state: the update counters, then the weights.
     pub(super) fn words(&self) -> Vec<u32> {
         let head = [self.mark.now, self.mark.whole, 0, 0, 0, 0, 0, 0];
         std::iter::once(head).chain(self.weights.iter().map(|weights| weights.map(f32::to_bits))).flatten().collect()
@@ -114,7 +114,7 @@ impl MissedUpdates {
         }
     }
 
-    fn go_back(&mut self, mark: UpdateMark) {
+    fn rewind(&mut self, mark: UpdateMark) {
         let taken_back = self.mark.now.saturating_sub(mark.now) as usize;
         self.weights.truncate(self.weights.len().saturating_sub(taken_back));
         self.mark = mark;
@@ -136,7 +136,7 @@ impl Engine {
         self.capacity.missed_rows > 0
     }
 
-    /// The variant of a training step, and whether one kernel makes its update; `None` for other lists.
+    /// Returns the variant of a training step, and whether one kernel does its whole update; `None` for other lists.
     fn step_of(&self, key: ListKey) -> Option<(Variant, bool)> {
         match key {
             ListKey::Train(variant) => Some((variant, is_fused(&self.shape, (&(), 0)))),
@@ -145,7 +145,7 @@ impl Engine {
         }
     }
 
-    /// Returns the list for a step: with a pass in which all Gaussians catch up, if it is due.
+    /// Returns the list for a step, with a catch-up pass for all Gaussians if it is due.
     pub(super) fn caught_up(&self, key: ListKey) -> ListKey {
         let (UpdateMark { now, whole }, of) = (self.missed.mark, self.step_of(key));
         let catch_up = match of.filter(|_| self.may_be_late()) {
@@ -161,7 +161,7 @@ impl Engine {
         }
     }
 
-    /// Notes the update of a step that was submitted. Returns the numbers before it.
+    /// Records the update of a submitted step. Returns the counters before it.
     pub(super) fn note_update(&mut self, key: ListKey, uniforms: &StepUniforms) -> UpdateMark {
         let before = self.missed.mark;
         if let Some((variant, is_fused)) = self.step_of(key).filter(|_| self.may_be_late()) {
@@ -171,7 +171,7 @@ impl Engine {
             if variant.update {
                 self.missed.advance(weights(uniforms));
             }
-            // Passes of their own update all Gaussians.
+            // Separate update passes update all Gaussians.
             if variant.update && !is_fused {
                 self.missed.mark.whole = self.missed.mark.now;
             }
@@ -179,18 +179,18 @@ impl Engine {
         before
     }
 
-    /// Takes the updates back that a failed list and those after it have not made.
-    pub(super) fn take_back(&mut self, before: UpdateMark) {
-        self.missed.go_back(before);
+    /// Undoes the counted updates of a failed list and of the lists after it.
+    pub(super) fn undo_updates(&mut self, before: UpdateMark) {
+        self.missed.rewind(before);
     }
 
-    /// Starts anew, with a model that has missed nothing.
+    /// Resets the counters, for a model without missed updates.
     pub(super) fn start_updates(&mut self) -> Result<()> {
         self.missed = MissedUpdates::default();
         if self.may_be_late() { self.sched.fill(Buf::TOUCHED_AT, 0) } else { Ok(()) }
     }
 
-    /// Writes what Gaussians have missed before a list.
+    /// Uploads the table of missed updates before a list.
     pub(super) fn write_missed(&mut self, frame: usize, input: Input) -> Result<()> {
         if !self.may_be_late() {
             return Ok(());
@@ -199,8 +199,8 @@ impl Engine {
         self.sched.upload(Buf::MISSED, frame, 0, &self.missed.table(next, false))
     }
 
-    /// Gives all Gaussians the updates that they have missed, before something changes planes of the state. Steps that
-    /// failed have made none. No list may be in flight.
+    /// Applies all missed updates on the device, before something else changes planes of the state. No list may be in
+    /// flight.
     #[doc(hidden)]
     pub fn catch_up(&mut self) -> Result<()> {
         if !self.missed.is_late() {
@@ -208,7 +208,7 @@ impl Engine {
         }
         self.check_idle()?;
         let list = self.list(ListKey::CatchUp)?;
-        // Packed moments are rounded by what the seed draws.
+        // The seed decides the rounding of packed moments.
         let seed = self.missed.mark.now;
         self.write(0, Input::Uniforms(&StepUniforms { seed, ..StepUniforms::zeroed() }))?;
         self.sched.upload(Buf::MISSED, 0, 0, &self.missed.table([0.0; 8], true))?;
@@ -259,7 +259,7 @@ mod tests {
         let before = missed.mark;
         (0..4).for_each(|_| missed.advance([1e9; 8]));
         missed.mark.whole = 302;
-        missed.go_back(before);
+        missed.rewind(before);
         assert_eq!(missed.mark, UpdateMark { now: 300, whole: 0 });
         assert_eq!(missed.table([0.0; 8], true), other.table([0.0; 8], true));
     }

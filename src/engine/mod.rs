@@ -1,7 +1,7 @@
 //! A device with a model in its memory.
 //!
-//! [`Engine::for_model`] opens one that is ready to [`render`](crate::render::render()). Inside of the crate, all modules
-//! above use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
+//! [`Engine::for_model`] opens one that is ready to [`render`](crate::render::render()). Inside the crate, higher
+//! modules use the scheduler through this module: `Engine::run` runs a pass list and waits for it, `Engine::submit` and
 //! `Engine::retire` keep steps in flight, and transfers are typed.
 
 mod ahead;
@@ -56,9 +56,9 @@ pub struct Engine {
     origin: DVec3,
     /// Passes that extended steps add.
     extension: Arc<dyn Extension>,
-    /// Variant of these passes that counts in predictions of memory; 0 for none.
+    /// Variant of these passes that memory predictions include; 0 for none.
     passes: u32,
-    /// Walks of each tile with which label maps start; grows to what they needed so far.
+    /// Walks per tile with which label maps start; grows to the number needed so far.
     label_rounds: u32,
     /// Stamp of the last submit, never 0.
     stamp: u32,
@@ -69,7 +69,7 @@ pub struct Engine {
     missed: MissedUpdates,
     /// Compiles kernels of later lists.
     ahead: Option<KernelCompiler>,
-    /// Every run is checked for writes outside of its buffers.
+    /// Every run is checked for out-of-bounds writes.
     has_guards: bool,
 }
 
@@ -132,7 +132,7 @@ impl Engine {
         &self.shape
     }
 
-    /// Present capacities of the buffers.
+    /// Current capacities of the buffers.
     #[doc(hidden)]
     pub fn capacity(&self) -> &Capacity {
         &self.capacity
@@ -148,12 +148,12 @@ impl Engine {
         self.gaussian_count
     }
 
-    /// Number of Gaussians that are trained; the others follow them and are frozen.
+    /// Number of trained Gaussians; frozen ones follow them.
     pub fn trained_count(&self) -> u32 {
         self.gaussian_count.saturating_sub(self.size.frozen)
     }
 
-    /// Sets the number of Gaussians that the device holds, after a densification.
+    /// Sets the number of Gaussians on the device, after a densification.
     pub(crate) fn set_gaussian_count(&mut self, count: u32) {
         self.gaussian_count = count;
     }
@@ -181,15 +181,15 @@ impl Engine {
         }
     }
 
-    /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step. Steps with the variant
-    /// `passes` count in predictions of memory; 0 for none.
+    /// Sets the passes that [`ListKey::Extended`] adds; call it before the first such step. Memory predictions include
+    /// the variant `passes`; 0 for none.
     pub(crate) fn set_extension(&mut self, extension: Arc<dyn Extension>, passes: u32) {
         (self.extension, self.passes) = (extension, passes);
     }
 
-    /// Copies a model into the device's memory; moments and statistics become 0. An engine for rendering gets memory for
-    /// labels with the first model that has some. Labels above [`LABEL_MAX`](crate::scene::LABEL_MAX) are for rendering
-    /// only.
+    /// Copies a model into the device's memory; moments and statistics become 0. A rendering engine allocates label
+    /// memory when it gets the first model with labels. Labels above [`LABEL_MAX`](crate::scene::LABEL_MAX) are for
+    /// rendering only.
     pub fn upload_model(&mut self, gaussians: &Gaussians) -> Result<()> {
         if gaussians.labels.is_some() && self.size.labels.is_none() && !self.size.trained {
             self.make_room_for_labels()?;
@@ -221,7 +221,7 @@ impl Engine {
     pub(crate) fn with_grow_box(&self, uniforms: StepUniforms, zone: &Zone) -> StepUniforms {
         let [grow_axis0, grow_axis1, grow_axis2] = zone.axes.map(|axis| axis.as_vec3().to_array());
         let origin = zone.place(self.origin);
-        // An open side stays so.
+        // Open sides stay open.
         let corner = |at: DVec3| (at - origin).clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into()));
         let (grow_low, grow_high) = (corner(zone.low).as_vec3().to_array(), corner(zone.high).as_vec3().to_array());
         StepUniforms { grow_axis0, grow_axis1, grow_axis2, grow_low, grow_high, ..uniforms }

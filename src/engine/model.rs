@@ -1,4 +1,4 @@
-//! Converts the model between its host form and the planes of vec4 on the device.
+//! Converts the model between the host and the vec4 planes on the device.
 
 use super::EngineSize;
 use super::label_ids::LabelIds;
@@ -9,10 +9,10 @@ use crate::scene::{Gaussians, LABEL_MAX, UNLABELLED};
 use crate::scheduler::Scheduler;
 use crate::scheduler::plan::Buf;
 
-/// Planes of colours after the first one: floats of each Gaussian, and how many above degree 0 are in the planes before.
+/// Colour planes after the first: plane, floats per Gaussian, and floats above degree 0 in earlier planes.
 const HIGHER_COLOUR_PLANES: [(Buf, usize, usize); 3] = [(Buf::SH1, 8, 1), (Buf::SH2, 16, 9), (Buf::SH3, 20, 25)];
 
-/// Writes the planes; sets the optimiser state to 0. Returns the ids of the labels on the device.
+/// Writes the planes and sets the optimiser state to 0. Returns the label ids on the device.
 pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize) -> Result<LabelIds> {
     model.check()?;
     let with = |rows: &[[f32; 3]], last: &dyn Fn(usize) -> f32| -> Vec<[f32; 4]> {
@@ -48,15 +48,14 @@ pub(super) fn upload(sched: &mut Scheduler, model: &Gaussians, size: &EngineSize
 pub(super) fn upload_labels(sched: &mut Scheduler, labels: &[u32], size: &EngineSize) -> Result<LabelIds> {
     let (ids, labels) = LabelIds::pack(labels)?;
     if ids.are_packed() && size.trained {
-        let problem =
-            format!("a label of the model is above {LABEL_MAX}, the largest id of masks; give it a smaller one");
+        let problem = format!("a label of the model is above {LABEL_MAX}, the largest mask id; give it a smaller id");
         return Err(Error::usage("labels", problem));
     }
     sched.upload(Buf::LABELS, 0, 0, &labels)?;
     Ok(ids)
 }
 
-/// Reads the planes of `count` Gaussians; without labels. `late`: with the updates that they have missed.
+/// Reads the planes of `count` Gaussians without labels; with `late`, after applying missed updates.
 pub(super) fn download(
     sched: &mut Scheduler,
     late: Option<&PendingUpdates>,

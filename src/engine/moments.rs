@@ -1,8 +1,8 @@
-//! Packed moments of Adam on the host (glsl/include/moments_store.glsl).
+//! Packs and unpacks Adam moments on the host (glsl/include/moments_store.glsl).
 
 use crate::shaders::constants::{MOMENT_FLOOR, MOMENT_LOG, MOMENT_RATIO};
 
-/// Returns the moments of a word.
+/// Unpacks a word into both moments.
 fn unpack(word: u32) -> (f32, f32) {
     let code = word & 0xffff;
     if code == 0 {
@@ -13,7 +13,7 @@ fn unpack(word: u32) -> (f32, f32) {
     (ratio * root, root * root)
 }
 
-/// Packs moments once: rounded to the nearest.
+/// Packs both moments into a word, rounded to nearest.
 fn pack((m, v): (f32, f32)) -> u32 {
     if v < f32::MIN_POSITIVE {
         return 0;
@@ -24,7 +24,7 @@ fn pack((m, v): (f32, f32)) -> u32 {
     (ratio as i32 as u32) << 16 | code
 }
 
-/// Returns the first and the second moments of words.
+/// Unpacks words into first and second moments.
 pub(super) fn unpack_all(words: &[u32]) -> (Vec<f32>, Vec<f32>) {
     words.iter().map(|&word| unpack(word)).unzip()
 }
@@ -49,13 +49,13 @@ mod tests {
     fn moments_are_within_half_a_step() {
         for (m, v) in [(1e-9_f32, 1e-18_f32), (-3.5, 2.0), (7.2e-4, 1e-8), (0.0, 1e20), (1e-20, 1e-30)] {
             let (first, second) = unpack(pack((m, v)));
-            // Half of a step is 3.4e-4 of the root, so twice of that of v, and half a step of the ratio 1.3e-4.
+            // Half a step is 3.4e-4 of the root, so twice that of v; half a step of the ratio is 1.3e-4.
             assert!((second / v - 1.0).abs() < 7e-4 || v > 2e8, "{v} {second}");
             assert!((first - m).abs() <= 1.3e-4 * second.sqrt(), "{m} {first}");
         }
         assert_eq!(pack((0.0, 0.0)), 0);
         assert_eq!(unpack(0), (0.0, 0.0));
-        // What is smaller than any step counts as the smallest one.
+        // Values below the smallest step round up to it.
         assert_eq!(pack((0.0, 1e-36)), 1);
     }
 }

@@ -1,4 +1,4 @@
-//! Lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
+//! Pass lists: recorded on first use, then either run and awaited, or submitted while others are in flight.
 
 use super::ahead::KernelCompiler;
 use super::missed::UpdateMark;
@@ -21,17 +21,16 @@ pub enum ListKey {
     Render {
         /// Active degree of the spherical harmonics.
         sh_degree: u32,
-        /// Most walks of each tile for the label map, for four labels each time; 0 without a label map.
+        /// Most walks per tile for the label map, four labels per walk; 0 without a label map.
         label_rounds: u32,
     },
-    /// The label map of one view; each tile is walked up to this many times, for four labels each time.
+    /// The label map of one view, with up to this many walks per tile of four labels each.
     LabelMap(u32),
-    /// Votes of one view; each tile is walked this many times, for four labels each time. True: as if nothing were in
-    /// front of a Gaussian.
+    /// Votes of one view, with this many walks per tile of four labels each. If true, occlusion is ignored.
     Vote(u32, bool),
     /// Adds up blending weights of one view.
     Weigh,
-    /// All Gaussians get the updates that they have missed.
+    /// Applies all missed updates.
     CatchUp,
     /// Counts the result of a densification.
     DensifyCount,
@@ -43,7 +42,7 @@ pub enum ListKey {
     RelocateApply,
     /// Opacity reset.
     OpacityReset,
-    /// Looks for numbers of the state that are not finite, with the buffers that the strategy keeps.
+    /// Searches the state, including buffers that the strategy keeps, for values that are not finite.
     Nonfinite(&'static [Buf]),
 }
 
@@ -60,11 +59,11 @@ pub(crate) struct InFlight {
     /// Recording that runs.
     pub recording: Recording,
     ticket: Ticket,
-    /// Updates before it.
+    /// Update counters before it.
     before: UpdateMark,
 }
 
-/// A recording of a list for a frame. After buffers have grown, the list is recorded anew.
+/// A recording of a list for a frame. It is recorded again after buffers have grown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Recording {
     list: ListId,
@@ -72,7 +71,8 @@ pub(crate) struct Recording {
 }
 
 impl ListKey {
-    /// Returns true if the list changes planes of the state, or looks for what they show, other than by a step.
+    /// Returns true if the list reads or changes planes of the state outside of a step, so that no updates may be
+    /// missing.
     fn needs_all_updates(self) -> bool {
         match self {
             Self::Train(_) | Self::Extended(..) | Self::CatchUp => false,
@@ -96,9 +96,9 @@ impl Engine {
         Ok(id)
     }
 
-    /// Compiles the kernels of lists that come later, in this order, while the device works.
+    /// Compiles the kernels of later lists in the background, in this order.
     pub(crate) fn compile_ahead(&mut self, keys: impl IntoIterator<Item = ListKey>) {
-        // Where buffers share bindings, kernels follow from the places of their buffers, which plans find.
+        // If buffers share bindings, kernels depend on buffer placement, which is only known after planning.
         if self.gpu().limits().plan.is_packed() {
             return;
         }
@@ -142,7 +142,7 @@ impl Engine {
             let before = self.note_update(key, input.uniforms());
             let report = self.report(0)?;
             if report.counters.failure != 0 {
-                self.take_back(before);
+                self.undo_updates(before);
             }
             if self.has_guards {
                 self.sched.check_guards()?;
@@ -153,8 +153,8 @@ impl Engine {
         }
     }
 
-    /// Runs a list with a label map; again with more walks while they do not decide all tiles, up to [`LABEL_ROUNDS`].
-    /// Later lists start with as many.
+    /// Runs a list with a label map. Repeats it with more walks, up to [`LABEL_ROUNDS`], while some tiles are
+    /// undecided. Later lists start with that number of walks.
     pub(crate) fn run_labels(&mut self, key: impl Fn(u32) -> ListKey, uniforms: &StepUniforms) -> Result<()> {
         loop {
             let report = self.run(key(self.label_rounds), uniforms)?;
@@ -170,7 +170,7 @@ impl Engine {
         self.sched.frames()
     }
 
-    /// True if the host works ahead of the device, as on a card, however many lists are in flight.
+    /// True if the host works ahead of the device, as on a GPU, regardless of the number of frames.
     pub(crate) fn runs_ahead(&self) -> bool {
         self.sched.runs_ahead()
     }
@@ -198,7 +198,7 @@ impl Engine {
         self.in_flight[flight.recording.frame] = false;
         let report = self.report(flight.recording.frame)?;
         if report.counters.failure != 0 {
-            self.take_back(flight.before);
+            self.undo_updates(flight.before);
         }
         Ok(report)
     }
@@ -210,7 +210,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Fails if lists are in flight: their reports, and with them any need to repeat a list, would be lost.
+    /// Fails if lists are in flight: their reports would be lost, and with them any need to repeat a list.
     pub(super) fn check_idle(&self) -> Result<()> {
         match self.in_flight.contains(&true) {
             true => Err(Error::Bug("steps are in flight; wait for them first (Trainer::drain)".to_owned())),
@@ -225,7 +225,7 @@ impl Engine {
         Ok(Report { counters: self.sched.download::<Counters>(Buf::REPORT, frame, 0, 1)?[0] })
     }
 
-    /// Sets whether lists write the times of their items from now on ([`Scheduler::time_items`]).
+    /// Sets whether later lists measure the time of each item ([`Scheduler::time_items`]).
     ///
     /// [`Scheduler::time_items`]: crate::scheduler::Scheduler::time_items
     pub(crate) fn time_items(&mut self, timestamps: bool, barriers: bool) -> Result<()> {

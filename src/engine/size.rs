@@ -1,4 +1,4 @@
-//! Sizes that the memory of an engine is made for.
+//! Sizes that an engine allocates memory for.
 
 use crate::error::{Error, Result, Setting};
 use crate::pass::KernelShape;
@@ -11,29 +11,29 @@ pub struct LabelSize {
     pub max_label: u32,
     /// Maximum number of objects sampled in one step.
     pub layers: u32,
-    /// Labels that votes are counted for, the background included; 0 without votes. Many labels of many Gaussians take
+    /// Labels that votes are counted for, including the background; 0 without votes. Many labels and Gaussians take
     /// several sweeps (`Engine::vote_columns`).
     pub vote_columns: u32,
 }
 
-/// Sizes that the memory of an engine is made for.
+/// Sizes that an engine allocates memory for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EngineSize {
     /// Gaussians.
     pub gaussians: u64,
     /// Largest image, px.
     pub image: (u32, u32),
-    /// True with optimiser state and gradients.
+    /// True to allocate optimiser state and gradients.
     pub trained: bool,
     /// Sizes for labels; `None` for a scene without masks, which then has no label buffers.
     pub labels: Option<LabelSize>,
     /// Rows of four shared parameters.
     pub shared_rows: u32,
-    /// Gaussians at the end of the model that are drawn and not trained; they have no optimiser state.
+    /// Frozen Gaussians at the end of the model: drawn, not trained, and without optimiser state.
     pub frozen: u32,
-    /// True with room for depths that photos are known to have.
+    /// True to allocate memory for known photo depths.
     pub depths: bool,
-    /// True with both moments of a parameter in one word, 16 bits each (glsl/include/moments_store.glsl).
+    /// True to pack both moments of a parameter into one word, 16 bits each (glsl/include/moments_store.glsl).
     pub half_moments: bool,
 }
 
@@ -92,14 +92,14 @@ impl EngineSize {
         Self { half_moments, ..self }
     }
 
-    /// Returns the most tiles and rows of tiles that the kernels of the device can walk; `None` without a limit.
+    /// Returns the most tiles, and tile rows, that the device's kernels can process; `None` without a limit.
     fn most_rounds(&self, shape: &KernelShape) -> Option<u32> {
-        // A splat may touch every tile twice, with its object's layer; one loop walks them, another one rows and their tiles.
+        // A splat may touch every tile twice, once in its object's layer. One loop visits the tiles, another the rows.
         let times = if self.labels.is_some_and(|labels| labels.layers > 0) { 2 } else { 1 };
         shape.loop_rounds.map(|rounds| rounds / times)
     }
 
-    /// Returns the most rows of a picture that a list can draw; `None` without a limit.
+    /// Returns the most picture rows that one list can draw; `None` without a limit.
     pub(crate) fn band(&self, shape: &KernelShape) -> Option<u32> {
         let rounds = shape.tiles(self.image.0, 1).0 + 1;
         self.most_rounds(shape).map(|most| (most / rounds).max(1) * shape.tile_height)
@@ -111,7 +111,7 @@ impl EngineSize {
         Self { image: (self.image.0, self.image.1.min(most)), ..self }
     }
 
-    /// Fails if the image has more tiles than the kernels can walk.
+    /// Fails if the image has more tiles than the kernels can process.
     pub(crate) fn check(&self, shape: &KernelShape) -> Result<()> {
         let (width, height) = self.image;
         let (tiles_x, tiles_y) = shape.tiles(width, height);

@@ -1,5 +1,4 @@
-//! Device state that a training needs to continue: the buffers of kind Model, unchanged. All other buffers start at
-//! zero, both in a new and in a continued training.
+//! Device state that a resumed training needs: all buffers of class Model. Other buffers always start at zero.
 
 use super::missed::MissedUpdates;
 use super::{Engine, EngineSize, ListKey, late};
@@ -16,12 +15,12 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::iter;
 
-/// Numbers of rows of a training's state.
+/// Row counts of a training's state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counts {
     /// Gaussians.
     pub gaussians: u32,
-    /// Gaussians at the end without optimiser state.
+    /// Frozen Gaussians at the end, without optimiser state.
     pub frozen: u32,
     /// Shared rows.
     pub shared: u32,
@@ -42,7 +41,7 @@ impl Counts {
     }
 }
 
-/// Buffers of a training's state, with row counts; `kept` are the buffers that its strategy keeps.
+/// Buffers of a training's state, with row counts; `kept` are the strategy's own buffers.
 fn buffers(sh_degree: u32, labels: bool, kept: &[Buf], counts: Counts) -> Vec<(Buf, u32)> {
     let planes = |a: &'static Attribute| iter::once(a.planes[0]).chain(a.moments(counts.half_moments).iter().copied());
     let attributes = MODEL_ATTRIBUTES.iter().filter(|a| a.from_degree <= sh_degree).flat_map(planes);
@@ -60,8 +59,8 @@ fn words(buf: Buf) -> u32 {
     TABLE[buf.index()].element_bytes / 4
 }
 
-/// Checks that planes form a state of `counts` rows. `labels` is true with masks; `kept` names
-/// the buffers that the strategy keeps. The error says what is wrong.
+/// Checks that planes form a state of `counts` rows. `labels` is true with masks; `kept` names the strategy's own
+/// buffers.
 pub(crate) fn check(
     planes: &[Plane],
     counts: Counts,
@@ -86,14 +85,14 @@ pub(crate) fn check(
         }
     }
     late::check(|name| given.remove(name), counts.rows_of(Buf::DENSIFY_STATS))?;
-    given.keys().next().map_or(Ok(()), |name| Err(format!("there is a plane {name}, which nothing needs")))
+    given.keys().next().map_or(Ok(()), |name| Err(format!("the plane {name} is not expected")))
 }
 
-/// A state on its way from the device, for any thread.
+/// A copy of the state that any thread can read.
 pub(crate) struct StateCopy {
     shapes: Vec<(Buf, u64)>,
     words: StateWords,
-    /// What Gaussians have missed.
+    /// Missed updates.
     missed: Option<Plane>,
 }
 
@@ -103,7 +102,7 @@ enum StateWords {
 }
 
 impl StateCopy {
-    /// Returns the planes, read from the device if need be.
+    /// Returns the planes, read from the device if necessary.
     pub(crate) fn planes(self) -> Result<Vec<Plane>> {
         let all = match self.words {
             StateWords::Read(all) => all,
@@ -119,8 +118,8 @@ impl StateCopy {
 }
 
 impl Engine {
-    /// Copies the state, including the buffers that the strategy keeps: on a card in its memory, to be read while lists go on,
-    /// else to the host at once. No list may be in flight.
+    /// Copies the state, including the strategy's own buffers. On a GPU the copy stays in device memory and is read
+    /// while lists run; otherwise it goes to the host at once. No list may be in flight.
     pub(crate) fn copy_state(&mut self, kept: &[Buf]) -> Result<StateCopy> {
         self.check_idle()?;
         let (gaussians, frozen) = (self.gaussian_count, self.size.frozen);
@@ -136,7 +135,7 @@ impl Engine {
                     return Ok(StateCopy { shapes, words: StateWords::OnDevice(Box::new(snapshot)), missed });
                 }
                 Err(error) if error.is_out_of_memory() => {
-                    tracing::info!("{error}; the training waits until its state is read");
+                    tracing::info!("{error}; training pauses until the state is read");
                 }
                 Err(error) => return Err(error),
             }
@@ -151,15 +150,15 @@ impl Engine {
         Counts { gaussians: 0, frozen: 0, shared, half_moments }
     }
 
-    /// Planes of floats of the state. Packed moments are none: all words stand for finite numbers.
+    /// Float planes of the state. Packed moments are excluded, because every word is a finite number.
     pub(super) fn floats(&self, kept: &[Buf]) -> Vec<Buf> {
         let all = buffers(self.sh_degree, false, kept, self.no_gaussians()).into_iter().map(|(buf, _)| buf);
         let is_packed = |buf: &Buf| self.size.half_moments && MODEL_ATTRIBUTES.iter().any(|a| a.planes[1] == *buf);
         all.filter(|buf| !is_packed(buf)).collect()
     }
 
-    /// Returns the name and the row of a number of the state that is not finite, and whether the row is a shared one; `None`
-    /// if all are finite. No list may be in flight.
+    /// Finds a value of the state that is not finite: plane name, row, and whether it is a shared row. `None` if all
+    /// are finite. No list may be in flight.
     pub(crate) fn nonfinite(&mut self, kept: &'static [Buf]) -> Result<Option<(&'static str, u32, bool)>> {
         self.run(ListKey::Nonfinite(kept), &StepUniforms::zeroed())?;
         let planes = self.floats(kept);

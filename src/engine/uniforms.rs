@@ -7,7 +7,7 @@ use crate::shaders::structs::StepUniforms;
 use bytemuck::Zeroable;
 use glam::DVec3;
 
-/// Returns the uniforms of a part of a picture with the limits of slopes of the whole one, so that parts fit together.
+/// Returns a part's uniforms with the slope limits of the whole picture, so that parts fit together.
 pub(crate) fn with_slopes_of(part: StepUniforms, whole: &StepUniforms) -> StepUniforms {
     let &StepUniforms { clamp_y_min, clamp_y_max, .. } = whole;
     StepUniforms { clamp_y_min, clamp_y_max, ..part }

@@ -1,4 +1,5 @@
-//! Boundary IoU (Cheng et al. 2021): the overlap of the rims of two masks, which does not depend on a large interior.
+//! Boundary IoU (Cheng et al. 2021): the overlap of the rims of two masks, so a large interior cannot hide a bad
+//! outline.
 
 use super::metrics::Overlap;
 
@@ -10,8 +11,8 @@ pub fn rim_width(width: usize, height: usize) -> usize {
     ((RIM_DIAGONAL_SHARE * (width as f64).hypot(height as f64)).round() as usize).max(1)
 }
 
-/// Returns the pixels of a mask (row-major) within `reach` px of a pixel outside of it, diagonals included. Everything
-/// beyond the image is outside. The result equals the mask without its erosion by `reach` passes of a 3x3 square.
+/// Returns the pixels of a mask (row-major) within `reach` px of a pixel outside of it, diagonals included. Pixels
+/// beyond the image are outside. The result equals the mask without its erosion by `reach` passes of a 3x3 square.
 pub fn rim(mask: &[bool], width: usize, height: usize, reach: usize) -> Vec<bool> {
     let rows = eroded(mask, width, height, reach, |line, at| line * width + at);
     let both = eroded(&rows, height, width, reach, |line, at| at * width + line);

@@ -10,13 +10,13 @@ pub struct ScoredPicture<'a> {
     pub view: &'a str,
     /// Name of the object; `None` for the whole view.
     pub object: Option<String>,
-    /// The photo, at the size of the picture.
+    /// The photo, at the picture's size.
     pub photo: &'a Photo,
     /// The picture, r, g, b, not clamped, row-major.
     pub rgb: &'a [[f32; 3]],
-    /// Label map of the picture, of a whole view.
+    /// Label map of the picture, for a whole view.
     pub labels: Option<&'a LabelMap>,
-    /// Mask of the view, for its label map.
+    /// Mask of the view, to compare with the label map.
     pub truth: Option<&'a LabelMap>,
     /// Predicted and ground-truth mask of the object, row-major.
     pub masks: Option<(&'a [bool], &'a [bool])>,
@@ -42,7 +42,7 @@ impl<'a> ScoredPicture<'a> {
         }
     }
 
-    /// Returns a score by its name.
+    /// Returns a score by name.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.numbers.iter().find(|number| number.0 == name)?.1
     }

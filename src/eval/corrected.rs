@@ -1,17 +1,17 @@
-//! PSNR after a correction of colours: what is left of the error when exposure and white balance do not count.
+//! PSNR after colour correction: ignores errors of exposure and white balance.
 //!
-//! The best affine map of the picture's colours to the photo's, of all pixels of a view, as multinerf and nerfstudio
-//! score captures whose exposure changes. It forgives every error of that form, so it is no replacement for the PSNR.
+//! Fits the best affine map from the render's colours to the photo's over all pixels of a view, as multinerf and
+//! nerfstudio do for captures with varying exposure. It hides every error of that form, so it does not replace PSNR.
 
 use super::metrics::{clamped, colour_of, mean, psnr_of, square};
 use crate::scene::Photo;
 use glam::{DMat4, DVec4};
 
-/// Keeps the equations of a picture with few colours solvable; much less than a pixel's rounding.
+/// Regularises the equations of pictures with few colours; far below the rounding of a pixel.
 const COLOUR_RIDGE: f64 = 1e-6;
 
 /// Returns the PSNR of the corrected render over the photo's valid pixels that count, dB; `None` without any. The map
-/// is that of the same pixels. `render` has the photo's pixels.
+/// is fitted to the same pixels. `render` and photo have the same size.
 pub(super) fn psnr_corrected(render: &[[f32; 3]], photo: &Photo, counts: impl Fn(usize) -> bool) -> Option<f64> {
     let pairs = || {
         let pixels = render.iter().zip(&photo.rgba).enumerate();
@@ -53,14 +53,14 @@ mod tests {
             .collect();
         let photo = Photo { width: 16, height: 16, rgba };
         let render: Vec<[f32; 3]> = (0..256).map(at).collect();
-        // Rounding to bytes is left.
+        // Only the rounding to bytes remains.
         let corrected = |render: &[[f32; 3]]| psnr_corrected(render, &photo, |_| true).unwrap();
         assert!(corrected(&render) > 55.0);
         let mut shuffled = render.clone();
         shuffled.rotate_left(5);
         assert!(corrected(&shuffled) < 30.0);
         assert!(corrected(&vec![[0.5; 3]; 256]).is_finite());
-        // A hole that does not count does not bend the map either.
+        // A hole that does not count does not affect the map either.
         let holed: Vec<[f32; 3]> = (0..256).map(|i| if i < 100 { [0.0; 3] } else { at(i) }).collect();
         assert!(corrected(&holed) < 30.0);
         assert!(psnr_corrected(&holed, &photo, |index| index >= 100).unwrap() > 55.0);

@@ -9,7 +9,7 @@ pub struct Crop {
     pub end: (usize, usize),
 }
 
-/// Padding on each side, as a share of the side of the object's box.
+/// Padding on each side, as a share of the box side.
 const PADDING_SHARE: f64 = 0.15;
 
 impl Crop {
@@ -35,7 +35,7 @@ impl Crop {
         let ratio = ((x.1 - x.0) / width as f64).max((y.1 - y.0) / height as f64);
         let fitted = |(low, high): (f64, f64), side: usize| {
             let (centre, half) = (0.5 * (low + high), 0.5 * ratio * side as f64);
-            // Half a millionth of a pixel protects whole numbers from rounding errors.
+            // Half a millionth of a pixel protects integers from rounding errors.
             let whole = |value: f64| (value.clamp(0.0, side as f64) + 5e-7) as usize;
             (whole(centre - half), whole(centre + half).min(side))
         };
@@ -48,7 +48,7 @@ impl Crop {
         (self.end.0 - self.start.0, self.end.1 - self.start.1)
     }
 
-    /// Returns the indices of its pixels in a row-major image `width` px wide.
+    /// Returns the crop's pixel indices in a row-major image `width` px wide.
     pub fn indices(self, width: usize) -> impl Iterator<Item = usize> {
         (self.start.1..self.end.1).flat_map(move |y| (self.start.0..self.end.0).map(move |x| y * width + x))
     }

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 pub struct Rendering<'a> {
     /// Options for whole scenes; objects are rendered on black.
     pub options: RenderOptions,
-    /// Training views, for scores by region; none leaves them out.
+    /// Training views, for scores by region; if empty, these scores are omitted.
     pub train: &'a [View],
     /// The label of a pixel is that of its main Gaussian, as in LabelGS, instead of the one with the largest sum of
     /// weights.
@@ -29,7 +29,7 @@ pub struct Rendering<'a> {
 }
 
 impl Rendering<'_> {
-    /// Makes the options of renders without scores by region and LPIPS.
+    /// Makes options without region scores and LPIPS.
     pub fn new(options: RenderOptions) -> Self {
         Self { options, train: &[], by_main: false, lpips: None }
     }
@@ -95,7 +95,7 @@ pub fn evaluate(
     Ok(Scores::new(views.iter().map(|view| view.name.clone()).zip(scores).collect()))
 }
 
-/// Scores the scene in a view; returns the objects that hide others there too.
+/// Scores the scene in a view. Also returns which objects hide which.
 fn score_scene(
     subject: &mut dyn Subject,
     view: &View,
@@ -126,7 +126,7 @@ fn score_scene(
     Ok((score, hidden_by(mask, &rendered)?))
 }
 
-/// Returns the distance of a render to the photo. Invalid pixels of the photo look like the render's.
+/// Returns the distance of a render to the photo. Invalid photo pixels are replaced by the render's.
 fn distance(lpips: &dyn Distance, render: &[[f32; 3]], photo: &Photo) -> Result<f64> {
     let render: Vec<[f32; 3]> = render.iter().map(|colour| colour.map(|value| value.clamp(0.0, 1.0))).collect();
     let truth = |(&[r, g, b, valid], &own): (&[u8; 4], &[f32; 3])| match valid {
@@ -169,7 +169,7 @@ pub(crate) fn picture_count(views: &[&View]) -> u64 {
 
 fn hidden_by(mask: Option<&LabelMap>, rendered: &Render) -> Result<BTreeMap<u16, Vec<u16>>> {
     let Some(mask) = mask else { return Ok(BTreeMap::new()) };
-    // Few pixels are left out, whatever may stand in some of the others: a score must not excuse what is wrong.
+    // Leave out few pixels, even if a few others are occluded: a score must not excuse errors.
     let rule = Rule { share: 0.5, unlabelled: false, ..Rule::default() };
     Ok(occluders_by_contour(mask, &rendered.mean_depth()?, rule))
 }

@@ -5,7 +5,7 @@ use crate::scene::{LabelMap, Photo};
 
 /// Opacity above which an object rendered alone covers a pixel.
 const COVERED_OPACITY_MIN: f32 = 0.5;
-/// Channel value above which an object on black covers a pixel, in the rule of the paper.
+/// Channel value above which an object on black covers a pixel, by the paper's rule.
 pub(crate) const PAPER_COVERED_VALUE_MIN: f32 = 0.01;
 
 /// Returns the pixels that an object rendered alone covers.
@@ -79,7 +79,7 @@ impl Overlap {
         })
     }
 
-    /// Counts the pixels that count.
+    /// Counts the pixels for which `counts` is true.
     pub(crate) fn over(found: &[bool], truth: &[bool], counts: impl Fn(usize) -> bool) -> Self {
         Self::count((0..truth.len()).filter(|&index| counts(index)).map(|index| (found[index], truth[index])))
     }
@@ -126,7 +126,7 @@ pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / count as f64)
 }
 
-/// Declares scores by name; `None` if there was nothing to compare.
+/// Declares a struct of scores; `None` if there was nothing to compare.
 macro_rules! scores {
     ($(#[$of:meta])* $name:ident { $($(#[$doc:meta])* $field:ident,)+ }) => {
         $(#[$of])*
@@ -136,7 +136,7 @@ macro_rules! scores {
         }
 
         impl $name {
-            /// Returns the mean of each score over its values.
+            /// Returns the mean of each score, ignoring missing values.
             pub fn mean<'a>(of: impl Iterator<Item = &'a Self> + Clone) -> Self {
                 Self { $($field: $crate::eval::metrics::mean(of.clone().filter_map(|scores| scores.$field)),)+ }
             }
@@ -157,7 +157,7 @@ pub(crate) fn check_means(found: [Option<f64>; 2], bounds: [Option<f64>; 2]) -> 
         let Some(found) = found else {
             return Err(Error::Check(format!("there is no {what} to compare with {least}{unit}")));
         };
-        // A NaN fails too.
+        // NaN fails too.
         if !(found >= least) {
             return Err(Error::Check(format!("mean {what} is {found:.4}{unit}, less than {least}{unit}")));
         }

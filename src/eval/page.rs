@@ -1,4 +1,4 @@
-//! An HTML page with ground truth, prediction and difference of every scored picture, in one folder with its PNGs.
+//! An HTML page with ground truth, prediction and difference of every scored picture, in a folder with its PNGs.
 
 use super::compared::{PictureObserver, ScoredPicture};
 use crate::files::atomic;
@@ -16,7 +16,7 @@ const ONLY_PREDICTED_COLOUR: [u8; 3] = [230, 60, 40];
 const ONLY_TRUE_COLOUR: [u8; 3] = [40, 110, 240];
 const IN_BOTH_COLOUR: [u8; 3] = [60, 190, 90];
 
-/// The page of a run. Pictures are written at once, the page itself by [`Page::finish`].
+/// The page of an evaluation. Pictures are written immediately, the page itself by [`Page::finish`].
 #[derive(Debug)]
 pub struct Page {
     folder: PathBuf,
@@ -25,7 +25,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// Makes a page in `folder`, which is created. Refuses a folder with files, because pictures of another page would
+    /// Makes a page in `folder`, which is created. Refuses a folder with files, so that no pictures of another page
     /// remain.
     pub fn new(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
@@ -45,7 +45,7 @@ impl Page {
             (PreEscaped(&self.figures))
         };
         let body = html! { (summary) (section("Pictures", &pictures)) };
-        let page = page("Scores", &html! { p.quiet { "A model of labelgs against its ground truth." } }, &body);
+        let page = page("Scores", &html! { p.quiet { "A labelgs model compared with its ground truth." } }, &body);
         atomic::write(&path, |out| out.write_all(page.as_bytes()))?;
         Ok(path)
     }
@@ -81,7 +81,7 @@ impl PictureObserver for Page {
     }
 }
 
-/// A score with its digits and unit.
+/// Formats a score with unit.
 fn score_text(name: &str, value: f64) -> String {
     let is_decibels = name.to_lowercase().contains("psnr");
     if is_decibels { format!("{value:.DECIBELS$} dB") } else { format!("{value:.SCORE$}") }

@@ -1,4 +1,4 @@
-//! Scores by place in the world, such as those of each block of a scene and of the seams between them.
+//! Scores by position in the world, such as per block of a scene and at the seams between blocks.
 
 use super::metrics::{clamped, colour_of, psnr_of, square};
 use super::regions::world_points;
@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Groups of places, by which pixels are scored.
+/// Groups of world positions, by which pixels are scored.
 pub trait PlaceGroups: Sync {
     /// Returns the names of the groups.
     fn names(&self) -> Vec<String>;
@@ -27,8 +27,8 @@ pub struct PlaceScore {
     pub psnr: f64,
 }
 
-/// Scores the pixels of each group over some views, which have photos: a pixel is where the model's depth puts it. `draw`
-/// renders the model. Groups without a pixel are absent.
+/// Scores the pixels of each group over views with photos. The model's depth gives the position of a pixel. `draw`
+/// renders the model. Groups without pixels are absent.
 pub fn score_by_place(
     draw: &mut dyn FnMut(&Camera, &RenderOptions) -> Result<Render>,
     views: &[&View],

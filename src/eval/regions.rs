@@ -1,6 +1,6 @@
-//! Regions of held-out views: what training views see and what none shows; objects, their contours, and the rest.
+//! Scores held-out views by region: seen and unseen in training; objects, their contours, and the rest.
 //!
-//! A score over whole views mixes pixels that training can know with pixels that it has to make up.
+//! A score over whole views mixes pixels that training views show with pixels that training must invent.
 
 use super::corrected::psnr_corrected;
 use super::subject::Subject;
@@ -12,13 +12,13 @@ use crate::scenes::shelf::Shelf;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Training views that have to see a pixel of a held-out view.
+/// Fewest training views that must see a pixel for it to count as seen.
 const SEEING_VIEWS_MIN: usize = 3;
-/// A training view sees a point if its own depth there is not less than this share of the point's.
+/// A training view sees a point if its depth there is at least this share of the point's depth.
 const DEPTH_SHARE_MIN: f64 = 0.95;
-/// Distance of what has no depth, such as the sky, in distances of the farthest depth.
+/// Distance of pixels without depth, such as sky, as a multiple of the largest depth.
 const BACKGROUND_DEPTH_FACTOR: f64 = 1e3;
-/// Pixels within this distance of a contour of the mask, px, are its contour.
+/// Width of the contour region on each side of a mask contour, px.
 const CONTOUR_WIDTH_PX: u32 = 2;
 
 scores! {
@@ -26,17 +26,17 @@ scores! {
     RegionScores {
         /// Share of the pixels that at least three training views see, by the depth of the model.
         seen_share,
-        /// Over these pixels.
+        /// PSNR over these pixels.
         psnr_seen,
-        /// Over the same pixels after a correction of their colours: neither exposure nor what no photo shows counts.
+        /// The same after colour correction, so that exposure does not count.
         psnr_seen_corrected,
-        /// Over all others.
+        /// PSNR over all other pixels.
         psnr_unseen,
-        /// Over the objects of the mask, without their contours.
+        /// PSNR over the mask's objects, without contours.
         psnr_objects,
-        /// Within 2 px of the contours of the mask.
+        /// PSNR within 2 px of mask contours.
         psnr_contours,
-        /// Over the unlabelled rest.
+        /// PSNR over the unlabelled rest.
         psnr_rest,
     }
 }
@@ -62,7 +62,7 @@ impl RegionScores {
     }
 }
 
-/// What the training views see, by the depth of the model.
+/// Model depths in all training views, to decide what these views see.
 pub(super) struct TrainingDepths {
     cameras: Vec<(Camera, Pixels<Vec<f32>>)>,
 }
@@ -81,7 +81,7 @@ impl TrainingDepths {
 
     /// Returns the pixels of a rendered view that enough training views see.
     pub(super) fn see(&self, camera: &Camera, rendered: &Render) -> Result<Vec<bool>> {
-        // One witness after the other, because the depths of all of them may not fit into memory.
+        // One training view at a time, because the world points of all may not fit into memory.
         let world = world_points(camera, &rendered.mean_depth()?);
         let mut open: Vec<(DVec3, usize)> = world.into_iter().map(|world| (world, 0)).collect();
         for (other, depths) in &self.cameras {
@@ -98,7 +98,7 @@ impl TrainingDepths {
     }
 }
 
-/// Returns the world point that each pixel shows, by the mean depth there; what has none is far away.
+/// Returns the world point of each pixel, by its mean depth; pixels without depth are far away.
 pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
     let far = BACKGROUND_DEPTH_FACTOR * f64::from(depths.iter().copied().fold(1e-6_f32, f32::max));
     let place = |(index, &depth): (usize, &f32)| {
@@ -108,7 +108,7 @@ pub(super) fn world_points(camera: &Camera, depths: &[f32]) -> Vec<DVec3> {
     depths.par_iter().enumerate().map(place).collect()
 }
 
-/// Returns true if the point is in the picture and nothing of the model is in front of it.
+/// Returns true if the point is in the picture and the model does not occlude it.
 fn sees(camera: &Camera, depths: &[f32], world: DVec3) -> bool {
     let Some(pixel) = camera.sees(world) else { return false };
     let depth = f64::from(depths[pixel.y as usize * camera.width as usize + pixel.x as usize]);

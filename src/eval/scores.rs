@@ -18,8 +18,7 @@ use crate::{Error, Result, Setting};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Distance below the median PSNR from which a view is an outlier, dB. The views of a trained scene usually lie within
-/// 3 dB.
+/// A view is an outlier if its PSNR is this far below the median, dB. Views of a trained scene usually lie within 3 dB.
 const OUTLIER_PSNR_GAP_DB: f64 = 6.0;
 
 scores! {
@@ -27,8 +26,8 @@ scores! {
     ObjectScores {
         /// Intersection over union of the rendered label map and the mask of the view.
         iou_map,
-        /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline, or its mask in
-        /// the view if the outline is unknown.
+        /// Intersection over union of the object rendered alone (opacity above 0.5) and its whole outline, or its mask
+        /// in the view if the outline is unknown.
         iou_object,
         /// Intersection over union by the rule of the paper: any channel above 0.01 against the mask of the view.
         paper_iou,
@@ -36,11 +35,11 @@ scores! {
         object_psnr,
         /// Boundary IoU of the rendered label map and the mask of the view.
         boundary_iou,
-        /// SSIM of the object alone on black against photo times mask, over the `Crop` around its mask, without the pixels
-        /// of occluders.
+        /// SSIM of the object alone on black against photo times mask, over the `Crop` around its mask, without the
+        /// pixels of occluders.
         object_ssim,
-        /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels where the
-        /// mask of the view shows another object.
+        /// Intersection over union of the object alone (opacity above 0.5) and its whole outline, over the pixels where
+        /// the mask of the view shows another object.
         iou_hidden,
         /// PSNR of the object alone on black against its ground truth without occluders, over the pixels of its whole
         /// outline where the mask of the view does not show it, dB.
@@ -63,7 +62,7 @@ pub struct ViewScores {
     /// PSNR by region, if the training views are known.
     #[serde(flatten)]
     pub regions: Option<RegionScores>,
-    /// Specks of the label map that the mask does not have; `None` without both.
+    /// Specks in the label map that the mask does not have; `None` without label map or mask.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub specks: Option<u64>,
     /// Scores of the objects by id.
@@ -88,7 +87,7 @@ pub struct ObjectTruth<'a> {
     pub mask: Option<&'a LabelMap>,
     /// Whole outline of the object, if known.
     pub whole: Option<&'a [bool]>,
-    /// Pixels of objects in front of this one. They are left out if the whole outline is unknown.
+    /// Pixels of objects in front of this one. They are excluded if the whole outline is unknown.
     pub hidden: Option<&'a [bool]>,
     /// r, g, b and opacity of the object without occluders, if known.
     pub alone: Option<&'a [[u8; 4]]>,
@@ -119,7 +118,7 @@ impl ViewScores {
         Self::with_colour_photo(render, (photo, photo), map, mask)
     }
 
-    /// The same, with another photo for the scores of colours: that of the pixels that count for them.
+    /// Same as [`Self::new`], with a second photo whose valid pixels count for the colour scores.
     pub(super) fn with_colour_photo(
         render: &[[f32; 3]],
         (photo, coloured): (&Photo, &Photo),
@@ -187,8 +186,7 @@ impl ViewScores {
     }
 }
 
-/// Returns the PSNR of a render on black, clamped, against colour times opacity over some pixels; `None` without
-/// pixels.
+/// Returns the PSNR of a clamped render on black against colour times opacity over some pixels; `None` without pixels.
 fn psnr_alone(render: &[[f32; 3]], truth: &[[u8; 4]], pixels: impl Iterator<Item = usize>) -> Option<f64> {
     let square = |index: usize| {
         let [r, g, b, opacity] = truth[index].map(byte_value);
@@ -249,7 +247,7 @@ pub struct Scores {
     pub objects: BTreeMap<u32, ObjectScores>,
     /// Scores of the views by name.
     pub views: BTreeMap<String, ViewScores>,
-    /// The poses of the views were refined by the model before.
+    /// True if the poses of the views were refined with the model before scoring.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub refined_poses: bool,
     /// Scores of removals, if asked for.
@@ -287,19 +285,19 @@ impl Scores {
         }
     }
 
-    /// Warns of a view with a much lower PSNR than the others, and names the most frequent remedy. The usual cause are
-    /// Gaussians close to its camera, where no training photo shows them.
+    /// Warns of a view with a much lower PSNR than the others, and names the most frequent remedy. The usual cause is
+    /// Gaussians close to the camera that no training photo shows.
     pub fn warn_of_odd_view(&self, near: f32) {
         if let Some((name, found, median)) = self.odd_view() {
             tracing::warn!(
-                "view {name} has {found:.1} dB, the median is {median:.1} dB: if it looks foggy, set {} to a tenth of the \
-                 distance to the scene (it is {near})",
+                "view {name} has {found:.1} dB, far below the median of {median:.1} dB; if it looks foggy, raise {} \
+                 (now {near}) to about a tenth of the distance to the scene",
                 Setting("near")
             );
         }
     }
 
-    /// Returns the view with the lowest PSNR, its PSNR and the median, dB, if it is an outlier. Then something is in
+    /// Returns the view with the lowest PSNR, its PSNR and the median, dB, if it is an outlier. Something is then in
     /// front of its camera, or its pose or photo is wrong.
     pub fn odd_view(&self) -> Option<(&str, f64, f64)> {
         let mut sorted: Vec<(&str, f64)> = self.views.iter().map(|(name, view)| (name.as_str(), view.psnr)).collect();

@@ -2,11 +2,11 @@
 
 use crate::scene::LabelMap;
 
-/// Pixels of the smallest region that is no speck.
+/// Smallest region that is not a speck, px.
 const REGION_PIXELS_MIN: usize = 12;
 
-/// Returns the number of specks: regions of one id, no label (0) included, connected by edges of pixels, of fewer than 12 px,
-/// inside one other id, at least half of whose pixels have another id in `truth`. Both maps have one size.
+/// Counts specks: edge-connected regions of one id (or 0) with fewer than 12 px, enclosed by a single other id, of
+/// which at least half the pixels have another id in `truth`. Both maps have the same size.
 pub fn specks(map: &LabelMap, truth: &LabelMap) -> u64 {
     let mut done = vec![false; map.ids.len()];
     let mut specks = 0;

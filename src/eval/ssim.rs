@@ -5,7 +5,7 @@ use super::metrics::byte_value;
 use crate::scene::Photo;
 use rayon::prelude::*;
 
-/// Half of the window, px.
+/// Radius of the window, px.
 const WINDOW_REACH_PX: usize = 5;
 const WINDOW_SIGMA_PX: f64 = 1.5;
 /// Stabilising constants for values in 0 to 1.

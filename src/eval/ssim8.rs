@@ -8,7 +8,7 @@ const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
 /// Converts a colour to 8 bits.
 pub fn to_bytes(colour: [f32; 3]) -> [u8; 3] {
-    // A NaN becomes 0.
+    // NaN becomes 0.
     colour.map(|value| (value * 255.0 + 0.5).clamp(0.0, 255.0) as u8)
 }
 

@@ -1,4 +1,4 @@
-//! What is scored: a model that fits into the memory of the device, or one of which each picture takes a part.
+//! The model to score: in device memory as a whole, or with a different part loaded for each picture.
 
 use crate::edit::select::extract;
 use crate::engine::Engine;
@@ -7,19 +7,19 @@ use crate::render::large::Painter;
 use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Camera, Gaussians, LabelMap};
 
-/// A model to draw pictures of, as a whole or some objects of it alone.
+/// A model that can be drawn as a whole or with some objects alone.
 pub trait Subject {
-    /// Labels of the Gaussians; main Gaussians are places in this list.
+    /// Labels of the Gaussians; main Gaussians are indices into this list.
     fn labels(&self) -> Option<&[u32]>;
 
-    /// Draws some objects alone from now on, or everything. Returns false if there are no such objects.
+    /// Selects what to draw: some objects alone, or everything. Returns false if there are no such objects.
     fn show(&mut self, only: Option<&[u32]>) -> Result<bool>;
 
-    /// Draws what is shown.
+    /// Draws the current selection.
     fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render>;
 
-    /// Draws the label of each pixel of everything: the one with the largest sum of weights, or that of the main Gaussian,
-    /// as in LabelGS.
+    /// Draws the label map of the whole model: per pixel, the label with the largest sum of weights, or that of the
+    /// main Gaussian, as in LabelGS.
     fn label_map(&mut self, camera: &Camera, near: f32, by_main: bool) -> Result<LabelMap> {
         if by_main {
             let rendered = self.render(camera, &RenderOptions::for_main(near))?;
@@ -36,7 +36,7 @@ pub struct WholeModel<'a> {
     pub engine: &'a mut Engine,
     /// The model.
     pub model: &'a Gaussians,
-    /// Least label confidence of Gaussians in objects that are drawn alone, 0 to 1.
+    /// Smallest label confidence of Gaussians in objects drawn alone, 0 to 1.
     pub min_confidence: f32,
 }
 

@@ -1,20 +1,20 @@
-//! What a render of a view is compared with.
+//! The photo that a render is compared with.
 
 use crate::error::Result;
 use crate::scene::view::ALPHA_CLEAR;
 use crate::scene::{Photo, View};
 use std::sync::Arc;
 
-/// The photo of a view behind which a render has its background.
+/// The photo of a view, over the background of the render.
 pub(crate) struct Target {
-    /// The photo, over that background where it is transparent.
+    /// The photo, with the background behind transparent pixels.
     pub(crate) photo: Arc<Photo>,
-    /// The same with weight only where it shows something, if it is a photo of objects alone.
+    /// The same with only opaque pixels valid, if it is a photo of objects alone.
     objects: Option<Photo>,
 }
 
 impl Target {
-    /// Takes the photo of a view.
+    /// Reads the photo of a view.
     pub(crate) fn for_view(view: &View, background: [f32; 3]) -> Result<Self> {
         let photo = view.photo()?;
         let Some(rgba) = photo.over(background) else { return Ok(Self { photo, objects: None }) };
@@ -25,8 +25,8 @@ impl Target {
         Ok(Self { photo: Photo { rgba, width, height }.into(), objects: Some(objects) })
     }
 
-    /// Returns the photo for scores of colours: what is clear in a photo of objects alone does not count, because it is
-    /// right wherever there is nothing.
+    /// Returns the photo for colour scores. Clear pixels of a photo of objects alone do not count, because any empty
+    /// render is right there.
     pub(crate) fn coloured(&self) -> &Photo {
         self.objects.as_ref().unwrap_or(&self.photo)
     }

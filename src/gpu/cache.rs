@@ -1,4 +1,4 @@
-//! Compiled pipelines that outlive the process, if the driver returns them (VkPipelineCache).
+//! Keeps compiled pipelines between runs, if the driver returns them (VkPipelineCache).
 
 use super::call::vk_call;
 use super::capabilities::Capabilities;
@@ -6,7 +6,8 @@ use ash::vk;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Storage of compiled pipelines between runs. A failure only costs time at the next start, so it is no error.
+/// Storage of compiled pipelines between runs. A failure only costs time at the next start, so it is not reported as an
+/// error.
 pub trait PipelineStore: Debug + Send + Sync {
     /// Returns the saved data of a device; empty if there is none.
     fn load(&self, device: &str) -> Vec<u8>;
@@ -14,7 +15,7 @@ pub trait PipelineStore: Debug + Send + Sync {
     fn save(&self, device: &str, data: &[u8]);
 }
 
-/// The cache of a device; without a store it lasts as long as the process.
+/// The pipeline cache of a device; without a store, it is lost when the process ends.
 pub(super) struct PipelineCache {
     handle: vk::PipelineCache,
     store: Option<Arc<dyn PipelineStore>>,
@@ -24,7 +25,7 @@ pub(super) struct PipelineCache {
 }
 
 impl PipelineCache {
-    /// If a driver refuses a cache or its saved contents, the engine runs without one.
+    /// If the driver refuses the cache or its saved contents, the engine runs without a cache.
     pub(super) fn new(
         device: &ash::Device,
         capabilities: &Capabilities,
@@ -34,7 +35,7 @@ impl PipelineCache {
         let data = store.map_or_else(Vec::new, |store| store.load(&name));
         let make = |data: &[u8]| {
             let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
-            // SAFETY: the device is alive. The driver checks the header of the data, the store checks all of it.
+            // SAFETY: the device is alive. The driver checks the data's header; the store checks all of the data.
             vk_call("vkCreatePipelineCache", || unsafe { device.create_pipeline_cache(&info, None) })
         };
         let handle = make(&data).or_else(|_| make(&[])).unwrap_or_default();

@@ -6,7 +6,7 @@ use ash::vk;
 
 /// Calls Vulkan and names the call in the error.
 ///
-/// An injected [fault](fault) fails the call without making it.
+/// With an injected [fault](fault), the function returns its error without calling Vulkan.
 pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
     let outcome = match fault(call) {
         Some(result) => Err(result),

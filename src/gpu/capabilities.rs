@@ -9,19 +9,19 @@ use std::fmt;
 /// Kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
-    /// A graphics card; preferred.
+    /// A discrete GPU; preferred.
     Discrete,
-    /// A graphics unit inside the processor.
+    /// An integrated GPU.
     Integrated,
-    /// A virtual machine's device.
+    /// A GPU of a virtual machine.
     Virtual,
     /// Unknown.
     Other,
-    /// The host's processor, as with lavapipe.
+    /// The CPU, as with lavapipe.
     Cpu,
 }
 
-/// One line of the table of `labelgs devices`.
+/// A required or optional feature or limit; one line of `labelgs devices`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Requirement {
     /// The feature or limit.
@@ -30,21 +30,21 @@ pub struct Requirement {
     pub is_required: bool,
     /// Needed value.
     pub needed: String,
-    /// Value of the device.
+    /// The device's value.
     pub found: String,
     /// True if the value suffices.
     pub is_met: bool,
-    /// Purpose of the feature or limit.
+    /// What the feature or limit is used for.
     pub reason: &'static str,
 }
 
-/// The need for memory, which compiling does without.
+/// Name of the memory requirement, which does not apply to compile-only use.
 pub(super) const MEMORY_REQUIREMENT: &str = "memory";
-/// Smallest subgroup size with kernels.
+/// Smallest subgroup size that kernels support.
 pub(crate) const SUBGROUP_MIN: u32 = 4;
-/// Smallest size of the device's own subgroups that kernels use; smaller ones are emulated.
+/// Smallest native subgroup size that kernels use; smaller ones are emulated.
 const OWN_SUBGROUP_MIN: u32 = 8;
-/// Size of emulated subgroups on cards.
+/// Size of emulated subgroups on GPUs.
 const EMULATED_SUBGROUP: u32 = 32;
 /// Subgroup operations that the kernels use.
 const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
@@ -52,7 +52,7 @@ const SUBGROUP_OPERATIONS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::
         | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw()
         | vk::SubgroupFeatureFlags::SHUFFLE.as_raw(),
 );
-/// Largest subgroup size with kernels: a strip of the loss and the longest butterfly have 64 lanes.
+/// Largest subgroup size that kernels support: a strip of the loss and the longest butterfly have 64 lanes.
 pub(crate) const SUBGROUP_MAX: u32 = 64;
 
 /// Subgroup properties of a device.
@@ -68,11 +68,10 @@ pub struct Subgroup {
     pub max_per_group: u32,
     /// True if pipelines pin the size.
     pub is_pinned: bool,
-    /// True if the size is certain: it is pinned, or the device has only one. Else the driver chooses the size, which may
-    /// differ from its reported default.
+    /// True if the size is certain: it is pinned, or the device has only one. Otherwise the driver may choose a size
+    /// other than its reported default.
     pub is_certain: bool,
-    /// True if kernels do without the device's subgroups: neighbouring invocations exchange values through shared
-    /// memory.
+    /// True if subgroups are emulated: neighbouring invocations exchange values through shared memory.
     pub is_emulated: bool,
     /// Subgroup operations available in compute shaders.
     pub operations: vk::SubgroupFeatureFlags,
@@ -94,12 +93,12 @@ impl Subgroup {
         (OWN_SUBGROUP_MIN..=SUBGROUP_MAX).contains(&self.size)
     }
 
-    /// True if the kernels can use the device's own subgroups.
+    /// True if the kernels can use native subgroups.
     pub(super) fn serves(&self) -> bool {
         self.is_certain && self.has_size() && self.has_operations()
     }
 
-    /// Has subgroups of any size emulated. A processor keeps the width of its vectors.
+    /// Emulates subgroups. A CPU keeps its vector width.
     pub(super) fn emulate(&mut self, is_cpu: bool) {
         (self.is_emulated, self.min, self.max) = (true, SUBGROUP_MIN, SUBGROUP_MAX);
         self.size = if is_cpu && self.size.is_power_of_two() { self.size } else { EMULATED_SUBGROUP };
@@ -128,7 +127,7 @@ impl fmt::Display for Subgroup {
     }
 }
 
-/// Features that are enabled if the device has them.
+/// Features to enable if the device has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Features {
     pub(super) memory_model: bool,
@@ -165,24 +164,24 @@ pub struct Capabilities {
     pub needs: Vec<Requirement>,
     pub(super) features: Features,
     pub(super) queue_family: u32,
-    /// Family of a queue that copies beside the compute queue.
+    /// Family of a separate transfer queue.
     pub(super) transfer_family: Option<u32>,
     /// True if subgroup size control is an extension, not part of Vulkan 1.3.
     pub(super) size_control_is_extension: bool,
 }
 
 impl Capabilities {
-    /// True if the device is the host's processor.
+    /// True if the device is the CPU.
     pub fn is_cpu(&self) -> bool {
         self.kind == DeviceKind::Cpu
     }
 
-    /// True if shaders can load and store 16 bits.
+    /// True if shaders can load and store 16-bit values.
     pub fn has_narrow_storage(&self) -> bool {
         self.features.narrow_storage
     }
 
-    /// Sets the subgroups that the options ask for.
+    /// Sets the subgroup size from the options.
     pub(super) fn choose_subgroup(&mut self, options: &GpuOptions) -> Result<()> {
         if options.emulate_subgroups {
             self.subgroup.emulate(self.is_cpu());

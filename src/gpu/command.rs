@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 
-/// A primary command buffer with its own pool, so that no other code has to synchronise with it.
+/// A primary command buffer with its own pool, so no other code has to synchronise with it.
 pub(crate) struct CommandBuffer {
     gpu: Arc<Gpu>,
     pool: vk::CommandPool,

@@ -1,4 +1,4 @@
-//! Marks that passes leave in host-visible memory, to name the last pass when the device is lost.
+//! Crash markers in host-visible memory, which identify the last pass when the device is lost.
 
 use super::Gpu;
 use super::memory::{Buffer, MemoryKind};
@@ -20,7 +20,7 @@ impl Markers {
         Ok(markers)
     }
 
-    /// Clears the marks; the recording must not be running.
+    /// Clears the markers; the recording must not be running.
     pub(crate) fn reset(&self) -> Result<()> {
         self.buffer.write(0, &vec![0; self.buffer.bytes() as usize])
     }

@@ -6,15 +6,16 @@ use super::instance::{Instance, Validation};
 use super::select;
 use crate::error::Result;
 
-/// Lists all devices, and the position of the one that [`Gpu::new`](super::Gpu::new) picks with these options, or the
-/// error with which it fails.
+/// Lists all devices. Also returns the index of the device that [`Gpu::new`](super::Gpu::new) selects with these
+/// options, or its error.
 pub fn devices(options: &GpuOptions) -> Result<(Vec<Capabilities>, Result<usize>)> {
     let instance = Instance::new(Validation::Off)?;
-    let mut found: Vec<Capabilities> = select::all(&instance)?.into_iter().map(|(_, device)| device).collect();
-    let picked = select::pick(&instance, options).map(|picked| picked.capabilities.index);
+    let mut found: Vec<Capabilities> =
+        select::candidates(&instance)?.into_iter().map(|device| device.capabilities).collect();
+    let selected = select::select_device(&instance, options).map(|device| device.capabilities.index);
     for device in &mut found {
         // A device without this subgroup size keeps its own; opening it reports the error.
         let _ = device.choose_subgroup(options);
     }
-    Ok((found, picked))
+    Ok((found, selected))
 }

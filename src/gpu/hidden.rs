@@ -1,4 +1,4 @@
-//! Hides features of a device, so that tests can try out a poorer device on a richer one.
+//! Hides device features, so that tests can simulate a less capable device.
 
 use super::capabilities::{Features, Subgroup};
 use super::limits::Limits;

@@ -18,9 +18,9 @@ pub enum Validation {
     Off,
     /// Correct use of the API.
     On,
-    /// Also hazards between commands.
+    /// Also checks hazards between commands.
     Sync,
-    /// Also memory accesses of shaders; slow.
+    /// Also checks memory accesses of shaders; slow.
     GpuAssisted,
 }
 
@@ -49,10 +49,11 @@ pub struct Message {
     pub text: String,
 }
 
-/// Messages beyond this number are dropped; a broken kernel makes one per invocation.
+/// Messages beyond this number are dropped, because a broken kernel makes one per invocation.
 const MESSAGES_MAX: usize = 1000;
 
-/// Messages of the validation layer. The log outlives the device, because destroying the device also makes messages.
+/// Messages of the validation layer. The log outlives the device, because destroying the device may also cause
+/// messages.
 #[derive(Clone, Debug, Default)]
 pub struct MessageLog(Arc<Messages>);
 
@@ -71,7 +72,7 @@ struct Messenger {
     handle: vk::DebugUtilsMessengerEXT,
 }
 
-/// An instance; it outlives everything made from it.
+/// A Vulkan instance; it outlives everything created from it.
 pub(super) struct Instance {
     instance: ash::Instance,
     messenger: Option<Messenger>,
@@ -89,7 +90,7 @@ impl Instance {
             ))
         };
         if fault::at("loader").is_some() {
-            return Err(missing(&"a fault on purpose"));
+            return Err(missing(&"injected fault"));
         }
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as in every Vulkan program.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| missing(&error))?;
@@ -191,7 +192,7 @@ fn create(
         ],
     };
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(enabled);
-    // For messages about creating and destroying the instance itself.
+    // Receives messages about creating and destroying the instance itself.
     let mut early = messenger_info(messages);
     let mut info = vk::InstanceCreateInfo::default()
         .application_info(&application)

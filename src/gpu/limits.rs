@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::lab;
 use crate::shaders::{self, ShaderDesc};
 
-/// Limits of a device that a plan must respect.
+/// Device limits that a plan must respect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanLimits {
     /// Largest storage buffer binding, in bytes.
@@ -21,34 +21,33 @@ pub struct PlanLimits {
     pub max_allocation: u64,
     /// Maximum number of storage buffers per shader.
     pub max_storage_buffers: u32,
-    /// Storage bindings that all buffers of a shader share (`plan::windows`), on a device that has too few for a buffer each;
-    /// 0 if each has its own.
+    /// Number of storage bindings that all buffers of a shader share (`plan::windows`), on a device with too few
+    /// bindings; 0 if each buffer has its own.
     pub windows: u32,
     /// Maximum number of texel buffers per shader.
     pub max_texel_buffers: u32,
     /// Memory that the engine may use in total, in bytes: a share of the driver's free memory, or of the heap.
     pub max_memory: u64,
-    /// Most steps in flight, and copies of the buffers that the host shares with them.
+    /// Most steps in flight, and number of copies of the buffers that the host shares with them.
     pub frames: usize,
-    /// The data of a step go through staging to the device's own memory.
+    /// Step data go through staging to device-local memory.
     pub stages: bool,
-    /// The host works ahead of the device: it compiles kernels before they are needed, and reads a checkpoint from a copy on
-    /// the device. On a processor, both would take time from the steps.
+    /// The host works ahead of the device: it compiles kernels before they are needed, and reads checkpoints from a
+    /// copy on the device. On a CPU device, both would slow down the steps.
     pub runs_ahead: bool,
 }
 
-/// Alignment of buffers that share bindings: the largest block of the shaders has 352 bytes. Powers of 2, like all alignments of
-/// Vulkan.
+/// Alignment of buffers that share bindings: the largest block of the shaders has 352 bytes. It is a power of 2, like
+/// all Vulkan alignments.
 const PACKED_ALIGNMENT: u64 = 512;
 
-/// Most buffers of a shader that share bindings: their offsets fill a slot of [`PACKED_SLOT`] bytes.
+/// Most buffers per shader that can share bindings: their offsets fill a slot of [`PACKED_SLOT`] bytes.
 const PACKED_MAX: u32 = PACKED_SLOT / 4;
 
-/// Bytes between the offsets of two passes, a multiple of any alignment of uniform buffers.
+/// Bytes between the buffer offsets of two passes; a multiple of any uniform buffer alignment.
 pub(crate) const PACKED_SLOT: u32 = 256;
 
-/// Most storage buffers of a shader that no device does without. Where others do not have their buffers, other passes do their
-/// work (`KernelShape`).
+/// Most storage buffers among the shaders that every device needs. Optional shaders have replacements (`KernelShape`).
 fn own_bindings() -> u32 {
     const REPLACEABLE: [&str; 6] =
         ["update", "catch_up", "project_visible", "emit_ordered", "group_forward", "group_backward"];
@@ -59,7 +58,7 @@ fn own_bindings() -> u32 {
 }
 
 impl Default for PlanLimits {
-    /// Modest limits that every suitable device is likely to reach, without a bound on total memory.
+    /// Conservative limits that every suitable device is likely to meet, without a memory limit.
     fn default() -> Self {
         Self {
             max_storage_range: 128 << 20,
@@ -80,19 +79,19 @@ impl Default for PlanLimits {
 }
 
 impl PlanLimits {
-    /// Steps in flight on a card, and their data in its own memory: the host runs ahead, and each pass reads a photo from there.
+    /// Adapts the limits to a GPU: more steps in flight, with step data in device-local memory.
     pub(crate) fn for_gpu(self) -> Self {
         Self { frames: 4, stages: true, runs_ahead: true, ..self }
     }
 
-    /// Most bytes of photos and masks that stay in device memory beside an engine of so many bytes: half of what is left, so
-    /// that the model can grow.
+    /// Most bytes of photos and masks that stay in device memory beside an engine of the given size: half of the
+    /// remaining memory, so that the model can grow.
     pub(crate) fn kept_max(&self, engine: u64) -> u64 {
         if self.stages { self.max_memory.saturating_sub(engine) / 2 } else { 0 }
     }
 
-    /// Has buffers share bindings if these are too few for a buffer each. The data of steps then go through staging, because
-    /// buffers that the host writes would take a binding of their own.
+    /// Lets buffers share bindings if the device has too few. Step data then go through staging, because host-written
+    /// buffers would need a binding of their own.
     #[must_use]
     pub fn packed(self) -> Self {
         if self.is_packed() || self.max_storage_buffers >= own_bindings() {
@@ -106,8 +105,8 @@ impl PlanLimits {
         self.windows > 0
     }
 
-    /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines. Buffers that share a binding
-    /// start at a whole element from its start, whatever their elements: a multiple of the largest.
+    /// Alignment of every buffer in a page, for storage bindings, texel views and cache lines. Buffers that share a
+    /// binding must start at a multiple of their element size, so the alignment is a multiple of the largest element.
     pub fn alignment(&self) -> u64 {
         let least = if self.is_packed() { PACKED_ALIGNMENT } else { 64 };
         self.storage_alignment.max(self.texel_alignment).max(least)
@@ -135,9 +134,9 @@ pub struct Limits {
 
 impl Limits {
     /// Lowers limits to the values of `LABELGS_LIMIT_SSBO`, `_TEXELS`, `_ALLOCATION` and `_MEMORY` (numbers with K, M
-    /// or G), and `_BUFFERS` (storage buffers per shader), so that tests can try out a small device on a large one; and takes steps in flight from `LABELGS_FRAMES`, the
-    /// way of their data from `LABELGS_PHOTOS` (`upload` or `resident`), and whether the host works ahead from `LABELGS_AHEAD`
-    /// (`no` or `yes`).
+    /// or G), and `_BUFFERS` (storage buffers per shader), so that tests can simulate a small device. Also reads the
+    /// number of steps in flight from `LABELGS_FRAMES`, whether step data are staged from `LABELGS_PHOTOS` (`upload` or
+    /// `resident`), and whether the host works ahead from `LABELGS_AHEAD` (`no` or `yes`).
     pub(super) fn change_from_env(&mut self) -> Result<()> {
         for (name, limit) in [
             ("LABELGS_LIMIT_SSBO", &mut self.plan.max_storage_range),

@@ -1,4 +1,4 @@
-//! Locks on devices, by which processes that may use several devices share them out.
+//! Device locks, so that processes started with a list of devices each take a different one.
 
 use super::capabilities::Capabilities;
 use crate::error::{Error, Result};
@@ -7,10 +7,10 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, Weak};
 
-/// A lock on a device, held until the last clone is dropped or the process ends in any way.
+/// A lock on a device, held until the last clone is dropped or the process ends, even by a crash.
 pub(super) type DeviceLock = Arc<File>;
 
-/// Locks of this process: a device that it opens again, such as a lost one, is its own.
+/// Locks held by this process, which may reopen its own device, for example after losing it.
 static PROCESS_LOCKS: Mutex<BTreeMap<PathBuf, Weak<File>>> = Mutex::new(BTreeMap::new());
 
 /// Locks a device; `None` if another process holds it.
@@ -33,8 +33,7 @@ pub(super) fn take(folder: &Path, device: &Capabilities) -> Result<Option<Device
     }
 }
 
-/// The file of a device. It stays when the lock is gone: a file that is deleted while others open it would be locked
-/// twice.
+/// The lock file of a device. It is never deleted: two processes could otherwise lock the old and the new file.
 fn path(folder: &Path, device: &Capabilities) -> PathBuf {
     folder.join(format!("device-{}.lock", device.uuid_text()))
 }

@@ -9,7 +9,7 @@ use gpu_allocator::{AllocationError, MemoryLocation};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Users of a buffer's memory.
+/// Who accesses a buffer's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MemoryKind {
     /// The device only.
@@ -39,20 +39,20 @@ impl MemoryUse {
 }
 
 impl Gpu {
-    /// Returns the most bytes that all buffers had together since the device was opened.
+    /// Returns the peak total size of all buffers since the device was opened, in bytes.
     pub fn peak_memory(&self) -> u64 {
         self.used.peak.load(Ordering::Relaxed)
     }
 }
 
-/// A buffer with its memory, or a part of another buffer; freed when dropped.
+/// A buffer with its memory, or a sub-range of another buffer; freed when dropped.
 pub(crate) struct Buffer {
     gpu: Arc<Gpu>,
     name: String,
     handle: vk::Buffer,
     bytes: u64,
     allocation: Option<Allocation>,
-    /// Of a part: the buffer that has the handle and the memory, and the first byte in it.
+    /// For a sub-range: the buffer that owns handle and memory, and the first byte in it.
     whole: Option<(Arc<Buffer>, u64)>,
 }
 
@@ -68,7 +68,7 @@ impl Buffer {
         let usage = if is_packed { usage | vk::BufferUsageFlags::UNIFORM_BUFFER } else { usage };
         let families: Vec<u32> =
             gpu.capabilities.transfer_family.into_iter().chain([gpu.capabilities.queue_family]).collect();
-        // Both queues use buffers as they come: for buffers, unlike images, that costs nothing.
+        // Concurrent sharing costs nothing for buffers, unlike images.
         let sharing = if families.len() > 1 { vk::SharingMode::CONCURRENT } else { vk::SharingMode::EXCLUSIVE };
         let shared_by = if families.len() > 1 { &families[..] } else { &[] };
         let info = vk::BufferCreateInfo::default()
@@ -109,10 +109,10 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// A part of a buffer, which lives as long as its parts.
+    /// Makes a sub-range of a buffer, and keeps the buffer alive.
     pub(crate) fn part(whole: &Arc<Self>, name: &str, start: u64, bytes: u64) -> Result<Self> {
         if bytes == 0 || start.checked_add(bytes).is_none_or(|end| end > whole.bytes) {
-            return Err(Error::Bug(format!("{bytes} bytes at {start} for {name}: no part of {whole:?}")));
+            return Err(Error::Bug(format!("{bytes} bytes at {start} for {name} are outside of {whole:?}")));
         }
         let (gpu, name, handle) = (Arc::clone(&whole.gpu), name.to_owned(), whole.handle);
         Ok(Self { gpu, name, handle, bytes, allocation: None, whole: Some((Arc::clone(whole), start)) })
@@ -125,11 +125,11 @@ impl Buffer {
             | AllocationError::FailedToMap(_) => Error::OutOfMemory {
                 what: self.name.clone(),
                 needed: self.bytes,
-                limit_name: "the largest heap of this device (of which that much is no longer free)".to_owned(),
+                limit_name: "the largest heap of this device (not all of it is free any more)".to_owned(),
                 limit: self.gpu.limits().heap,
                 cure: format!("lower {}, use smaller images or free memory of the device", Setting("max_gaussians")),
             },
-            // The allocator reports some failures only by name.
+            // The allocator reports some failures only by the name of the result.
             AllocationError::Internal(text) if text.contains("DEVICE_LOST") => {
                 Error::DeviceLost { pass: "unknown".to_owned() }
             }
@@ -165,7 +165,7 @@ impl Buffer {
         self.whole.as_ref().map_or(self, |(whole, _)| whole)
     }
 
-    /// First byte behind the handle: 0 but for parts.
+    /// First byte in the handle's buffer: 0 except for sub-ranges.
     pub(crate) fn start(&self) -> u64 {
         self.whole.as_ref().map_or(0, |(_, start)| *start)
     }

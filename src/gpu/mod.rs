@@ -1,8 +1,8 @@
 //! Opens Vulkan devices: [`Gpu::new`] opens one, [`devices`] lists all with their [`Capabilities`].
 //!
-//! A thin layer over Vulkan: one instance, one device, one compute queue and perhaps one that copies, and owners of the objects made from them.
-//! This module and `scheduler/recorder.rs` fulfil all guarantees that Vulkan demands of the caller, so the rest of the
-//! crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
+//! A thin layer over Vulkan: one instance, one device, one compute queue, an optional transfer queue, and owners of the
+//! objects created from them. This module and `scheduler/recorder.rs` uphold Vulkan's requirements on the caller, so
+//! the rest of the crate is safe code. Objects hold an `Arc<Gpu>`: no handle outlives its device.
 // Vulkan calls are foreign functions: every call is unsafe. Only this module and the recorder make them.
 #![allow(unsafe_code)]
 
@@ -58,25 +58,25 @@ use std::sync::{Arc, Mutex, MutexGuard};
 /// Options for opening a device.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
-    /// Index, part of the name, or UUID of the device, or a list of these with commas between; `None` for the most capable
-    /// one. A list means the first of its devices that no other process has opened from a list.
+    /// Index, part of the name, or UUID of the device, or a comma-separated list of these; `None` for the most capable
+    /// device. With a list, the first device that no other process has locked is used.
     pub device: Option<String>,
-    /// Folder for the locks on devices of a list, made if it is not there; processes with the same folder share devices
-    /// out. The lock goes with the [`Gpu`], or with the process.
+    /// Folder for device locks, created if missing; needed with a list of devices. Processes with the same folder take
+    /// different devices. The lock is released when the [`Gpu`] is dropped or the process ends.
     pub locks: Option<PathBuf>,
     /// Validation layer.
     pub validation: Validation,
-    /// Bounds checks of the driver on every buffer access.
+    /// Enables the driver's bounds checks on every buffer access.
     pub robust_buffer_access: bool,
     /// Subgroup size, a power of two that the device offers; `None` for the device's default.
     pub subgroup_size: Option<u32>,
-    /// Emulates subgroups through shared memory, as on devices whose own subgroups do not serve: slower, but every size
-    /// from 4 to 64 runs on every device.
+    /// Emulates subgroups in shared memory, as on devices without usable subgroups. It is slower, but every size from 4
+    /// to 64 runs on every device.
     pub emulate_subgroups: bool,
-    /// Opens the device to ask for statistics of compiled kernels. It may then have no memory, like a driver that only
-    /// compiles.
+    /// Opens the device only to query statistics of compiled kernels. A compile-only driver without memory is then
+    /// accepted.
     pub statistics: bool,
-    /// Storage of compiled pipelines between runs; `None` to keep none.
+    /// Storage of compiled pipelines between runs; `None` to discard them.
     pub pipelines: Option<Arc<dyn PipelineStore>>,
 }
 
@@ -97,9 +97,9 @@ impl GpuOptions {
 /// Queue of a command buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
-    /// Runs lists, and all else.
+    /// Runs lists and all other work.
     Compute,
-    /// Copies beside them; the compute queue on a device without a queue for that.
+    /// Copies in parallel to lists; falls back to the compute queue if there is no transfer queue.
     Transfer,
 }
 
@@ -109,7 +109,7 @@ pub struct Gpu {
     allocator: Mutex<Option<Allocator>>,
     used: memory::MemoryUse,
     queue: Mutex<vk::Queue>,
-    /// The queue for copies beside the compute queue.
+    /// The separate transfer queue, if there is one.
     transfer: Option<Mutex<vk::Queue>>,
     names: Option<ash::ext::debug_utils::Device>,
     statistics: Option<statistics::StatisticFunctions>,
@@ -125,7 +125,7 @@ impl Gpu {
     /// Opens a device. The error lists all devices and the missing features of each.
     pub fn new(options: &GpuOptions) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
-        let SelectedDevice { physical, mut capabilities, lock } = select::pick(&instance, options)?;
+        let SelectedDevice { physical, mut capabilities, lock } = select::select_device(&instance, options)?;
         capabilities.choose_subgroup(options)?;
         let device = select::open(&instance, physical, &capabilities, options)?;
         // SAFETY: the device has this family and was created with one queue of it.
@@ -144,7 +144,7 @@ impl Gpu {
         let allocator = allocator.map_err(|error| {
             // SAFETY: no object was made from the device yet.
             unsafe { device.destroy_device(None) };
-            Error::NoDevice(format!("the memory allocator does not start: {error}"))
+            Error::NoDevice(format!("the memory allocator cannot be created: {error}"))
         })?;
         let names = instance.has_debug_utils().then(|| ash::ext::debug_utils::Device::new(instance.raw(), &device));
         let statistics = options.statistics.then(|| statistics::StatisticFunctions::new(instance.raw(), &device));
@@ -191,7 +191,7 @@ impl Gpu {
         self.instance.log().messages()
     }
 
-    /// Log of the validation layer; it can still be read after the device is destroyed.
+    /// Log of the validation layer; it stays readable after the device is destroyed.
     pub fn message_log(&self) -> MessageLog {
         self.instance.log().clone()
     }
@@ -208,8 +208,8 @@ impl Gpu {
         vk_call("vkDeviceWaitIdle", || unsafe { self.device.device_wait_idle() })
     }
 
-    /// Submits command buffers of a lane, to begin when the timeline of `after` has reached its value; the timeline reaches
-    /// `value` when the commands are done.
+    /// Submits command buffers to a lane. They start when the timeline of `after` has reached its value, and set the
+    /// timeline to `value` when they are done.
     pub(crate) fn submit(
         &self,
         lane: Lane,
@@ -244,7 +244,7 @@ impl Gpu {
         lock(&self.cache).raw()
     }
 
-    /// Functions of the device, for the modules that may use unsafe code.
+    /// Device functions, for the modules that may use unsafe code.
     pub(crate) fn raw(&self) -> &ash::Device {
         &self.device
     }
@@ -260,7 +260,7 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // A lost device reports an error here; it is destroyed nevertheless. A driver that only compiles cannot wait.
+        // A lost device reports an error here; it is destroyed nevertheless. A compile-only driver cannot wait.
         if self.limits().heap > 0 {
             let _ = self.wait_idle();
         }
@@ -280,7 +280,7 @@ impl std::fmt::Debug for Gpu {
     }
 }
 
-/// Locks a mutex even after a panic in another thread: the guarded data is valid between any two statements.
+/// Locks a mutex even after a panic in another thread: the guarded data are valid between any two statements.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

@@ -1,14 +1,14 @@
-//! SPIR-V whose storage buffers share a few bindings, for devices that have too few for a binding each.
+//! Rewrites SPIR-V so that storage buffers share a few bindings, for devices with too few bindings.
 //!
-//! Every storage variable of a module moves to the binding of a window, a range of memory that holds several buffers, and each
-//! access adds the place of its buffer in the window, in elements. Places come from a uniform buffer, one word for each
-//! storage buffer: buffers move when they grow, and no kernel is compiled again for that. A block that is one struct becomes an
-//! array of such structs. Only the modules of such a device are changed, when their pipelines are created.
+//! Every storage variable of a module moves to the binding of a window, a memory range that contains several buffers.
+//! Each access adds the buffer's offset in the window, in elements. Offsets come from a uniform buffer, one word per
+//! storage buffer, so that buffers can move without recompiling kernels. A block that is a single struct becomes an
+//! array of structs. Modules are rewritten when pipelines are created, and only on such devices.
 
 use crate::shaders::{BindingDesc, BindingKind};
 use std::collections::BTreeMap;
 
-/// Opcodes and numbers of SPIR-V that matter here.
+/// The SPIR-V opcodes and constants used here.
 mod spirv {
     pub(super) const LINE: u32 = 8;
     pub(super) const ENTRY_POINT: u32 = 15;
@@ -44,16 +44,16 @@ mod spirv {
     /// Storage classes.
     pub(super) const UNIFORM: u32 = 2;
     pub(super) const STORAGE_BUFFER: u32 = 12;
-    /// Words before the first instruction; one of them is the bound of ids.
+    /// Header words before the first instruction, and the index of the id bound.
     pub(super) const HEADER: usize = 5;
     pub(super) const BOUND: usize = 3;
 }
 use spirv as op;
 
-/// Which window each storage buffer of a shader is in, in the order of its bindings.
+/// Window of each storage buffer of a shader, in binding order.
 pub(super) type Windows<'a> = &'a [u8];
 
-/// Bytes of an element of a storage buffer in its window: those of the array in GLSL, or of a struct with room after it.
+/// Bytes per element of a storage buffer in its window: the array's element size in GLSL, or the padded struct size.
 pub(crate) fn stride(binding: &BindingDesc) -> u64 {
     u64::from(binding.element_bytes).next_power_of_two()
 }
@@ -63,41 +63,41 @@ pub(super) fn count(windows: Windows<'_>) -> u32 {
     windows.iter().map(|&window| u32::from(window) + 1).max().unwrap_or(0)
 }
 
-/// Binding of the first window; the uniform buffer follows the last. Texel buffers keep theirs.
+/// Binding of the first window; the uniform buffer follows the last window. Texel buffers keep their bindings.
 pub(super) fn first_binding(bindings: &[BindingDesc]) -> u32 {
     bindings.iter().map(|binding| binding.binding + 1).max().unwrap_or(0)
 }
 
 /// A storage variable.
 struct Variable {
-    /// Binding of its window.
+    /// Binding of the window.
     binding: u32,
-    /// Place among the storage buffers of the shader.
+    /// Index among the shader's storage buffers.
     number: u32,
-    /// Its block is an array, and no single struct.
+    /// True if its block is an array, not a single struct.
     is_array: bool,
-    /// Ids of that number and of the place in elements, which is loaded where the function begins.
+    /// Ids of the index constant, and of the offset in elements, which is loaded at the start of the function.
     constant: u32,
     place: u32,
 }
 
-/// What a walk over a module finds, and ids that are new.
+/// Result of scanning a module, and newly assigned ids.
 struct Module {
     /// Storage variables by id.
     variables: BTreeMap<u32, Variable>,
-    /// Blocks of one struct: ids of the block and of its array, and the bytes of an element.
+    /// Blocks that are a single struct: ids of block and array, and bytes per element.
     singles: BTreeMap<u32, (u32, u32)>,
     /// Type `uint`, and whether the module has it.
     uint: u32,
     has_uint: bool,
-    /// Block, its type of pointer, variable and the type of pointer to a word of the buffer of places.
+    /// Ids for the offsets buffer: block, pointer to block, variable, and pointer to a word.
     uniform: [u32; 4],
     uniform_binding: u32,
     /// The next new id.
     next: u32,
 }
 
-/// The module with buffers in windows. An error says what the module has that this does not change.
+/// Returns the module with buffers in windows. The error names what the rewrite does not support.
 pub(super) fn repack(words: &[u32], bindings: &[BindingDesc], windows: Windows<'_>) -> Result<Vec<u32>, String> {
     let storage: Vec<&BindingDesc> = bindings.iter().filter(|binding| binding.kind == BindingKind::Storage).collect();
     if storage.len() != windows.len() {
@@ -149,9 +149,9 @@ fn put(out: &mut Vec<u32>, opcode: u32, operands: &[u32]) {
 struct StorageTypes {
     bindings: BTreeMap<u32, u32>,
     strides: BTreeMap<u32, u32>,
-    /// Element bytes of runtime arrays.
+    /// Element size of runtime arrays, bytes.
     arrays: BTreeMap<u32, Option<u32>>,
-    /// The member of structs with one.
+    /// The member of structs with a single member.
     blocks: BTreeMap<u32, u32>,
     pointers: BTreeMap<u32, u32>,
     variables: Vec<(u32, u32)>,
@@ -199,7 +199,7 @@ impl Module {
             let number = storage.iter().position(|binding| found.bindings.get(&id) == Some(&binding.binding));
             let number = number.ok_or_else(|| format!("storage variable {id} without a known binding"))?;
             let block = *found.pointers.get(&pointer).ok_or("a storage variable of an unknown type")?;
-            let member = found.blocks.get(&block).ok_or("a storage block that has not one member")?;
+            let member = found.blocks.get(&block).ok_or("a storage block without exactly one member")?;
             let bytes = stride(storage[number]) as u32;
             let is_array = match found.arrays.get(member) {
                 Some(own) if *own != Some(bytes) => return Err(format!("an array with elements of {own:?} bytes")),
@@ -228,12 +228,12 @@ impl Module {
         put(out, op::DECORATE, &[uniform, op::BINDING, self.uniform_binding]);
     }
 
-    /// Words of the buffer of places.
+    /// Number of words of the offsets buffer.
     fn words(&self) -> u32 {
         self.variables.values().map(|variable| variable.number + 1).max().unwrap_or(1)
     }
 
-    /// The buffer of places, before the function.
+    /// Declares the offsets buffer, before the function.
     fn declare(&self, out: &mut Vec<u32>) {
         let ([block, pointer, uniform, word], uint) = (self.uniform, self.uint);
         if !self.has_uint {
@@ -249,7 +249,7 @@ impl Module {
         }
     }
 
-    /// Loads the places where the function begins, so that they are there in all its blocks.
+    /// Loads the offsets at the start of the function, so that all its blocks can use them.
     fn load_places(&mut self, out: &mut Vec<u32>) {
         let [_, _, uniform, word] = self.uniform;
         for variable in self.variables.values() {
@@ -275,7 +275,7 @@ impl Module {
             (op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [_, _, _, base, ..]) if is_ours(base) => {
                 return self.access(out, opcode, of);
             }
-            // Whole blocks: no kernel has these.
+            // Accesses to whole blocks do not occur in kernels.
             (op::LOAD | op::ARRAY_LENGTH | op::COPY_OBJECT | op::PTR_ACCESS_CHAIN, [_, _, _, id, ..])
             | (op::STORE, [_, id, ..])
                 if is_ours(id) =>
@@ -290,7 +290,8 @@ impl Module {
         Ok(())
     }
 
-    /// A pointer into a storage block: the element moves by the place of the buffer, and a struct becomes that element.
+    /// Rewrites a pointer into a storage block: adds the buffer's offset to the element index, and indexes a single
+    /// struct by it.
     fn access(&mut self, out: &mut Vec<u32>, opcode: u32, of: &[u32]) -> Result<(), String> {
         let (variable, chain) = (&self.variables[&of[3]], &of[1..]);
         let Some((before, after)) = chain.split_at_checked(4) else { return Err("a pointer to a whole block".into()) };
@@ -316,7 +317,7 @@ mod tests {
         shader.spirv.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
     }
 
-    /// Three windows in turn.
+    /// Assigns three windows in turn.
     fn windows(shader: &ShaderDesc) -> Vec<u8> {
         (0..shader.storage_buffers()).map(|buffer| (buffer % 3) as u8).collect()
     }
@@ -342,7 +343,7 @@ mod tests {
             let mut wanted: Vec<u32> = texels.chain(shared).chain([first + count(&windows)]).collect();
             wanted.sort_unstable();
             assert_eq!(operands(&new, op::DECORATE, op::BINDING), wanted, "{}", shader.name);
-            // Each pointer into a storage array has one sum more, and nothing else of the code changes.
+            // Each pointer into a storage array has one more addition; the rest of the code is unchanged.
             let number = |of: &[u32], opcode| {
                 instructions(of).expect("instructions").iter().filter(|(found, _)| *found == opcode).count()
             };

@@ -8,7 +8,7 @@ use ash::vk;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
 
-/// Properties that distinguish pipelines.
+/// Key that distinguishes pipelines.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct PipelineKey {
     name: &'static str,
@@ -17,17 +17,17 @@ pub(super) struct PipelineKey {
     /// Values of the specialisation constants.
     spec: Vec<u32>,
     subgroup_size: Option<u32>,
-    /// Window of each storage buffer, if they share bindings.
+    /// Window of each storage buffer, if buffers share bindings.
     windows: Vec<u8>,
 }
 
 /// Binding and kind of a descriptor.
 pub(super) type Slot = (u32, vk::DescriptorType);
 
-/// A kernel to compile: its shader, the constants of a pass, and the windows of its storage buffers.
+/// A kernel to compile: shader, constants of a pass, and windows of its storage buffers.
 pub(crate) type Kernel<'a> = (&'static ShaderDesc, &'a [u32], Vec<u8>);
 
-/// A pipeline, or none before its first use.
+/// A pipeline; `None` before its first use.
 pub(super) type PipelineSlot = Arc<Mutex<Option<Arc<Pipeline>>>>;
 
 /// A compute pipeline with its layouts.
@@ -40,8 +40,9 @@ pub(crate) struct Pipeline {
 }
 
 impl Gpu {
-    /// Returns the pipeline of a shader; creates it on first use. `spec` has the constants of a pass and is empty for the
-    /// defaults. `windows` has the window of each storage buffer where they share bindings, and is empty for the first.
+    /// Returns the pipeline of a shader; creates it on first use. `spec` has the constants of a pass; empty for the
+    /// defaults. `windows` has the window of each storage buffer, if buffers share bindings; empty for the first
+    /// window.
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32], windows: &[u8]) -> Result<Arc<Pipeline>> {
         let specialised = shader.spec.iter().enumerate().filter(|(_, constant)| !constant.is_pushed);
         let spec = specialised.map(|(place, constant)| spec.get(place).copied().unwrap_or(constant.default)).collect();
@@ -50,7 +51,7 @@ impl Gpu {
         let windows = self.windows(shader, windows);
         let key = PipelineKey { name: shader.name, spirv, spec, subgroup_size, windows };
         let slot = Arc::clone(lock(&self.pipelines).entry(key.clone()).or_default());
-        // Others wait for this pipeline only: it may take long.
+        // Lock only this pipeline, because creating it may take long.
         let mut slot = lock(&slot);
         let pipeline = match slot.take() {
             Some(pipeline) => pipeline,
@@ -60,12 +61,13 @@ impl Gpu {
         Ok(pipeline)
     }
 
-    /// Creates pipelines by several threads, so that [`Self::pipeline`] finds them.
+    /// Creates pipelines on several threads, so that [`Self::pipeline`] finds them.
     pub(crate) fn compile(&self, kernels: &[Kernel<'_>]) -> Result<()> {
         kernels.par_iter().try_for_each(|(shader, spec, windows)| self.pipeline(shader, spec, windows).map(drop))
     }
 
-    /// The window of each storage buffer of a shader: the first for all if none are given; none where each has its own binding.
+    /// Returns the window of each storage buffer of a shader: the first window if none are given; empty if buffers have
+    /// their own bindings.
     pub(super) fn windows(&self, shader: &ShaderDesc, given: &[u8]) -> Vec<u8> {
         match (self.limits().plan.is_packed(), given) {
             (false, _) => Vec::new(),
@@ -74,12 +76,12 @@ impl Gpu {
         }
     }
 
-    /// The subgroup size to pin for a shader, if it uses subgroups.
+    /// Returns the subgroup size to pin, if the shader uses subgroups.
     pub(super) fn pinned(&self, shader: &ShaderDesc, size: u32) -> Option<u32> {
         (shader.uses_subgroups && self.capabilities.subgroup.is_pinned).then_some(size)
     }
 
-    /// Width of a shader's workgroup. Fails if the workgroup is too large, because drivers differ in their reaction.
+    /// Width of a shader's workgroup. Fails if the workgroup is too large, because drivers react differently.
     fn check_workgroup(&self, shader: &ShaderDesc, spec: &[u32], subgroup_size: Option<u32>) -> Result<u32> {
         let (size, limits) = (shader.workgroup(spec), self.limits());
         let invocations = size.iter().map(|&count| u64::from(count)).product::<u64>();
@@ -96,19 +98,19 @@ impl Gpu {
     }
 }
 
-/// The error for a shader that the driver refuses; errors of memory and a lost device stay as they are.
+/// The error for a shader that the driver refuses; memory errors and a lost device are passed through.
 fn refused(gpu: &Gpu, shader: &ShaderDesc, error: Error) -> Error {
     if error.is_out_of_memory() || error.is_device_lost() {
         return error;
     }
     let device = gpu.capabilities();
     Error::NoDevice(format!(
-        "{} ({} {}) does not compile the shader {}: {error}; try another version of the driver or another device",
+        "{} ({} {}) does not compile the shader {}: {error}; try another driver version or another device",
         device.name, device.driver_name, device.driver_info, shader.name
     ))
 }
 
-/// Descriptors of a shader: in the order of its bindings, or windows, the places of buffers in them, and texel buffers.
+/// Descriptors of a shader in binding order; with shared bindings: windows, the offsets buffer, and texel buffers.
 fn slots(shader: &ShaderDesc, windows: packed::Windows<'_>) -> Vec<Slot> {
     let own = |kind| match kind {
         BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
@@ -160,7 +162,7 @@ impl Pipeline {
             gpu.capabilities.features.full_subgroups && subgroup_size.is_some_and(|size| width.is_multiple_of(size));
         let flags = gpu.pipeline_flags();
         let made = pipeline.make((gpu.pipeline_cache(), shader), module, spec, (subgroup_size, full), flags);
-        // SAFETY: finished pipelines do not need their modules.
+        // SAFETY: pipelines do not need their modules after creation.
         unsafe { gpu.raw().destroy_shader_module(module, None) };
         made.map_err(|error| refused(gpu, shader, error))?;
         gpu.name_object(pipeline.handle, shader.name);

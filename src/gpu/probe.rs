@@ -9,10 +9,10 @@ use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
 use ash::vk;
 
-/// Least memory of a device: one block of the allocator. A driver that only compiles has none at all.
+/// Smallest device memory: one block of the allocator. A compile-only driver has none.
 const MEMORY_MIN: u64 = 64 << 20;
 
-/// Least storage buffers of a shader, as Vulkan has it: the model and what stays, scratch, reports, and one to spare.
+/// Fewest storage buffers per shader (Vulkan's minimum): persistent buffers, scratch, reports, and one to spare.
 const WINDOWS_MIN: u32 = 4;
 
 impl Capabilities {
@@ -116,7 +116,7 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
     }
 }
 
-/// Picks the queue family: one with compute but without graphics, because it is least busy; else any with compute.
+/// Selects a queue family: compute without graphics, because it is least busy, else any with compute.
 fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::QueueFamilyProperties)> {
     let computes = |family: &&(u32, vk::QueueFamilyProperties)| family.1.queue_flags.contains(vk::QueueFlags::COMPUTE);
     let numbered = families.iter().enumerate().map(|(index, family)| (index as u32, *family)).collect::<Vec<_>>();
@@ -127,14 +127,14 @@ fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<(u32, vk::Qu
     numbered.iter().filter(computes).min_by_key(rank).copied()
 }
 
-/// Picks a queue family that does nothing but copy, if there is one.
+/// Selects a transfer-only queue family, if there is one.
 fn transfer_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     let only = vk::QueueFlags::TRANSFER | vk::QueueFlags::SPARSE_BINDING | vk::QueueFlags::PROTECTED;
     let copies = |flags: vk::QueueFlags| flags.contains(vk::QueueFlags::TRANSFER) && only.contains(flags);
     families.iter().position(|family| copies(family.queue_flags)).map(|index| index as u32)
 }
 
-/// Size of the device's largest heap, and the part of it that the engine may use.
+/// Returns the size of the device's largest heap, and how much of it the engine may use.
 fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bool) -> (u64, u64) {
     let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
     let mut all = vk::PhysicalDeviceMemoryProperties2::default();
@@ -149,7 +149,7 @@ fn memory(instance: &ash::Instance, physical: vk::PhysicalDevice, has_budget: bo
     let Some((index, heap)) = heaps.filter(|(_, heap)| local(heap)).max_by_key(|(_, heap)| heap.size) else {
         return (0, 0);
     };
-    // Beyond its budget, a driver may swap, slow down or lose the device, so a part stays free.
+    // Keep part of the budget free: beyond it, drivers may swap, slow down or lose the device.
     let free = if has_budget { budget.heap_budget[index].min(heap.size) } else { heap.size };
     (heap.size, free / 100 * 90)
 }
@@ -221,7 +221,7 @@ fn subgroup(
     }
 }
 
-/// Compares the requirements and optional features with the device.
+/// Checks the device against requirements and optional features.
 fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Requirement> {
     let (limits, features) = (&found.limits, &found.features);
     let (major, minor, patch) = found.api_version;
@@ -241,13 +241,13 @@ fn needs(found: &Capabilities, has_queue: bool, bindings: u32) -> Vec<Requiremen
         ),
         flag("timelineSemaphore", features.timeline, "two steps in flight"),
         least("workgroup size", 128, limits.max_invocations, "projection"),
-        least("storage buffers per shader", WINDOWS_MIN, bindings, "all buffers share them, if they are few"),
+        least("storage buffers per shader", WINDOWS_MIN, bindings, "all buffers share these bindings if there are few"),
     ];
     needs.extend(wishes(limits, &found.subgroup));
     needs
 }
 
-/// Optional features; without them, the engine runs with a drawback, which the reason says.
+/// Optional features; `reason` says what the engine loses without them.
 fn wishes(limits: &Limits, subgroup: &Subgroup) -> [Requirement; 5] {
     let wish = |what, is_met, found: String, reason| Requirement {
         is_required: false,

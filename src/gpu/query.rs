@@ -29,7 +29,7 @@ impl QueryPool {
         self.count
     }
 
-    /// Nanoseconds between successive timestamps; the command buffer must have finished.
+    /// Returns the nanoseconds between successive timestamps; the command buffer must have finished.
     pub(crate) fn intervals(&self) -> Result<Vec<u64>> {
         let mut ticks = vec![0_u64; self.count as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;

@@ -9,34 +9,41 @@ use super::statistics;
 use crate::error::{Error, Result, Setting};
 use ash::vk;
 
-/// A device with what it is capable of.
-type Found = (vk::PhysicalDevice, Capabilities);
+/// A physical device with its capabilities.
+#[derive(Clone)]
+pub(super) struct Candidate {
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) capabilities: Capabilities,
+}
 
-/// All devices, in the loader's order.
-pub(super) fn all(instance: &Instance) -> Result<Vec<Found>> {
+/// Lists all devices, in the loader's order.
+pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     // SAFETY: the instance is alive.
     let devices = vk_call("vkEnumeratePhysicalDevices", || unsafe { instance.raw().enumerate_physical_devices() })?;
-    let probe = |(index, device)| Ok((device, Capabilities::probe(instance.raw(), index, device)?));
+    let probe = |(index, physical)| {
+        let capabilities = Capabilities::probe(instance.raw(), index, physical)?;
+        Ok(Candidate { physical, capabilities })
+    };
     devices.into_iter().enumerate().map(probe).collect()
 }
 
-/// A device, and the lock on it if it came from a list.
+/// The selected device, and its lock if it came from a list.
 pub(super) struct SelectedDevice {
     pub(super) physical: vk::PhysicalDevice,
     pub(super) capabilities: Capabilities,
     pub(super) lock: Option<DeviceLock>,
 }
 
-/// Picks a device by index, UUID or part of its name, or the first free one of a list of these; by default the best that
+/// Selects a device by index, UUID or part of its name, or the first free device of a list; by default, the best that
 /// meets the requirements.
-pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<SelectedDevice> {
-    let devices = all(instance)?;
+pub(super) fn select_device(instance: &Instance, options: &GpuOptions) -> Result<SelectedDevice> {
+    let devices = candidates(instance)?;
     if devices.is_empty() {
         return Err(Error::NoDevice("the Vulkan loader found no device; install a Vulkan driver".to_owned()));
     }
     let Some(wanted) = options.device.as_deref() else { return best(usable(&devices, None, options)?) };
-    // A comma may be part of a name.
-    if !wanted.contains(',') || devices.iter().any(|(_, device)| matches(device, wanted)) {
+    // A device name may contain a comma.
+    if !wanted.contains(',') || devices.iter().any(|device| matches(&device.capabilities, wanted)) {
         return best(usable(&devices, Some(wanted), options)?);
     }
     let names = wanted.split(',').map(str::trim).filter(|name| !name.is_empty());
@@ -44,49 +51,49 @@ pub(super) fn pick(instance: &Instance, options: &GpuOptions) -> Result<Selected
     first_free(&listed, options)
 }
 
-/// Devices that meet the requirements, the best first; those that match `wanted`, if it is given.
-fn usable(devices: &[Found], wanted: Option<&str>, options: &GpuOptions) -> Result<Vec<Found>> {
-    let listing = || devices.iter().map(|(_, device)| line(device)).collect::<Vec<_>>().join("; ");
+/// Returns the devices that meet the requirements and match `wanted`, if given; the best first.
+fn usable(devices: &[Candidate], wanted: Option<&str>, options: &GpuOptions) -> Result<Vec<Candidate>> {
+    let listing = || devices.iter().map(|device| line(&device.capabilities)).collect::<Vec<_>>().join("; ");
     let mut found = devices.to_vec();
     if let Some(wanted) = wanted {
-        found.retain(|(_, device)| matches(device, wanted));
+        found.retain(|device| matches(&device.capabilities, wanted));
         if found.is_empty() {
-            return Err(Error::NoDevice(format!("none matches {wanted}; found: {}", listing())));
+            return Err(Error::NoDevice(format!("no device matches {wanted}; found: {}", listing())));
         }
     }
-    found.retain(|(_, device)| {
-        device.missing().iter().all(|need| options.statistics && need.what == MEMORY_REQUIREMENT)
+    found.retain(|device| {
+        device.capabilities.missing().iter().all(|need| options.statistics && need.what == MEMORY_REQUIREMENT)
     });
     if found.is_empty() {
-        return Err(Error::NoDevice(format!("none meets the requirements: {}", listing())));
+        return Err(Error::NoDevice(format!("no device meets the requirements: {}", listing())));
     }
-    found.sort_by_key(|(_, device)| (device.kind, device.index));
+    found.sort_by_key(|device| (device.capabilities.kind, device.capabilities.index));
     Ok(found)
 }
 
-fn best(usable: Vec<Found>) -> Result<SelectedDevice> {
+fn best(usable: Vec<Candidate>) -> Result<SelectedDevice> {
     let best = usable.into_iter().next().ok_or_else(|| Error::Bug("no device is left".to_owned()))?;
-    Ok(SelectedDevice { physical: best.0, capabilities: best.1, lock: None })
+    Ok(SelectedDevice { physical: best.physical, capabilities: best.capabilities, lock: None })
 }
 
-/// Locks the first device that no other process holds.
-fn first_free(listed: &[Found], options: &GpuOptions) -> Result<SelectedDevice> {
+/// Selects and locks the first device that no other process has locked.
+fn first_free(listed: &[Candidate], options: &GpuOptions) -> Result<SelectedDevice> {
     let Some(folder) = &options.locks else {
-        return Err(Error::usage(
-            Setting("device"),
-            "a list of devices needs a folder for the locks on them: set `locks`",
-        ));
+        return Err(Error::usage(Setting("device"), "a list of devices needs a folder for locks; set `locks`"));
     };
-    for (physical, device) in listed {
-        if let Some(lock) = lock::take(folder, device)? {
-            return Ok(SelectedDevice { physical: *physical, capabilities: device.clone(), lock: Some(lock) });
+    for Candidate { physical, capabilities } in listed {
+        if let Some(lock) = lock::take(folder, capabilities)? {
+            return Ok(SelectedDevice { physical: *physical, capabilities: capabilities.clone(), lock: Some(lock) });
         }
     }
-    let names = listed.iter().map(|(_, device)| format!("{}: {}", device.index, device.name)).collect::<Vec<_>>();
+    let names = listed
+        .iter()
+        .map(|Candidate { capabilities, .. }| format!("{}: {}", capabilities.index, capabilities.name))
+        .collect::<Vec<_>>();
     Err(Error::NoDevice(match names.is_empty() {
         true => "the list of devices is empty; name at least one".to_owned(),
         false => format!(
-            "other labelgs processes hold all that are listed ({}); wait for one of them, or list further devices",
+            "all listed devices are in use by other labelgs processes ({}); wait for one of them, or list more devices",
             names.join("; ")
         ),
     }))
@@ -94,7 +101,7 @@ fn first_free(listed: &[Found], options: &GpuOptions) -> Result<SelectedDevice> 
 
 fn matches(device: &Capabilities, wanted: &str) -> bool {
     let lower = wanted.to_lowercase();
-    // The tools of NVIDIA write GPU-8f2ea41c-...
+    // NVIDIA's tools write GPU-8f2ea41c-...
     let uuid = lower.strip_prefix("gpu-").unwrap_or(&lower).replace('-', "");
     match wanted.parse::<usize>() {
         Ok(index) if wanted.len() < 4 => device.index == index,
@@ -110,7 +117,8 @@ fn line(device: &Capabilities) -> String {
     format!("{}: {}, {lacks}", device.index, device.name)
 }
 
-/// Creates the logical device with one compute queue, one for copies if there is such a family, and the known features that the device has.
+/// Creates the logical device with a compute queue, a transfer queue if available, and all known features that the
+/// device has.
 pub(super) fn open(
     instance: &Instance,
     physical: vk::PhysicalDevice,

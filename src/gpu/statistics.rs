@@ -1,4 +1,4 @@
-//! Statistics of compiled kernels, as the driver's compiler tells them (VK_KHR_pipeline_executable_properties).
+//! Statistics of compiled kernels, as reported by the driver (VK_KHR_pipeline_executable_properties).
 
 use super::call::vk_call;
 use super::capabilities::Capabilities;
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::shaders::ShaderDesc;
 use ash::vk;
 
-/// A number about a compiled kernel, under the driver's own name for it.
+/// A statistic of a compiled kernel, under the driver's name for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistic {
     /// Name, such as `VGPRs` or `Register Count`.
@@ -22,7 +22,7 @@ pub(super) type StatisticFunctions = ash::khr::pipeline_executable_properties::D
 /// The error for a driver without the extension.
 pub(super) fn unknown(device: &Capabilities) -> Error {
     Error::NoDevice(format!(
-        "{} ({} {}) tells no statistics of compiled kernels: the driver lacks VK_KHR_pipeline_executable_properties",
+        "{} ({} {}) does not report statistics of compiled kernels: the driver lacks VK_KHR_pipeline_executable_properties",
         device.name, device.driver_name, device.driver_info
     ))
 }
@@ -36,7 +36,7 @@ impl Gpu {
         }
     }
 
-    /// Compiles a kernel for subgroups of a size, and returns what the compiler tells of it. `spec` has a word for each
+    /// Compiles a kernel for a subgroup size, and returns the compiler's statistics. `spec` has a word for each
     /// constant of the shader.
     pub fn statistics(&self, shader: &'static ShaderDesc, spec: &[u32], size: u32) -> Result<Vec<Statistic>> {
         let Some(functions) = &self.statistics else { return Err(unknown(&self.capabilities)) };

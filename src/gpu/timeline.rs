@@ -7,7 +7,7 @@ use ash::vk;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time for which a wait asks before it sleeps.
+/// Longest time that a wait polls before it sleeps.
 const POLLING_TIME_MAX: Duration = Duration::from_micros(200);
 
 /// A timeline semaphore that starts at 0.
@@ -38,8 +38,8 @@ impl Timeline {
         Ok(found >= value)
     }
 
-    /// Waits until the value is reached. Asks again and again for a while, unless the device is the processor: a thread that
-    /// sleeps wakes up 30 to 60 us late.
+    /// Waits until the value is reached. Polls for a while first, unless the device is the CPU, because a sleeping
+    /// thread wakes up 30 to 60 us late.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
         let start = Instant::now();
         while !self.gpu.is_cpu() && start.elapsed() < POLLING_TIME_MAX {

@@ -1,7 +1,8 @@
 //! Labels of Gaussians from masks.
 //!
 //! [`label_by_votes`] labels a trained model by the votes of all views, [`label_by_lift`] by the rule of the paper.
-//! [`strokes`] finds what strokes over photos hit. [`occlusion`] finds which objects hide which, and [`masks`] makes the masks of different views agree.
+//! [`strokes`] finds the Gaussians that strokes over photos hit. [`occlusion`] finds which objects hide which, and
+//! [`masks`] makes the masks of different views agree.
 
 #[cfg(feature = "network")]
 pub mod click;

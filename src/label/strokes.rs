@@ -1,4 +1,4 @@
-//! The Gaussians that strokes over photos hit.
+//! Finds the Gaussians that strokes over photos hit.
 
 use crate::edit::strokes::{Seed, Stroke, place};
 use crate::engine::{Engine, EngineSize};
@@ -11,15 +11,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Least opacity of the Gaussians that a stroke means where it hits any of these: it sees through fainter ones.
+/// Strokes ignore Gaussians below this opacity wherever they also hit more opaque ones.
 const OPACITY_MIN: f64 = 0.25;
 
-/// Returns the main Gaussians of the pixels of each stroke, in the order of the strokes. `file` is where these are
-/// from, for messages.
+/// Returns the main Gaussians of the pixels of each stroke, in the order of the strokes. `file` is their source, for
+/// messages.
 ///
 /// # Errors
 ///
-/// A stroke that leaves its photo, or that hits nothing of the model, with its number from 1.
+/// A stroke leaves its photo, or hits no Gaussian; the message has its number, from 1.
 pub fn seeds(
     gpu: Arc<Gpu>,
     model: &Gaussians,

@@ -116,7 +116,7 @@ fn a_list_of_devices_means_the_first_that_is_free() {
         let output = devices(list);
         assert_eq!(output.status.code(), Some(4), "{list}");
         let said = text(&output.stderr);
-        assert!(said.contains("other labelgs processes hold") && said.contains(&format!("0: {name}")), "{said}");
+        assert!(said.contains("in use by other labelgs processes") && said.contains(&format!("0: {name}")), "{said}");
     }
     let second = ["--device", "0,", "--iterations", "4"];
     assert_eq!(place.trained("second", &second).status.code(), Some(4));

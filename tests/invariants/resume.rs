@@ -209,8 +209,8 @@ fn a_state_that_does_not_fit_together_is_refused() {
     refusal(&|state| state.planes[means].words = 2, "of 4 are expected");
     refusal(&|state| state.gaussians += 1, "rows of 4 words");
     let other = Plane { name: "other".to_owned(), words: 1, data: vec![0; 3] };
-    refusal(&|state| state.planes.push(other.clone()), "nothing needs");
-    refusal(&|state| state.config.sh_degree = 1, "nothing needs");
+    refusal(&|state| state.planes.push(other.clone()), "is not expected");
+    refusal(&|state| state.config.sh_degree = 1, "is not expected");
     refusal(&|state| state.config.sh_degree = 9, "sh_degree");
     refusal(&|state| state.updates = 7, "7 updates");
     refusal(&|state| state.planes[labels].data[0] = 4000, "4000");

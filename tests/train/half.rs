@@ -134,7 +134,7 @@ fn a_state_has_moments_of_one_kind() {
         .expect("a state")
         .planes;
     full.config.moments = Moments::Half;
-    refused(full, "which nothing needs");
+    refused(full, "is not expected");
 }
 
 #[test]

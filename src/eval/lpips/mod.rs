@@ -1,4 +1,4 @@
-//! LPIPS v0.1 with VGG16 (Zhang et al. 2018) on the processor.
+//! LPIPS v0.1 with VGG16 (Zhang et al. 2018) on the CPU.
 //!
 //! Both pictures go through the 13 convolutions of VGG16. After each of its five stages, the features of a pixel are
 //! scaled to length 1. The squared differences of the channels are weighted, summed over channels, averaged over
@@ -12,23 +12,25 @@ use crate::eval::protocol::score::Distance;
 use convolution::{Planes, convolve, halve};
 pub use weights::Weights;
 
-/// Indices of the convolutions of each stage in torchvision's `features`. Each stage after the first starts with a
+/// Indices of the convolutions of each stage in torchvision's `features`. Each stage after the first starts with
 /// pooling.
 pub const STAGE_CONVOLUTIONS: [&[usize]; 5] = [&[0, 2], &[5, 7], &[10, 12, 14], &[17, 19, 21], &[24, 26, 28]];
 /// Number of output channels of each stage.
 pub const STAGE_CHANNELS: [usize; 5] = [64, 128, 256, 512, 512];
 /// Smallest side of a picture, px: four poolings leave one pixel.
 const SIDE_MIN: usize = 16;
-/// Mean and standard deviation of each input channel, for values from -1 to 1.
+/// Mean of each input channel, for values from -1 to 1.
 const CHANNEL_MEANS: [f32; 3] = [-0.030, -0.088, -0.188];
+/// Standard deviation of each input channel.
 const CHANNEL_DEVIATIONS: [f32; 3] = [0.458, 0.448, 0.450];
-/// Added to the length of a feature vector, against division by zero.
+/// Added to the length of a feature vector, to avoid division by zero.
 const EPSILON: f32 = 1e-10;
 
 impl Distance for Weights {
     fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Result<f64> {
         if width < SIDE_MIN || height < SIDE_MIN {
-            let problem = format!("needs pictures of {SIDE_MIN} x {SIDE_MIN} px or more, one has {width} x {height}");
+            let problem =
+                format!("needs pictures of at least {SIDE_MIN} x {SIDE_MIN} px, but one has {width} x {height}");
             return Err(Error::usage(Setting("lpips"), problem));
         }
         let (mut a, mut b) = (input(a, width, height), input(b, width, height));

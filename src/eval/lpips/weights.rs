@@ -57,7 +57,7 @@ impl Weights {
 pub fn read_tensors(path: &Path, wanted: &[(String, Vec<usize>)]) -> Result<Vec<Vec<f32>>> {
     let bytes = read::bytes(path)?;
     let file = SafeTensors::deserialize(&bytes)
-        .map_err(|error| Error::data(path, "", format!("is no readable safetensors file: {error}")))?;
+        .map_err(|error| Error::data(path, "", format!("is not a readable safetensors file: {error}")))?;
     wanted.iter().map(|(name, shape)| floats(path, &file, name, shape)).collect()
 }
 

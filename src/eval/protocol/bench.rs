@@ -13,26 +13,26 @@ use std::path::Path;
 pub struct Bench<'a> {
     /// The benchmark.
     pub protocol: Protocol,
-    /// Follows the published scorer instead of our rules; the label of a pixel is that of its main Gaussian.
+    /// Follows the published scorer instead of our rules; a pixel takes the label of its main Gaussian.
     pub compat: bool,
     /// Near plane, world units.
     pub near: f32,
     /// All views, with their photos.
     pub views: &'a [&'a View],
-    /// Test views sorted by name, for benchmarks that number them.
+    /// Held-out views sorted by name, for benchmarks that number them.
     pub test: &'a [&'a View],
     /// Names of the labels.
     pub names: Option<&'a LabelTable>,
     /// Labels of the Gaussians in the model.
     pub labels: &'a BTreeSet<u32>,
-    /// Reads the mask of a view, by its path in the layout.
+    /// Reads a view's mask, given its path in the layout.
     pub truth: &'a dyn Fn(&Path, &View) -> Result<TruthMask>,
     /// LPIPS, if weights are given.
     pub lpips: Option<&'a dyn Distance>,
 }
 
 impl Bench<'_> {
-    /// Returns an error if the scene has none of the frames of the layout, because then it is another scene.
+    /// Fails if the scene has none of the layout's frames: it is then a different scene.
     pub fn check(&self, layout: &Layout, root: &Path) -> Result<()> {
         let mut frames = layout.tasks.iter().flat_map(|task| &task.truths).map(|truth| truth.frame.as_str());
         if frames.clone().any(|frame| self.view(frame).is_some()) {
@@ -40,7 +40,7 @@ impl Bench<'_> {
         }
         let name = |view: &&View| view.name.clone();
         let problem = format!(
-            "the scene has none of the frames, such as {}; its views are {} ...; use the ground truth of this scene",
+            "the scene has none of the frames, such as {}; its views are {} ...; give the ground truth of this scene",
             frames.next().unwrap_or_default(),
             self.views.iter().take(3).map(name).collect::<Vec<_>>().join(", ")
         );

@@ -1,6 +1,6 @@
-//! Black and white masks: `OBJECT/FRAME.png`, or `FRAME.png` for a single object with the name of the folder.
+//! Black and white masks: `OBJECT/FRAME.png`, or `FRAME.png` for a single object named like the folder.
 //!
-//! As in SPIn-NeRF, the first frame is the prompt and has no score.
+//! As in SPIn-NeRF, the first frame is the prompt and is not scored.
 
 use super::{Layout, LayoutInput, TruthFile, folders, is_png, stem, tasks};
 use std::collections::BTreeMap;
@@ -21,9 +21,9 @@ pub(super) fn layout(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, Stri
         objects.entry(object).or_default().push(TruthFile { frame: stem(file), file: file.clone() });
     }
     if objects.is_empty() {
-        return Err("holds no mask; expected FRAME.png, or OBJECT/FRAME.png".into());
+        return Err("contains no masks; expected FRAME.png or OBJECT/FRAME.png".into());
     }
-    // The first frame differs between objects.
+    // Each object has its own first frame.
     let mut layout = Layout { tasks: Vec::new(), left_out };
     for (object, truths) in objects {
         let one = tasks(BTreeMap::from([(object, truths)]), Vec::new(), ask);

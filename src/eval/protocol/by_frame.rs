@@ -18,37 +18,38 @@ fn objects(files: &[PathBuf], left_out: &mut Vec<String>) -> BTreeMap<String, Ve
     objects
 }
 
-/// The evaluation of the LabelGS paper, in `segmentations`. The first frame by name is a training view and the prompt; the
-/// other frames are scored. The first frame is left out even if labels are chosen by name, because the model was trained
-/// on it.
+/// The evaluation of the LabelGS paper, in `segmentations`. The first frame by name is a training view and the prompt;
+/// the other frames are scored. The first frame is excluded even if labels are chosen by name, because the model was
+/// trained on it.
 pub(super) fn labelgs(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, String> {
     let mut left_out = Vec::new();
     let mut objects = objects(files, &mut left_out);
     let frames = objects.values().flatten().map(|truth| truth.frame.clone());
-    let Some(first) = frames.min() else { return Err("holds no mask; expected FRAME/OBJECT.png".into()) };
+    let Some(first) = frames.min() else { return Err("contains no masks; expected FRAME/OBJECT.png".into()) };
     if ask.by == SelectBy::Name {
         objects.values_mut().for_each(|truths| truths.retain(|truth| truth.frame != first));
     }
     Ok(tasks(objects, left_out, ask))
 }
 
-/// LERF-Mask, the benchmark of Gaussian Grouping, in `test_mask`. Objects are text prompts; a frame is the name of a view,
-/// or the number of a test view, from 0. The published score averages over the views of a prompt, then over prompts. Its
-/// scorer leaves out missing predictions.
+/// LERF-Mask, the benchmark of Gaussian Grouping, in `test_mask`. Objects are text prompts; a frame is the name of a
+/// view, or the number of a held-out view, from 0. The published score averages over the views of a prompt, then over
+/// prompts. Its scorer excludes missing predictions.
 pub(super) fn lerf_mask(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, String> {
     let mut left_out = Vec::new();
     let objects = objects(files, &mut left_out);
     if objects.is_empty() {
-        return Err("holds no mask; expected VIEW/PROMPT.png, as in lerf_mask/figurines/test_mask".into());
+        return Err("contains no masks; expected VIEW/PROMPT.png, as in lerf_mask/figurines/test_mask".into());
     }
     Ok(tasks(objects, left_out, ask))
 }
 
-/// 3D-OVS, in `segmentations`: `classes.txt` lists the objects. The published score is the mean IoU over classes and frames.
+/// 3D-OVS, in `segmentations`: `classes.txt` lists the objects. The published score is the mean IoU over classes and
+/// frames.
 pub(super) fn three_d_ovs(files: &[PathBuf], classes: Option<&str>, ask: LayoutInput) -> Result<Layout, String> {
     let Some(classes) = classes else {
         return Err(
-            "holds no classes.txt; expected classes.txt and FRAME/CLASS.png, as in 3D-OVS/sofa/segmentations".into()
+            "contains no classes.txt; expected classes.txt and FRAME/CLASS.png, as in 3D-OVS/sofa/segmentations".into(),
         );
     };
     let classes: Vec<&str> = classes.split(['\n', ',']).map(str::trim).filter(|class| !class.is_empty()).collect();
@@ -65,7 +66,7 @@ pub(super) fn three_d_ovs(files: &[PathBuf], classes: Option<&str>, ask: LayoutI
         known
     });
     if objects.is_empty() {
-        return Err(format!("holds no mask of a class; classes.txt names {}", classes.join(", ")));
+        return Err(format!("contains no mask of a class in classes.txt ({})", classes.join(", ")));
     }
     Ok(tasks(objects, left_out, ask))
 }

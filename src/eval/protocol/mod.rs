@@ -1,8 +1,8 @@
 //! Published benchmarks of object masks.
 //!
-//! [`Protocol::layout`] sorts the mask files of a benchmark into a [`Layout`]: objects, the frames with scores, and how
-//! to choose the labels of each object. `run` chooses and scores, `report` averages. An object without labels and a
-//! frame without a prediction count as 0 and are listed.
+//! [`Protocol::layout`] sorts a benchmark's mask files into a [`Layout`]: objects, scored frames, and how to choose
+//! each object's labels. `run` chooses labels and scores, `report` averages. An object without labels and a frame
+//! without a prediction count as 0 and are listed.
 
 pub(crate) mod bench;
 mod binary;
@@ -38,7 +38,7 @@ pub enum Protocol {
     Binary,
 }
 
-/// The way to choose the labels of an object.
+/// How to choose the labels of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SelectBy {
@@ -62,13 +62,13 @@ pub struct TruthFile {
 pub enum Prompt {
     /// A mask in one frame.
     Mask(TruthFile),
-    /// Strokes on the object and beside it, in one frame.
+    /// Strokes on and off the object, in one frame.
     Scribbles {
         /// Name of the frame, without extension.
         frame: String,
         /// Strokes on the object.
         on: Vec<PathBuf>,
-        /// Strokes elsewhere.
+        /// Strokes off the object.
         off: Vec<PathBuf>,
     },
     /// The name of the object.
@@ -91,18 +91,18 @@ pub struct Task {
 pub struct Layout {
     /// Objects, sorted by name.
     pub tasks: Vec<Task>,
-    /// Masks that the rules leave out, with reasons.
+    /// Masks that the rules exclude, with reasons.
     pub left_out: Vec<String>,
 }
 
-/// The inputs of a layout besides the files.
+/// Inputs of a layout besides the mask files.
 #[derive(Clone, Copy, Debug)]
 pub struct LayoutInput<'a> {
     /// Folder of the ground truth, from [`Protocol::root`].
     pub truth: &'a Path,
     /// Name of the scene's folder.
     pub scene: &'a str,
-    /// The way to choose labels.
+    /// How to choose labels.
     pub by: SelectBy,
 }
 
@@ -118,7 +118,7 @@ impl Protocol {
         }
     }
 
-    /// Returns the folder of the masks: `folder`, or the subfolder of the data set.
+    /// Returns the mask folder: `folder`, or the data set's subfolder.
     pub fn root(self, folder: &Path) -> PathBuf {
         let inside = match self {
             Self::Labelgs | Self::ThreeDOvs => "segmentations",
@@ -129,7 +129,7 @@ impl Protocol {
         Some(folder.join(inside)).filter(|folder| folder.is_dir()).unwrap_or_else(|| folder.to_owned())
     }
 
-    /// Returns the way in which this benchmark chooses labels.
+    /// Returns how this benchmark chooses labels.
     pub fn chooses_by(self) -> SelectBy {
         match self {
             Self::Labelgs | Self::Nvos | Self::Binary => SelectBy::Prompt,
@@ -142,7 +142,7 @@ impl Protocol {
         matches!(self, Self::Labelgs | Self::LerfMask)
     }
 
-    /// Returns true if folders of masks may have numbers of test views instead of names.
+    /// Returns true if mask folders may be named by the number of a held-out view.
     pub fn numbers_views(self) -> bool {
         self == Self::LerfMask
     }
@@ -160,7 +160,7 @@ impl Protocol {
         let layout = layout.map_err(|problem| Error::data(ask.truth, "", problem))?;
         if layout.tasks.iter().all(|task| task.truths.is_empty()) {
             let problem =
-                "has no mask to score: the first frame is the prompt, and no other frame shows the same object";
+                "has no masks to score: the first frame is the prompt, and no other frame shows the same object";
             return Err(Error::data(ask.truth, "", problem));
         }
         Ok(layout)
@@ -171,19 +171,19 @@ fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Returns true for PNG files. JPEG is no mask format, because its compression moves edges.
+/// Returns true for PNG files. JPEG is not accepted, because its compression shifts mask edges.
 fn is_png(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
 }
 
-/// Returns the names of the folders of a file, outermost first.
+/// Returns the folder names of a path, outermost first.
 fn folders(path: &Path) -> Vec<String> {
     let parent = path.parent().unwrap_or(Path::new(""));
     parent.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect()
 }
 
-/// Makes one task per object: by name in all frames, or by the mask in the first frame in all others. An object that is
-/// not in the first frame then has no prompt and is left out.
+/// Makes one task per object: by name in all frames, or by the mask of the first frame in all other frames. Without a
+/// mask in the first frame, an object has no prompt and is excluded.
 fn tasks(objects: BTreeMap<String, Vec<TruthFile>>, left_out: Vec<String>, ask: LayoutInput) -> Layout {
     let first = objects.values().flatten().map(|truth| truth.frame.clone()).min().unwrap_or_default();
     let mut layout = Layout::default();
@@ -198,7 +198,7 @@ fn tasks(objects: BTreeMap<String, Vec<TruthFile>>, left_out: Vec<String>, ask: 
                 let prompt = truths.remove(at);
                 layout.tasks.push(Task { object, prompt: Prompt::Mask(prompt), truths });
             }
-            None => layout.left_out.push(format!("{object} is not in the prompt's frame {first}")),
+            None => layout.left_out.push(format!("{object} is not in the prompt frame {first}")),
         }
     }
     layout.left_out.extend(left_out);

@@ -31,7 +31,7 @@ pub(super) fn layout(files: &[PathBuf], ask: LayoutInput) -> Result<Layout, Stri
     if wanted.is_empty() {
         let there: Vec<&str> = scenes.iter().map(String::as_str).collect();
         return Err(format!(
-            "holds no masks/{}/FRAME_mask.png; the folder of the scene must be called as its masks are{}{}",
+            "holds no masks/{}/FRAME_mask.png; name the scene folder like its masks{}{}",
             ask.scene,
             if there.is_empty() { "" } else { ": " },
             there.join(", ")
@@ -63,10 +63,11 @@ fn prompt(scene: &str, references: &[PathBuf], scribbles: &[PathBuf]) -> Result<
     let starting = |word: &str| scribbles.iter().filter(|file| stem(file).starts_with(word)).cloned().collect();
     let (on, off): (Vec<PathBuf>, Vec<PathBuf>) = (starting("pos"), starting("neg"));
     match references.first() {
-        None => Err(format!("reference_image/{scene} holds no photo; it names the view of the strokes")),
-        Some(_) if on.is_empty() => {
-            Err(format!("scribbles/{scene} holds no pos_*.png; {} chooses without strokes", Setting("by").to("name")))
-        }
+        None => Err(format!("reference_image/{scene} contains no photo, so the view of the strokes is unknown")),
+        Some(_) if on.is_empty() => Err(format!(
+            "scribbles/{scene} contains no pos_*.png; add strokes, or set {} to choose without them",
+            Setting("by").to("name")
+        )),
         Some(photo) => Ok(Prompt::Scribbles { frame: stem(photo), on, off }),
     }
 }

@@ -1,4 +1,4 @@
-//! The result of a benchmark, for programs and as JSON.
+//! Benchmark results, for programs and as JSON.
 
 use super::Protocol;
 use super::score::PairScores;
@@ -43,7 +43,7 @@ pub struct Means {
     pub object_count: u64,
 }
 
-/// The number in the benchmark's tables.
+/// The score that the benchmark's tables report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Headline {
     /// Kind of IoU: `iou` or `iou_colour`.
@@ -63,13 +63,13 @@ pub struct Report {
     pub schema_version: u32,
     /// Name of the benchmark.
     pub protocol: &'static str,
-    /// True if the rules are those of the published scorer.
+    /// True for the rules of the published scorer.
     pub compat: bool,
     /// The rules in words.
     pub rules: Vec<&'static str>,
     /// `VGG16, v0.1`, or `no weights`.
     pub lpips: &'static str,
-    /// The number in the benchmark's tables.
+    /// The score that the benchmark's tables report.
     pub headline: Headline,
     /// Averages.
     pub mean: Means,
@@ -79,9 +79,9 @@ pub struct Report {
     pub views: BTreeMap<String, BTreeMap<String, PairScores>>,
     /// Missing predictions.
     pub missing: Vec<MissingPrediction>,
-    /// Prompts that select nothing.
+    /// Prompts that selected nothing.
     pub empty: Vec<MissingPrediction>,
-    /// Ground-truth masks that the rules leave out, with reasons.
+    /// Ground-truth masks that the rules exclude, with reasons.
     pub left_out: Vec<String>,
 }
 
@@ -100,7 +100,7 @@ const LABELGS_COMPAT_RULES: [&str; 5] = [
 ];
 const LERF_MASK_COMPAT_RULES: [&str; 4] = [
     "prompts choose by the label of the Gaussian with the largest weight in a pixel",
-    "a missing prediction and an empty selection are left out of the averages",
+    "missing predictions and empty selections are excluded from the averages",
     "psnr: mean of the PSNR of each channel over the whole frame, not clamped",
     "ssim: 8-bit pictures, uniform 7x7 window, sample covariance, over the whole frame",
 ];

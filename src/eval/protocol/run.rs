@@ -28,7 +28,7 @@ pub fn run(
 ) -> Result<Report> {
     let mut report = Report::new(bench.protocol, bench.compat, bench.lpips.is_some());
     report.left_out.clone_from(&layout.left_out);
-    // Choose all labels first: prompts need the whole model.
+    // Choose all labels first, because prompts need the whole model.
     subject.show(None)?;
     let choices: Vec<Choice> = layout.tasks.iter().map(|task| choose(task, bench, subject)).collect::<Result<_>>()?;
     for (task, choice) in layout.tasks.iter().zip(choices) {
@@ -70,7 +70,7 @@ pub fn run(
     Ok(report)
 }
 
-/// Adds a missing prediction. It counts as 0; the scorer of Gaussian Grouping leaves it out.
+/// Adds a missing prediction. It counts as 0; Gaussian Grouping's scorer excludes it.
 fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &TruthFile) {
     if bench.compat && bench.protocol == Protocol::LerfMask {
         report.left_out.push(format!("{} in {} has no prediction and is not counted", task.object, truth.frame));
@@ -79,7 +79,7 @@ fn add_absent(report: &mut Report, bench: &Bench, task: &Task, truth: &TruthFile
     }
 }
 
-/// Scores what is shown in a frame, or nothing for a reason.
+/// Scores the current selection in a frame, or a missing prediction with its reason.
 fn score_one(
     task: &Task,
     truth: &TruthFile,

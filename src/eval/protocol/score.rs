@@ -43,7 +43,7 @@ impl PairScores {
     }
 }
 
-/// Scores a picture against a mask and a photo of the same size. Invalid pixels of the photo do not count. `compat`
+/// Scores a picture against a mask and a photo of the same size. Invalid photo pixels do not count. `compat`
 /// uses the PSNR and SSIM of the paper's scorer: every pixel, PSNR of the unclamped picture as the mean over channels,
 /// SSIM of 8-bit pictures with a uniform window.
 pub(crate) fn score(

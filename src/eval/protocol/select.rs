@@ -19,7 +19,7 @@ pub(super) enum Choice {
     Missing(String),
 }
 
-/// Least share of the strokes on an object for a label, against strokes that slip onto a neighbour.
+/// Smallest share of the object's strokes that a label must have, so that strokes may slip onto a neighbour.
 const STROKE_SHARE_MIN: f64 = 0.05;
 
 pub(super) fn choose(task: &Task, bench: &Bench, subject: &mut dyn Subject) -> Result<Choice> {
@@ -43,10 +43,10 @@ pub(super) fn choose(task: &Task, bench: &Bench, subject: &mut dyn Subject) -> R
 }
 
 fn no_view(frame: &str) -> Choice {
-    Choice::Missing(format!("the scene has no view {frame}, which holds the prompt"))
+    Choice::Missing(format!("the scene has no view {frame}, the view of the prompt"))
 }
 
-/// Chooses by a name in the table, or an id.
+/// Chooses by name in the label table, or by id.
 fn select_by_name(object: &str, bench: &Bench) -> Choice {
     let named = bench.names.and_then(|names| names.by_name(object));
     let Some(id) = named.or_else(|| object.parse().ok()) else {
@@ -70,8 +70,8 @@ fn why_empty(map: &LabelMap, mask: &TruthMask) -> String {
     }
 }
 
-/// Chooses labels with more pixels under the strokes on the object than under the other strokes, and a least share of
-/// the strokes.
+/// Chooses labels with more pixels under the object's strokes than under other strokes, and a minimum share of the
+/// former.
 fn under_strokes(
     on: &[TruthMask],
     off: &[TruthMask],
@@ -90,7 +90,7 @@ fn under_strokes(
     let enough = |&(yes, no): &(u64, u64)| yes > no && yes as f64 >= STROKE_SHARE_MIN * all as f64;
     let labels: Vec<u32> = counts.iter().filter(|(_, count)| enough(count)).map(|(&label, _)| label).collect();
     Ok(if labels.is_empty() {
-        Choice::Empty("no label has more pixels under the strokes on the object than under the others".into())
+        Choice::Empty("no label has more pixels under the object's strokes than under the other strokes".into())
     } else {
         Choice::Labels(labels)
     })

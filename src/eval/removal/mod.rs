@@ -1,4 +1,4 @@
-//! Scores of removals: what a model shows where an object was, against photos of the scene without it.
+//! Scores removals: what a model shows in place of a removed object, compared with photos without that object.
 
 mod score;
 
@@ -17,14 +17,14 @@ use std::collections::BTreeMap;
 
 /// Photos of the scene without an object.
 pub trait RemovalTruth {
-    /// Returns the photo of a view without object `id`, at the size of the view; `None` if there is none.
+    /// Returns the photo of a view without object `id`, at the view's size; `None` if there is none.
     fn without(&self, id: u32, view: &View) -> Result<Option<Photo>>;
 
-    /// Returns the same photo with the shadow of the object.
+    /// Returns the same photo with the object's shadow.
     fn shadowed(&self, id: u32, view: &View) -> Result<Option<Photo>>;
 }
 
-/// Renders what training views show of the model in the engine, for [`fill`].
+/// Renders the engine's model in the training views, for [`fill`].
 pub fn sights(engine: &mut Engine, views: &[&View], near: f32) -> Result<Vec<Sight>> {
     let sight = |view: &&View| {
         let (width, height) = (view.camera.width, view.camera.height);
@@ -44,9 +44,9 @@ pub(crate) fn picture_count(views: &[&View]) -> u64 {
     2 * views.iter().filter_map(|view| view.mask.as_ref()).map(|mask| mask.objects().len() as u64).sum::<u64>()
 }
 
-/// Removes each object of the masks from `model` and scores what is left in `views`: by the labels of the model, the same
-/// filled, and by labels of the paper's rule. `train` are the training views with masks, for the last two. `engine` has
-/// memory for votes ([`vote_engine`](crate::label::vote::model::vote_engine)); its model is replaced.
+/// Removes each object of the masks from `model` and scores the result in `views`: by the model's labels, by the same
+/// with filling, and by labels of the paper's rule. `train` are the training views with masks, for the last two.
+/// `engine` has memory for votes ([`vote_engine`](crate::label::vote::model::vote_engine)); its model is replaced.
 pub fn removals(
     engine: &mut Engine,
     model: &Gaussians,
@@ -106,7 +106,7 @@ pub fn removals(
         let scores = ObjectRemoval {
             votes: plain.scores(votes_left(&own)),
             main: main.scores(votes_left(labels)),
-            // Its places in the light would count as left over.
+            // Filled areas would count as leftovers.
             filled: RuleScores { leftover: None, ..filled.scores(None) },
             mean_colour: plain.mean_colour(),
             holes: holes.scores(),
@@ -119,7 +119,7 @@ pub fn removals(
     Ok(RemovalScores::new(objects))
 }
 
-/// Returns the share of the votes for a label that Gaussians of other labels have.
+/// Returns the share of a label's votes that went to Gaussians with other labels.
 fn weight_left(ballot: &Ballot, id: u32, labels: &[u32]) -> Option<f64> {
     let sum = |rows: &dyn Fn(&usize) -> bool| -> f64 {
         (0..ballot.len()).filter(rows).map(|row| ballot.weight_on(row, id)).sum()
@@ -128,7 +128,7 @@ fn weight_left(ballot: &Ballot, id: u32, labels: &[u32]) -> Option<f64> {
     (all > 0.0).then(|| sum(&|&row| labels[row] != id) / all)
 }
 
-/// Compares the new Gaussians of a filled model with the colours around, where there is nothing without them.
+/// Scores the holes of a removal: the filled model, and the mean surrounding colour.
 fn holes(engine: &mut Engine, closed: &Filled, places: &[RemovalSite], options: RenderOptions) -> Result<HoleSums> {
     let old = closed.model.len() as u64 - closed.added.values().sum::<u64>();
     let bare = closed.model.filtered(|row| (row as u64) < old);
@@ -141,7 +141,7 @@ fn holes(engine: &mut Engine, closed: &Filled, places: &[RemovalSite], options: 
     Ok(holes)
 }
 
-/// Name of the picture by the rule of the paper.
+/// Name of the picture by the paper's rule.
 const MAIN_RULE_PICTURE: &str = "removed by main Gaussians";
 
 /// Renders a part of the model, which may be empty.

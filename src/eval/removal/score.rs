@@ -1,4 +1,4 @@
-//! The scores themselves.
+//! Computes the removal scores.
 
 use super::RemovalTruth;
 use crate::error::Result;
@@ -9,62 +9,63 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Width of the band around the mask that counts as the object's place, px: its pixels are partly the object's.
+/// Width of the band around the mask that belongs to the removal site, px, because its pixels are partly the object's.
 const BAND_WIDTH_PX: u32 = 2;
-/// Width of the ring around that place, px, whose mean colour is the simplest way to close a hole.
+/// Width of the ring around the site, px. Its mean colour is the simplest hole filling, for comparison.
 const RING_WIDTH_PX: u32 = 4;
 /// Opacity below which a pixel is a hole.
 const HOLE_OPACITY_MAX: f32 = 0.5;
-/// Distance of two colours (r, g, b, 0 to 1) from which photo and truth differ enough to tell whose colour is shown.
+/// Smallest colour distance (r, g, b, 0 to 1) between the photos with and without the object for a pixel to be
+/// compared.
 const COLOUR_DISTANCE_MIN: f64 = 0.1;
 
 scores! {
-    /// What one way of removing an object leaves; `None` where there is nothing to compare with.
+    /// Scores of one removal method; `None` if there is nothing to compare with.
     RuleScores {
         /// PSNR against the photos without the object, over its pixels and 2 px around them in all views together, dB.
         psnr,
-        /// The same against photos in which its shadow stays: no photo shows the colours outside of that shadow.
+        /// The same against photos that keep its shadow, because training photos never show the area without it.
         psnr_shadowed,
-        /// Of the object's pixels where photos with and without it differ and the model shows anything, the share whose colour
-        /// is nearer to the photo with it. Its shadow stays in both, if such photos are given.
+        /// Share of the object's pixels that still look more like the photo with the object. Counts pixels that differ
+        /// between both photos and are not holes. Both photos keep the shadow, if given.
         leftover,
-        /// Of the blending weight in the object's pixels before the removal, the share of Gaussians that stay. It needs no photo
-        /// without the object.
+        /// Share of the blending weight in the object's pixels that belongs to Gaussians that were not removed. Needs
+        /// no photo without the object.
         leftover_weight,
     }
 }
 
 scores! {
-    /// What closes the pixels that no photo shows: those where neither another object nor a Gaussian that was seen is left.
+    /// Scores of filled holes: pixels where nothing remains after the removal.
     HoleScores {
-        /// Share of the object's place.
+        /// Share of the removal site.
         share,
-        /// PSNR of the filled model there against the photos without the object, dB.
+        /// PSNR of the filled model in the holes against the photos without the object, dB.
         filled,
-        /// The same against photos in which its shadow stays.
+        /// The same against photos that keep its shadow.
         filled_shadowed,
-        /// PSNR of the mean colour of a ring around the object in the picture.
+        /// PSNR of filling with the mean colour of a ring around the object.
         mean_colour,
-        /// The same against photos in which its shadow stays.
+        /// The same against photos that keep its shadow.
         mean_colour_shadowed,
     }
 }
 
-/// What removals of an object leave.
+/// Removal scores of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectRemoval {
     /// By the labels of the model.
     pub votes: RuleScores,
-    /// By labels of the paper's rule for the same Gaussians: each has the label of the last view in which it is the main
-    /// Gaussian of a pixel.
+    /// By the paper's label rule: each Gaussian takes the label of the last view in which it is a pixel's main
+    /// Gaussian.
     pub main: RuleScores,
-    /// By the labels of the model, and filled, without [`leftover`](RuleScores::leftover).
+    /// By the labels of the model, with filling, without [`leftover`](RuleScores::leftover).
     pub filled: RuleScores,
-    /// By the labels of the model, with holes painted in the mean colour of a ring around the object in the picture.
+    /// By the labels of the model, with holes painted in the mean colour of a ring around the object.
     pub mean_colour: RuleScores,
-    /// Of the filled model, where without its new Gaussians there is a hole.
+    /// Scores of the filled model in the holes.
     pub holes: HoleScores,
-    /// Share of the object's place that is a hole (opacity below one half) after the removal by the labels of the model.
+    /// Share of the removal site that is a hole (opacity below one half) after removal by the model's labels.
     pub hole: Option<f64>,
     /// The same after filling.
     pub hole_filled: Option<f64>,
@@ -77,7 +78,7 @@ pub struct ObjectRemoval {
 pub struct RemovalScores {
     /// Means over the objects.
     pub mean: ObjectRemoval,
-    /// Each object over all views, by id.
+    /// Scores of each object over all views, by id.
     pub objects: BTreeMap<u32, ObjectRemoval>,
 }
 
@@ -99,24 +100,24 @@ impl RemovalScores {
     }
 }
 
-/// Where a view shows an object, with the photos to compare a removal with.
+/// The site of a removed object in a view, with the photos to compare it with.
 pub(super) struct RemovalSite<'a> {
     pub(super) view: &'a View,
     photo: Arc<Photo>,
-    /// The photo without the object, and the same with its shadow, if there are such.
+    /// The photo without the object, and the same with its shadow, if available.
     pub(super) truths: [Option<Photo>; 2],
-    /// Its pixels in the mask.
+    /// The object's pixels in the mask.
     inside: Vec<usize>,
-    /// These and those within `BAND_WIDTH_PX` of them.
+    /// These pixels and all within `BAND_WIDTH_PX` of them.
     around: Vec<usize>,
-    /// Those within `RING_WIDTH_PX` of these.
+    /// Pixels within `RING_WIDTH_PX` of that area.
     ring: Vec<usize>,
 }
 
 impl<'a> RemovalSite<'a> {
     /// Finds the valid pixels of object `id`; `None` without any.
     pub(super) fn new(id: u16, view: &'a View, truth: &dyn RemovalTruth) -> Result<Option<Self>> {
-        // Masks are asked for their pixels only where they show the object.
+        // Read the photos only if the mask shows the object.
         let (Some(mask), Some(photo)) = (&view.mask, &view.photo) else { return Ok(None) };
         if !mask.objects().contains(&id) {
             return Ok(None);
@@ -151,7 +152,7 @@ impl<'a> RemovalSite<'a> {
     }
 }
 
-/// Sums of squared errors, and their numbers, against both truths.
+/// Sums of squared errors against both photos, with pixel counts.
 #[derive(Clone, Copy, Debug, Default)]
 struct SquaredErrors([(f64, u64); 2]);
 
@@ -170,7 +171,7 @@ impl SquaredErrors {
     }
 }
 
-/// Returns a share; `None` of nothing.
+/// Returns `part / all`; `None` if `all` is 0.
 fn share(part: u64, all: u64) -> Option<f64> {
     (all > 0).then(|| part as f64 / all as f64)
 }
@@ -180,7 +181,7 @@ fn share(part: u64, all: u64) -> Option<f64> {
 pub(super) struct RemovalSums {
     pixels: u64,
     holes: u64,
-    /// As rendered, and with holes painted in the mean colour around the object.
+    /// Errors as rendered, and with holes painted in the surrounding mean colour.
     rendered: SquaredErrors,
     painted: SquaredErrors,
     different: u64,
@@ -188,7 +189,7 @@ pub(super) struct RemovalSums {
 }
 
 impl RemovalSums {
-    /// Adds a picture of what is left.
+    /// Adds a picture after the removal.
     pub(super) fn add(&mut self, place: &RemovalSite, rendered: &Render) {
         self.pixels += place.around.len() as u64;
         let colour = place.mean_colour(rendered);
@@ -199,7 +200,7 @@ impl RemovalSums {
             self.rendered.add(shown, place, index);
             self.painted.add(if is_hole { colour } else { shown }, place, index);
         }
-        // A shadow that stays is nothing of the object.
+        // A remaining shadow does not count as a leftover.
         let [without, shadowed] = &place.truths;
         let Some(truth) = shadowed.as_ref().or(without.as_ref()) else { return };
         for &index in place.inside.iter().filter(|&&index| !is_hole(rendered, index)) {
@@ -217,7 +218,7 @@ impl RemovalSums {
         RuleScores { psnr, psnr_shadowed, leftover: share(self.leftover, self.different), leftover_weight }
     }
 
-    /// Returns the PSNRs with holes painted.
+    /// Returns the PSNRs with painted holes.
     pub(super) fn mean_colour(&self) -> RuleScores {
         let [psnr, psnr_shadowed] = self.painted.psnr();
         RuleScores { psnr, psnr_shadowed, ..RuleScores::default() }
@@ -238,7 +239,7 @@ pub(super) struct HoleSums {
 }
 
 impl HoleSums {
-    /// Adds a picture of the filled model, and of that without its new Gaussians.
+    /// Adds a picture of the filled model, and one without its new Gaussians.
     pub(super) fn add(&mut self, place: &RemovalSite, bare: &Render, filled: &Render) {
         let colour = place.mean_colour(bare);
         self.pixels += place.around.len() as u64;

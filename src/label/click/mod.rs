@@ -1,4 +1,5 @@
-//! An object from places in photos: what a network sees there, found again in the other views through the model.
+//! Finds an object from clicks or a box in photos. A segmentation network makes a mask there, and the model carries the
+//! object into other views.
 
 mod photos;
 mod question;
@@ -23,9 +24,9 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Difference of depths, as a share, up to which a view sees the point and not something in front of it.
+/// Largest relative depth difference at which a view sees a point rather than something in front of it.
 const DEPTH_SHARE_MAX: f64 = 0.04;
-/// The object, in masks and labels of this work.
+/// Id of the object in temporary masks and labels.
 const OBJECT_ID: u16 = 1;
 
 /// A click in a photo.
@@ -35,7 +36,7 @@ pub struct Click {
     pub view: usize,
     /// Column and row, px of [`Photos::size`].
     pub pixel: [u32; 2],
-    /// On the object, or on what does not belong to it.
+    /// True on the object, false on something that does not belong to it.
     pub is_on: bool,
 }
 
@@ -48,7 +49,7 @@ pub struct Area {
     pub corners: [u32; 4],
 }
 
-/// What says which object is meant: a click on it at least, or a box.
+/// The user's hints for an object: at least one click on it, or a box.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Hints {
     /// Clicks.
@@ -58,7 +59,7 @@ pub struct Hints {
 }
 
 impl Hints {
-    /// Returns the flags of `labelgs label` that say the same, and what follows them.
+    /// Returns the equivalent flags of `labelgs label`, with their values.
     pub fn flags(&self, photos: &Photos) -> Vec<(&'static str, String)> {
         let click = |Click { view, pixel: [x, y], is_on }: &Click| {
             (if *is_on { "click" } else { "not" }, format!("{}:{x},{y}", photos.name(*view)))
@@ -69,65 +70,65 @@ impl Hints {
         self.area.iter().map(area).chain(self.clicks.iter().map(click)).collect()
     }
 
-    /// Returns the view of the box, else of the first click on the object.
+    /// Returns the view of the box, or else of the first click on the object.
     fn first(&self) -> Result<usize> {
         let click = self.clicks.iter().find(|click| click.is_on).map(|click| click.view);
         self.area.map(|area| area.view).or(click).ok_or_else(|| {
-            Error::usage(Setting("click"), "no click is on the object; one at least must be, or a box around it")
+            Error::usage(Setting("click"), "no click is on the object; give at least one, or a box around the object")
         })
     }
 }
 
-/// How far the work is.
+/// Progress of a search.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress<'a> {
-    /// The network was asked.
+    /// Queries of the network.
     Asked {
-        /// Photos that have answered in this round.
+        /// Photos done in this round.
         done: usize,
-        /// Photos of the round.
+        /// All photos of this round.
         all: usize,
-        /// Time that photos take that the network has not seen before, as far as it is known.
+        /// Estimated time for photos that the network has not seen before, if known.
         left: Option<Duration>,
     },
-    /// A first answer: which Gaussians belong to the object.
+    /// A first result: which Gaussians belong to the object.
     First(&'a [bool]),
 }
 
-/// Who hears of the progress. An error ends the work.
+/// Receives progress. An error cancels the search.
 pub type ProgressObserver<'a> = &'a mut dyn FnMut(Progress) -> Result<()>;
 
-/// Finds objects in a model. What was worked out of a view is kept for the next question.
+/// Finds objects in a model. Results per view are cached for later searches.
 pub struct ObjectFinder<'a> {
     engine: Engine,
     means: Vec<[f32; 3]>,
     photos: &'a Photos,
     near: f32,
     known: Vec<ViewCache>,
-    /// Views whose photos the network has to look at first, and the time and number of those that it has looked at.
+    /// Views whose photos the network has not encoded yet; then time and number of the encoded ones.
     unseen: BTreeSet<usize>,
     looked: (Duration, u32),
     answers: Vec<(Question, Vec<bool>)>,
 }
 
-/// Adds Gaussians to an object, or takes them away.
+/// Adds Gaussians to an object, or removes them.
 fn joined(object: Option<&[bool]>, rows: &[bool], is_on: bool) -> Vec<bool> {
     let Some(object) = object else { return rows.to_vec() };
     object.iter().zip(rows).map(|(&old, &new)| if is_on { old || new } else { old && !new }).collect()
 }
 
 fn nothing(by_box: bool) -> Error {
-    let problem = "the network found nothing there that the model shows; try another view";
+    let problem = "the network found no object there that the model shows; try another view";
     Error::usage(Setting(if by_box { "box" } else { "click" }), problem)
 }
 
-/// Returns the index of the pixel at a place; places outside count as at the border.
+/// Returns the index of the pixel at a position; positions outside are clamped to the border.
 fn pixel_of([x, y]: Place, view: &View) -> usize {
     let along = |at: f32, size: u32| (at.max(0.0) as u32).min(size - 1);
     (along(y, view.camera.height) * view.camera.width + along(x, view.camera.width)) as usize
 }
 
-/// What was worked out of a view.
+/// Cached renders of a view.
 #[derive(Default)]
 struct ViewCache {
     shown: Option<Render>,
@@ -135,7 +136,7 @@ struct ViewCache {
 }
 
 impl<'a> ObjectFinder<'a> {
-    /// Puts a model on the device.
+    /// Uploads a model to the device.
     pub fn new(gpu: Arc<Gpu>, model: &Gaussians, photos: &'a Photos, near: f32) -> Result<Self> {
         let engine = vote_engine(gpu, model, &photos.views.iter().collect::<Vec<_>>(), 2)?;
         let known = photos.views.iter().map(|_| ViewCache::default()).collect();
@@ -143,13 +144,13 @@ impl<'a> ObjectFinder<'a> {
         Ok(Self { engine, means: model.means.clone(), photos, near, known, unseen, looked, answers: Vec::new() })
     }
 
-    /// Forgets what takes most memory, before another object.
+    /// Drops the largest cached data, before another object.
     pub fn forget(&mut self) {
         self.known.iter_mut().for_each(|known| known.prepared = None);
         self.answers.clear();
     }
 
-    /// Returns the view that looks at points most as from `eye` and sees most of them, and where it sees them.
+    /// Returns the view that sees most of the points from a direction similar to `eye`, and their positions in it.
     pub fn nearest(&mut self, points: &[DVec3], eye: DVec3) -> Result<Option<(usize, Vec<[u32; 2]>)>> {
         let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
         for view in self.views_by_direction(eye, middle) {
@@ -164,9 +165,9 @@ impl<'a> ObjectFinder<'a> {
         Ok(None)
     }
 
-    /// Returns which Gaussians belong to the object: what the box means, or the first click on it, and what other clicks on it add
-    /// or clicks beside it take away, where they are not answered so already. Clicks on it come first, in whatever order the two
-    /// kinds were made.
+    /// Returns which Gaussians belong to the object. Starts with the box or the first click on the object. Each further
+    /// click on the object adds Gaussians, and each click off it removes some, unless the current result already
+    /// agrees. Clicks on the object come first, whatever their original order.
     pub fn object(&mut self, hints: &Hints, observe: ProgressObserver) -> Result<Vec<bool>> {
         hints.first()?;
         let mut spots = Vec::new();
@@ -192,7 +193,7 @@ impl<'a> ObjectFinder<'a> {
         object.filter(|object| object.contains(&true)).ok_or_else(|| nothing(hints.area.is_some()))
     }
 
-    /// Returns what of the model is at a click.
+    /// Returns the model surface at a click.
     fn spot(&mut self, Click { view, pixel, is_on }: Click) -> Result<Spot> {
         let place = self.photos.drawn(view, pixel.map(|at| at as f32 + 0.5));
         let point = self.surface(view, place)?;
@@ -209,14 +210,14 @@ impl<'a> ObjectFinder<'a> {
         }
     }
 
-    /// Returns the point of the surface at a place of a view, if there is one.
+    /// Returns the surface point at a position in a view, if there is one.
     fn surface(&mut self, view: usize, [x, y]: Place) -> Result<Option<DVec3>> {
         let place = DVec2::new(f64::from(x), f64::from(y));
         let depth = self.depth(view, place)?;
         Ok(depth.map(|depth| self.photos.views[view].camera.unproject(place, depth)))
     }
 
-    /// Returns the depth of the surface at a place of a view, if there is one.
+    /// Returns the surface depth at a position in a view, if there is one.
     fn depth(&mut self, view: usize, place: DVec2) -> Result<Option<f64>> {
         let camera = &self.photos.views[view].camera;
         if self.known[view].shown.is_none() {
@@ -231,7 +232,7 @@ impl<'a> ObjectFinder<'a> {
         Ok(shown.and_then(|shown| shown.depth_at(at)).map(f64::from))
     }
 
-    /// Returns where a view sees a point, if nothing hides it.
+    /// Returns the position at which a view sees a point, if nothing hides it.
     fn place_of(&mut self, view: usize, point: DVec3) -> Result<Option<Place>> {
         let camera = &self.photos.views[view].camera;
         let z = camera.to_camera(point).z;
@@ -250,13 +251,13 @@ impl<'a> ObjectFinder<'a> {
         order
     }
 
-    /// Asks views, several at a time.
+    /// Queries the network for views, several at a time.
     fn ask_all(&mut self, prompts: &[(usize, Prompt)], observe: ProgressObserver) -> Result<Vec<Masks>> {
         let mut answers = Vec::new();
         for some in prompts.chunks(rayon::current_num_threads()) {
             for &(view, _) in some {
                 observe(Progress::Asked { done: answers.len(), all: prompts.len(), left: self.left() })?;
-                // To look at a photo takes all threads.
+                // Encoding a photo uses all threads.
                 if self.unseen.remove(&view) {
                     let (prepared, time) = self.photos.prepare(view)?;
                     self.known[view].prepared = Some(prepared);
@@ -280,7 +281,7 @@ impl<'a> ObjectFinder<'a> {
         Ok(answers)
     }
 
-    /// Returns the time that photos take which the network has not seen, once it has seen one.
+    /// Returns the estimated time for photos that are not encoded yet; `None` before the first one.
     fn left(&self) -> Option<Duration> {
         let (time, count) = self.looked;
         (count > 0 && !self.unseen.is_empty()).then(|| time / count * self.unseen.len() as u32)
@@ -291,7 +292,7 @@ impl<'a> ObjectFinder<'a> {
         let pixels: Vec<Pixels<LabelMap>> = masks.iter().map(|(_, mask)| mask.clone().into()).collect();
         let views: &'a [View] = &self.photos.views;
         let voters: Vec<Voter> =
-            // Photos have another size than the masks.
+            // Photos and masks differ in size.
             masks.iter().zip(&pixels).map(|((view, _), mask)| Voter { photo: None, ..Voter::for_view(&views[*view], mask) }).collect();
         let decision = decide(&sweep(&mut self.engine, &voters, Sweep::new(self.near, 0))?, &self.means)?;
         self.engine.set_labels(&decision.labels)?;

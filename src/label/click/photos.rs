@@ -1,4 +1,4 @@
-//! The photos that are asked for an object, and where places in them are.
+//! The photos that the network is queried with, and their coordinates.
 
 use crate::error::{Error, Result};
 use crate::files::resize::bounded_size;
@@ -7,25 +7,25 @@ use crate::segment::{Answer, FeatureCache, Network, Place, Prepared, Prompt};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest side of the views in which an object is drawn and compared, px.
+/// Longest side of the views in which objects are drawn and compared, px.
 const DRAWN_SIDE_MAX_PX: u32 = 512;
 
-/// The photos of a scene, and the network that is asked about them.
+/// The photos of a scene, and the segmentation network.
 pub struct Photos {
     network: Network,
     cache: FeatureCache,
-    /// At the size at which objects are drawn.
+    /// Views at the size at which objects are drawn.
     pub(super) views: Vec<View>,
-    /// Size of each view in which places are typed.
+    /// Size of each view that the user's positions refer to.
     typed: Vec<(u32, u32)>,
 }
 
-/// Masks of an answer at the size of a view, and how sure the network is of each.
+/// Masks at the size of a view, and the network's score of each.
 pub(super) type Masks = (Vec<LabelMap>, Vec<f64>);
 
 impl Photos {
-    /// Takes the views of `typed`, in whose sizes places are given, and their photos of `read`, which are as large as the
-    /// network sees them. Features of photos are kept in `folder`, if there is one.
+    /// Makes the photo set. The user's positions refer to the sizes of `typed`; `read` has the photos at the size that
+    /// the network needs. Photo features are cached in `folder`, if given.
     pub fn new(network: Network, folder: Option<&Path>, typed: &Dataset, read: Dataset) -> Result<Self> {
         let sizes = typed.all();
         let mut views: Vec<View> = read.train.into_iter().chain(read.test).collect();
@@ -55,37 +55,37 @@ impl Photos {
         &self.views[view].name
     }
 
-    /// Returns the size in which places of a view are given, px.
+    /// Returns the size that the user's positions in a view refer to, px.
     pub fn size(&self, view: usize) -> (u32, u32) {
         self.typed[view]
     }
 
-    /// Returns the place of a typed corner of a pixel in the drawn view; add halves for its middle.
+    /// Converts a pixel corner from the user's size to the drawn view; add 0.5 to each coordinate for the pixel centre.
     pub(super) fn drawn(&self, view: usize, [x, y]: [f32; 2]) -> Place {
         let ((width, height), to) = (self.typed[view], self.views[view].camera.size());
         [x * to.0 as f32 / width as f32, y * to.1 as f32 / height as f32]
     }
 
-    /// Returns the typed pixel at a place of the drawn view.
+    /// Converts a position in the drawn view to a pixel in the user's size.
     pub(super) fn pixel(&self, view: usize, [x, y]: Place) -> [u32; 2] {
         let ((width, height), from) = (self.typed[view], self.views[view].camera.size());
         let along = |at: f32, from: u32, to: u32| ((at * to as f32 / from as f32).max(0.0) as u32).min(to - 1);
         [along(x, from.0, width), along(y, from.1, height)]
     }
 
-    /// Returns true if the network has not looked at the photo of a view yet.
+    /// Returns true if the network has not encoded the photo of a view yet.
     pub(super) fn is_new(&self, view: usize) -> Result<bool> {
         Ok(!self.cache.holds(&*self.views[view].photo()?))
     }
 
-    /// Returns what the network makes of a photo, and the time of that.
+    /// Returns the network's features of a photo, and the time they took.
     pub(super) fn prepare(&self, view: usize) -> Result<(Prepared, Duration)> {
         let start = Instant::now();
         let features = self.cache.of(&self.network, &*self.views[view].photo()?)?;
         Ok((self.network.prepare(&features)?, start.elapsed()))
     }
 
-    /// Asks for masks at the size of the view.
+    /// Queries masks at the size of the view.
     pub(super) fn ask(&self, view: usize, prepared: &Prepared, prompt: &Prompt) -> Result<Masks> {
         let (photo, size) = (prepared.frame.size, self.views[view].camera.size());
         let scale = [photo.0 as f32 / size.0 as f32, photo.1 as f32 / size.1 as f32];

@@ -1,5 +1,5 @@
-//! One question about an object: what lies at a click or in a box. It is asked of the photos of several views, put together by
-//! their Gaussians, and asked again of what the model shows then.
+//! Answers one question: which object is at a click or in a box. Queries the photos of several views, merges their
+//! masks through the Gaussians, and queries again with the merged result.
 
 use super::photos::Masks;
 use super::shapes::{ViewMasks, agreeing, iou, places, prompt_of, without};
@@ -10,31 +10,32 @@ use crate::scene::LabelMap;
 use crate::segment::{Place, Prompt};
 use glam::DVec3;
 
-/// Views that are asked for a first answer, and at most.
+/// Most views queried for a first answer.
 const FIRST_VIEWS_MAX: usize = 12;
+/// Most views queried in all.
 const VIEWS_MAX: usize = 24;
-/// IoU of a mask with what the model shows of the object above which it counts in the second round.
+/// Smallest IoU of a mask with the rendered object for the mask to count in the second round.
 const CONFIRMING_IOU_MIN: f64 = 0.6;
 
-/// What of the model is at a click.
+/// The model surface at a click.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {
     pub(super) view: usize,
-    /// On the surface, in the world.
+    /// Point on the surface, world units.
     pub(super) point: DVec3,
-    /// The one with most weight there.
+    /// Gaussian with the largest weight there.
     pub(super) gaussian: usize,
     pub(super) is_on: bool,
 }
 
-/// Where an object is pointed at.
+/// What points at an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Target {
     Click(Spot),
     Box(Area),
 }
 
-/// One click or box, and spots that are on something else.
+/// One click or box, and spots that are not on the object.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Question {
     pub(super) target: Target,
@@ -42,7 +43,7 @@ pub(super) struct Question {
 }
 
 impl Question {
-    /// Returns the view that is asked first.
+    /// Returns the view that is queried first.
     fn first(&self) -> usize {
         match self.target {
             Target::Click(spot) => spot.view,
@@ -67,7 +68,7 @@ impl Question {
 }
 
 impl ObjectFinder<'_> {
-    /// Returns what a click means. If that has Gaussians at `others`, it is asked again so that it has not.
+    /// Returns the Gaussians that a click selects. If they include some at `others`, queries again with these excluded.
     pub(super) fn meant(&mut self, spot: Spot, others: &[Spot], observe: ProgressObserver) -> Result<Vec<bool>> {
         let question = Question { target: Target::Click(spot), others: Vec::new() };
         let found = self.remembered(question.clone(), observe)?;
@@ -75,7 +76,7 @@ impl ObjectFinder<'_> {
         if wrong.is_empty() { Ok(found) } else { self.remembered(Question { others: wrong, ..question }, observe) }
     }
 
-    /// Returns the answer to a question, also to one that was asked before.
+    /// Returns the answer to a question, from the cache if possible.
     pub(super) fn remembered(&mut self, question: Question, observe: ProgressObserver) -> Result<Vec<bool>> {
         if let Some((_, rows)) = self.answers.iter().find(|(other, _)| *other == question) {
             return Ok(rows.clone());
@@ -85,7 +86,7 @@ impl ObjectFinder<'_> {
         Ok(rows)
     }
 
-    /// Asks for what lies at one click or in a box.
+    /// Queries the object at a click or in a box.
     fn answer(&mut self, question: &Question, observe: ProgressObserver) -> Result<Vec<bool>> {
         let anchors = self.anchors(question)?;
         let Some(target) = question.point().or(anchors.first().copied()) else {
@@ -116,11 +117,12 @@ impl ObjectFinder<'_> {
         }
         observe(Progress::First(&rows))?;
         let confirmed = self.confirmed(&order[..order.len().min(VIEWS_MAX)], question, observe)?;
-        // Where no view confirms, the first answer stands.
+        // If no view confirms it, keep the first answer.
         if confirmed.is_empty() { Ok(rows) } else { self.vote(&confirmed) }
     }
 
-    /// Asks views, and leaves out masks that have places of something else. A view of which none is left is asked again with these.
+    /// Queries views, and drops masks that include excluded positions. If none remain, queries the view again with
+    /// these positions as negative prompts.
     fn ask_without(
         &mut self,
         prompts: Vec<(usize, Prompt)>,
@@ -143,7 +145,7 @@ impl ObjectFinder<'_> {
         Ok(found)
     }
 
-    /// Returns where a view sees spots that nothing hides.
+    /// Returns the positions at which a view sees spots that nothing hides.
     fn places_of(&mut self, view: usize, spots: &[Spot]) -> Result<Vec<Place>> {
         let mut places = Vec::new();
         for spot in spots {
@@ -152,7 +154,7 @@ impl ObjectFinder<'_> {
         Ok(places)
     }
 
-    /// Asks views for what the model shows now, and returns their masks where they confirm it.
+    /// Queries views for the object as currently rendered, and returns the masks that confirm it.
     fn confirmed(
         &mut self,
         views: &[usize],
@@ -178,13 +180,13 @@ impl ObjectFinder<'_> {
         Ok(found.filter_map(|(best, (view, _))| Some((*view, best?.1))).collect())
     }
 
-    /// Returns the box in the drawn view, if it is there.
+    /// Returns the box in the drawn view, if it belongs to this view.
     fn area(&self, view: usize, question: &Question) -> Option<[Place; 2]> {
         let [x0, y0, x1, y1] = question.area().filter(|area| area.view == view)?.corners.map(|at| at as f32);
         Some([self.photos.drawn(view, [x0, y0]), self.photos.drawn(view, [x1, y1])])
     }
 
-    /// Returns points of the surface that the network takes of a box, from its middle outwards; none without a box.
+    /// Returns surface points of the object in the box, from its centre outwards; empty without a box.
     fn anchors(&mut self, question: &Question) -> Result<Vec<DVec3>> {
         let Some(Area { view, .. }) = question.area() else { return Ok(Vec::new()) };
         let Some(prompt) = self.prompt(view, question, &[])? else { return Ok(Vec::new()) };
@@ -198,7 +200,7 @@ impl ObjectFinder<'_> {
         Ok(anchors)
     }
 
-    /// Returns the prompt of a view that has the box or sees a point of the object.
+    /// Returns the prompt for a view that has the box or sees a point of the object.
     fn prompt(&mut self, view: usize, question: &Question, anchors: &[DVec3]) -> Result<Option<Prompt>> {
         let mut prompt = Prompt { area: self.area(view, question), ..Prompt::default() };
         if prompt.area.is_some() {

@@ -1,4 +1,4 @@
-//! Masks of an object in single views: which of several views agree, how much two overlap, and where one is thickest.
+//! Compares an object's masks in single views: agreement between views, overlap, and the thickest point.
 
 use super::OBJECT_ID;
 use super::photos::Masks;
@@ -7,14 +7,15 @@ use crate::render::Render;
 use crate::scene::LabelMap;
 use crate::segment::{Place, Prompt};
 
-/// Overlap of the masks of two views above which both show the object.
+/// Smallest overlap of two views' masks at which both show the object.
 const AGREEING_MIN: f64 = 0.5;
-/// Agreement, as a share of the best, from which a smaller mask is preferred: what is missing is easily added by a click.
+/// A smaller mask is preferred if its agreement is at least this share of the best: missing parts are easily added by a
+/// click.
 const CLOSE_MIN: f64 = 0.9;
-/// Most places of a mask.
+/// Most positions sampled from a mask.
 const PLACES_MAX: usize = 64;
 
-/// The masks of a view that was asked.
+/// The network's masks of a view.
 pub(super) struct ViewMasks {
     view: usize,
     /// Masks at the size of the view.
@@ -35,8 +36,8 @@ impl ViewMasks {
     }
 }
 
-/// Chooses among the masks of the first view, which show a part, the object or more, the one on which the other views agree
-/// most, and returns it with theirs. Of masks on which they agree almost as much, it is the smallest.
+/// Chooses the mask of the first view (a part, the object, or more) that other views agree with most, and returns it
+/// with their masks. Among masks with almost the same agreement, it takes the smallest.
 pub(super) fn agreeing(asked: &[ViewMasks]) -> Vec<(usize, LabelMap)> {
     let Some((first, others)) = asked.split_first() else { return Vec::new() };
     let overlaps: Vec<_> = others.iter().map(|other| first.sight.overlaps(&other.sight)).collect();
@@ -59,21 +60,21 @@ pub(super) fn agreeing(asked: &[ViewMasks]) -> Vec<(usize, LabelMap)> {
     close.min_by_key(area).map(|(_, found)| found).unwrap_or_default()
 }
 
-/// Returns the masks that have none of these places.
+/// Returns the masks that contain none of these positions.
 pub(super) fn without((masks, qualities): Masks, off: &[Place]) -> Masks {
     let has = |mask: &LabelMap, [x, y]: Place| mask.ids[y as usize * mask.width as usize + x as usize] != 0;
     let kept = masks.into_iter().zip(qualities).filter(|(mask, _)| !off.iter().any(|place| has(mask, *place)));
     kept.unzip()
 }
 
-/// Returns the intersection of two masks over their union.
+/// Returns the intersection over union of two masks.
 pub(super) fn iou(a: &LabelMap, b: &LabelMap) -> f64 {
     let count =
         |of: &dyn Fn(bool, bool) -> bool| a.ids.iter().zip(&b.ids).filter(|(a, b)| of(**a != 0, **b != 0)).count();
     count(&|a, b| a && b) as f64 / count(&|a, b| a || b).max(1) as f64
 }
 
-/// Returns the box around the pixels of the object and the one of them that is farthest from their border.
+/// Returns the bounding box of the object's pixels, and the pixel farthest from their border.
 pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
     let depths = map.depths(OBJECT_ID);
     let deepest = (0..).zip(&depths).max_by_key(|(at, depth)| (**depth, *at));
@@ -82,7 +83,7 @@ pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
     Some(Prompt { on: vec![place(map, at)], off: Vec::new(), area: Some([[left, top], [right, bottom]]) })
 }
 
-/// Returns places all over a mask, from the one that is farthest from its border outwards.
+/// Returns positions spread over a mask, starting with the one farthest from its border.
 pub(super) fn places(map: &LabelMap) -> Vec<Place> {
     let depths = map.depths(OBJECT_ID);
     let mut inside: Vec<usize> = (0..depths.len()).filter(|&at| depths[at] > 0).collect();
@@ -90,7 +91,7 @@ pub(super) fn places(map: &LabelMap) -> Vec<Place> {
     inside.iter().step_by(inside.len().div_ceil(PLACES_MAX).max(1)).map(|&at| place(map, at)).collect()
 }
 
-/// Returns the middle of a pixel.
+/// Returns the centre of a pixel.
 fn place(map: &LabelMap, at: usize) -> Place {
     let width = map.width as usize;
     [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5]

@@ -10,17 +10,17 @@ use crate::render::label_map;
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
 use std::collections::BTreeMap;
 
-/// Fewest views of an object where nothing else is asked for: what one view alone shows may be a mistake of the segmenter.
+/// Default for the fewest views of an object: an object in only one view may be a segmentation error.
 pub const OBJECT_VIEWS_MIN: usize = 2;
 
 /// What the ids of masks mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ids {
-    /// The same object in all views, but for faults.
+    /// The same object in all views, except for errors.
     Shared,
-    /// Nothing in other views.
+    /// Unrelated between views.
     PerView,
-    /// Objects that all views have chosen ([`nested`](super::nested)): they agree.
+    /// Objects chosen from all views ([`nested`](super::nested)), which already agree.
     Chosen,
 }
 
@@ -74,8 +74,8 @@ pub fn agree(
     Ok((masks, repairs))
 }
 
-/// Mends masks whose ids agree: all of them give the model labels, and these divide masks that cover several objects and fill
-/// in missed ones. `tick` is called once per view.
+/// Repairs masks whose ids agree: all masks together label the model, and its labels then split masks that cover
+/// several objects and add missing ones. `tick` is called once per view.
 fn settle(
     engine: &mut Engine,
     model: &Gaussians,
@@ -85,7 +85,7 @@ fn settle(
     (repairs, tick): (&mut Repairs, &mut dyn FnMut()),
 ) -> Result<Vec<Option<LabelMap>>> {
     let counting = Sweep::new(how.near, 0);
-    // The labels that all masks give the model decide the content of each mask.
+    // The model's labels, voted by all masks, decide each mask.
     let voters = views.iter().zip(masks).filter_map(|(view, mask)| Some(Voter::for_view(view, mask.as_ref()?)));
     let decision = count(engine, &voters.collect::<Vec<_>>(), false, &model.means, counting)?;
     engine.set_labels(&decision.labels)?;
@@ -105,9 +105,9 @@ fn settle(
     Ok(mended)
 }
 
-/// Returns the masks of views that told the model nothing, such as those that are held out, with the ids of its objects.
-/// `before` is what [`agree`] made with the same engine; views are numbered after its views. Outlines stay, so that a
-/// score compares the model with the masks and not with itself. `tick` is called once per view.
+/// Returns the masks of views that did not vote, such as held-out views, with the ids of the model's objects. `before`
+/// is the result of [`agree`] with the same engine; view numbers continue after its views. Outlines stay unchanged, so
+/// that scores compare the model with the masks and not with itself. `tick` is called once per view.
 pub fn follow(
     engine: &mut Engine,
     views: &[&View],

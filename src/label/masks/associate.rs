@@ -1,6 +1,6 @@
-//! Groups the masks of different views into objects, by the Gaussians that they own.
+//! Groups the masks of different views into objects by the Gaussians they own.
 //!
-//! A segmenter of single images numbers its masks anew in every photo, and trackers lose and swap ids. A trained scene
+//! A single-image segmenter renumbers masks in every photo, and trackers lose and swap ids. A trained scene
 //! connects the views: two masks show one object if the same Gaussians make their pixels (the Gaussian memory of Gaga,
 //! here with exact counts instead of the front-most layer).
 
@@ -26,7 +26,7 @@ pub struct Owners {
 }
 
 impl Owners {
-    /// Finds the owners from the votes of this view alone.
+    /// Finds the owners from the votes of one view.
     pub fn new(ballot: &Ballot) -> Self {
         let owner = |row: usize| {
             let votes = ballot.row(row);
@@ -38,11 +38,10 @@ impl Owners {
     }
 }
 
-/// A mask: index of its view, and its id there.
+/// A mask: index of its view, and its id in that view.
 pub type Segment = (usize, u16);
 
-/// The overlap of two groups: the weight that both own, and the weight that either owns, over Gaussians visible in both
-/// views.
+/// The overlap of two groups: weight owned by both, and weight owned by either, over Gaussians visible in both views.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Overlap {
     pub both: f64,
@@ -60,8 +59,8 @@ impl Overlap {
 }
 
 /// Groups the masks of all views, without 0, into objects. It joins the two groups with the largest overlap until no
-/// overlap exceeds `SAME_OBJECT_OVERLAP_MIN`. Two masks of one view never join. Returns the groups, each sorted, in the order of
-/// their first masks.
+/// overlap exceeds `SAME_OBJECT_OVERLAP_MIN`. Two masks of one view never join. Returns the groups, each sorted, in
+/// order of their first masks.
 pub fn associate(views: &[Owners]) -> Vec<Vec<Segment>> {
     let segments: Vec<Segment> = (views.iter().enumerate())
         .flat_map(|(view, owners)| owners.ids.iter().filter(|&&id| id != 0).map(move |&id| (view, id)))
@@ -105,13 +104,13 @@ fn overlaps(first: &Owners, second: &Owners) -> Vec<((u16, u16), Overlap)> {
     found
 }
 
-/// Joins the two groups with the largest overlap until no overlap reaches `least`: agglomerative clustering with average
-/// linkage. `links` are the overlaps of each segment with others. Two masks of one view never join.
+/// Joins the two groups with the largest overlap until no overlap reaches `least`: agglomerative clustering with
+/// average linkage. `links` are the overlaps between segments. Two masks of one view never join.
 pub(crate) fn join(segments: &[Segment], mut links: Vec<BTreeMap<usize, Overlap>>, least: f64) -> Vec<Vec<Segment>> {
     let mut groups: Vec<Vec<Segment>> = segments.iter().map(|&segment| vec![segment]).collect();
     let mut seen_in: Vec<BTreeSet<usize>> = segments.iter().map(|&(view, _)| [view].into()).collect();
-    // Pairs to join by overlap, whose bits are in its order because it is positive, then by number, so that the order is the
-    // same everywhere.
+    // Candidate pairs, ordered by overlap, then by number, so that the order is deterministic. The bits of positive
+    // floats sort like their values.
     let candidate = |a: usize, b: usize, overlap: Overlap| {
         let ratio = overlap.ratio();
         (ratio >= least).then_some((ratio.to_bits(), Reverse((a.min(b), a.max(b)))))

@@ -1,4 +1,4 @@
-//! Masks that agree between views: [`track`] connects frames of a video by overlap, [`agree()`] connects views by the
+//! Makes masks agree between views: [`track`] connects video frames by overlap, [`agree()`] connects views through the
 //! Gaussians of a model.
 
 pub mod agree;

@@ -1,11 +1,11 @@
-//! Names of objects after a repair of masks whose ids were of single views.
+//! Names of objects after a repair of masks with per-view ids.
 
 use crate::files::label_table::{LabelTable, unique_name};
 use crate::scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Returns the names of the objects in repaired masks: for each, the name of most of its pixels in the masks before.
-/// `pairs` are masks before and after. Names that several objects have get numbers.
+/// Returns the names of objects in repaired masks: the most frequent previous name among each object's pixels. `pairs`
+/// are masks before and after. Names shared by several objects get numbers.
 pub fn carried<'a>(
     known: &LabelTable,
     pairs: impl Iterator<Item = (&'a LabelMap, &'a LabelMap)>,
@@ -31,7 +31,7 @@ pub fn carried<'a>(
     counts.into_iter().filter_map(named).collect()
 }
 
-/// Returns `cup` for `cup 2` if there is a `cup`: the number only told masks of one photo apart.
+/// Returns `cup` for `cup 2` if there is a `cup`: the number only distinguished masks within one photo.
 fn without_number<'a>(name: &'a str, names: &BTreeSet<&str>) -> &'a str {
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let bare = name.rsplit_once(' ').filter(|(_, number)| is_number(number)).map(|(bare, _)| bare);

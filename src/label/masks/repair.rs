@@ -1,24 +1,24 @@
-//! Repairs inconsistent masks by the model that all of them made.
+//! Repairs inconsistent masks through the model that all masks labelled.
 
 use super::associate::{SAME_OBJECT_OVERLAP_MIN, Segment};
 use crate::scene::LabelMap;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of one object in a mask above which the whole mask becomes that object. Otherwise the mask covers several
-/// objects and is divided along the borders in the model.
+/// If one object has more than this share of a mask, the whole mask becomes that object. Otherwise the mask covers
+/// several objects, and is divided along the model's object borders.
 const ONE_OBJECT_SHARE_MIN: f64 = 0.85;
-/// Smallest share of a mask that is split off as another object. Less is a shifted border.
+/// Smallest share of a mask that is split off as another object; a smaller share is only a shifted border.
 const PART_SHARE_MIN: f64 = 0.05;
-/// Share of an object's rendered pixels outside of all masks above which the object counts as missing in the view.
+/// An object counts as missing in a view if more than this share of its rendered pixels is outside of all masks.
 const MISSED_SHARE_MIN: f64 = 0.6;
 /// Smallest area to split off or fill in, as a share of the image. Smaller areas are borders, not objects.
 const AREA_SHARE_MIN: f64 = 0.0005;
 
-/// The rule for the ids of objects.
+/// How objects get their ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Naming {
-    /// The most frequent id of the object's pixels in the masks; conflicts get the next free ids.
+    /// The most frequent id of the object's pixels in the masks; conflicting objects get the next free ids.
     Majority,
     /// 1, 2, ... by size, for views with unrelated ids.
     Fresh,
@@ -29,18 +29,18 @@ pub enum Naming {
 pub struct Repairs {
     /// Masks with a new id: view, old id, new id.
     pub renamed: Vec<(Segment, u16)>,
-    /// Masks of objects that too few views show; they are 0 now.
+    /// Masks of objects that too few views show; their pixels are now 0.
     pub left_out: Vec<Segment>,
     /// Divided masks, with the ids of their parts.
     pub divided: Vec<(Segment, Vec<u16>)>,
     /// Objects that were missing in a view: view and id.
     pub filled: Vec<Segment>,
-    /// Views that got their mask from the model.
+    /// Views whose mask was made from the model.
     pub made: Vec<usize>,
 }
 
 impl Repairs {
-    /// Turns ids that masks had after they were renamed by `names` into those that they had at first; `all` are the masks.
+    /// Converts the ids after a first renaming by `names` back to the original ids; `all` are the masks.
     pub(super) fn trace(&mut self, names: &BTreeMap<Segment, u16>, all: impl Iterator<Item = Segment>) {
         let first: BTreeMap<Segment, u16> = names.iter().map(|(&(view, old), &new)| ((view, new), old)).collect();
         let old = |(view, id): Segment| (view, first.get(&(view, id)).copied().unwrap_or(id));
@@ -55,7 +55,7 @@ impl Repairs {
     }
 }
 
-/// Returns the id of each mask from its group.
+/// Returns the id of each mask, given its group.
 pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, naming: Naming) -> BTreeMap<Segment, u16> {
     let area = |group: &[Segment]| group.iter().map(|segment| pixels.get(segment).copied().unwrap_or(0)).sum::<u64>();
     let mut by_size: Vec<usize> = (0..groups.len()).collect();
@@ -92,7 +92,7 @@ pub fn name_groups(groups: &[Vec<Segment>], pixels: &BTreeMap<Segment, u64>, nam
     groups.iter().enumerate().flat_map(named).collect()
 }
 
-/// Returns the mask with the ids of its groups.
+/// Returns the mask with its groups' ids.
 pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> LabelMap {
     let new: BTreeMap<u16, u16> =
         mask.objects().into_iter().map(|id| (id, names.get(&(view, id)).copied().unwrap_or(0))).collect();
@@ -100,7 +100,7 @@ pub fn rename(view: usize, mask: &LabelMap, names: &BTreeMap<Segment, u16>) -> L
     LabelMap { ids, ..mask.clone() }
 }
 
-/// For each id of a mask, its pixels by the object that the model shows there; 0 where it shows none.
+/// For each id of a mask, its pixel counts by the object that the model shows there, 0 for none.
 fn shown_by_id(mask: &LabelMap, shown: &LabelMap) -> BTreeMap<u16, BTreeMap<u16, u64>> {
     let mut counts: BTreeMap<u16, BTreeMap<u16, u64>> = BTreeMap::new();
     for (&id, &object) in mask.ids.iter().zip(&shown.ids) {
@@ -109,12 +109,12 @@ fn shown_by_id(mask: &LabelMap, shown: &LabelMap) -> BTreeMap<u16, BTreeMap<u16,
     counts
 }
 
-/// Returns the pixels of an object that the model shows.
+/// Returns the pixels at which the model shows an object.
 fn area(counts: &BTreeMap<u16, BTreeMap<u16, u64>>, object: u16) -> u64 {
     counts.values().filter_map(|seen| seen.get(&object)).sum()
 }
 
-/// Returns the object with the most pixels, the smaller id of equals, and these pixels.
+/// Returns the object with the most pixels, and its pixel count; ties go to the smaller id.
 fn most_frequent(objects: &BTreeMap<u16, u64>) -> Option<(u16, u64)> {
     let objects = objects.iter().map(|(&object, &pixels)| (object, pixels)).filter(|(object, _)| *object != 0);
     objects.max_by_key(|&(object, pixels)| (pixels, Reverse(object)))
@@ -156,8 +156,8 @@ pub fn mend(view: usize, mask: &LabelMap, shown: &LabelMap, repairs: &mut Repair
     out
 }
 
-/// Gives the masks of a view the ids of the objects that the model shows there; outlines stay. A mask where it shows none
-/// keeps its id if that is one of `objects`. A model may show less of an object than its mask has.
+/// Gives a view's masks the ids of the objects that the model shows there; outlines stay unchanged. A mask without a
+/// rendered object keeps its id if it is one of `objects`, because a model may show less of an object than its mask.
 pub fn adopt(
     view: usize,
     mask: &LabelMap,
@@ -188,7 +188,7 @@ pub fn adopt(
     out
 }
 
-/// Sets the pixels of `id` to the new id at their index.
+/// Replaces `id` by the new id at each pixel.
 fn recolour(out: &mut LabelMap, mask: &LabelMap, id: u16, new: impl Fn(usize) -> u16) {
     for (at, to) in out.ids.iter_mut().enumerate().filter(|(at, _)| mask.ids[*at] == id) {
         *to = new(at);
@@ -203,7 +203,7 @@ mod tests {
     fn a_mask_of_which_the_model_shows_a_part_is_its_object() {
         let map = |ids: &[u16]| LabelMap { width: ids.len() as u32, height: 1, ids: ids.to_vec() };
         let mask = map(&[7, 7, 7, 7, 7, 7, 7, 7, 7, 7, 8, 8, 8, 8, 9, 9, 0, 0, 0, 0]);
-        // A tenth of the first is seen, and all that is seen of that object; of the second a row of its neighbour.
+        // The first mask is one tenth covered by its only object; the second includes a row of its neighbour.
         let shown = map(&[3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 4, 4, 4, 4, 4, 0]);
         let mut repairs = Repairs::default();
         let found = adopt(5, &mask, &shown, &BTreeSet::new(), &mut repairs);
@@ -217,7 +217,7 @@ mod tests {
     fn repairs_are_told_by_the_ids_that_masks_had() {
         let names = BTreeMap::from([((0, 3), 1), ((0, 1), 3), ((0, 5), 5), ((1, 2), 4)]);
         let mut repairs = Repairs {
-            // After they were renamed: 3 was 1, 5 is as it was, 4 was 2.
+            // After the first renaming: 3 was 1, 5 is unchanged, 4 was 2.
             renamed: vec![((0, 3), 1), ((0, 5), 6)],
             divided: vec![((1, 4), vec![4, 7])],
             ..Repairs::default()

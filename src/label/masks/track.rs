@@ -1,6 +1,6 @@
 //! A simple tracker: connects the masks of a single-image segmenter from frame to frame by overlap.
 //!
-//! It uses only outlines. So objects must hardly move between frames, as in the videos of `labelgs frames` (LabelGS,
+//! It uses only outlines, so objects must hardly move between frames, as in the videos of `labelgs frames` (LabelGS,
 //! densification of views).
 
 use crate::scene::LabelMap;
@@ -8,10 +8,10 @@ use crate::scene::labels::LABEL_MAX;
 use crate::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The rule for the same object in two frames.
+/// The rule by which regions in two frames are the same object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overlap {
-    /// Least intersection over union of a region and the last region of the object.
+    /// Smallest intersection over union of a region and the object's last region.
     pub least: f64,
     /// Number of frames that an object may be absent before it is forgotten.
     pub memory: usize,

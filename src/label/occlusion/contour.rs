@@ -1,4 +1,4 @@
-//! Occluders from consistent depth: a vote of the pixels along a contour, and chains of occluders.
+//! Finds occluders from consistent depth: pixels along a contour vote, and occluders form chains.
 
 use super::hull::Outline;
 use super::walk;
@@ -11,12 +11,12 @@ pub struct Rule {
     /// Relative difference of depth from which a pixel votes. 0.02: a floor seen at 15 degrees in an image of 320 px
     /// changes by 1 % from one pixel to the next, and is not in front of the things on it.
     pub margin: f64,
-    /// Share of the votes that must agree. 0.25: a bin stands before a thing in it along the nearer part of their contour
-    /// and behind it along the rest. Below 0.5 each of two may hide a part of the other.
+    /// Share of the votes that must agree. 0.25: a bin is in front of an object inside it along the near part of their
+    /// contour, and behind it along the rest. Below 0.5, two objects may hide parts of each other.
     pub share: f64,
     /// Share of all pixels of the contour that must agree. 0.1: less is noise.
     pub least: f64,
-    /// What has no label may hide objects too.
+    /// Unlabelled pixels may hide objects too.
     pub unlabelled: bool,
 }
 
@@ -54,10 +54,10 @@ type Sides = BTreeMap<(u16, u16), Side>;
 /// compares its depth with the mean of its neighbours on the other side.
 ///
 /// k' hides k through a chain k, a, .., k' in which each object hides the previous one directly. k continues behind a,
-/// and may also continue behind k' where k' covers a, so these pixels do not show that k is absent. Each further link
+/// and may also continue behind k' where k' covers a, so these pixels do not prove that k is absent. Each further link
 /// must
 /// * lie within k: the mean of its pixels is in the convex hull of the pixels of k. An interrupted object continues
-///   between its visible parts; without this rule nearly everything in a crowd would hide everything.
+///   between its visible parts; without this rule, nearly everything in a crowded scene would hide everything else.
 /// * be nearer by the margin, along its contour with the previous link, than k is along its contour with a.
 /// * not be hidden by k directly.
 pub fn occluders_by_contour(labels: &LabelMap, depth: &[f32], rule: Rule) -> Occluders {

@@ -1,4 +1,4 @@
-//! The rule of the paper: the object with the smaller mean distance along the contour is in front.
+//! The paper's rule: the object with the smaller mean distance along the contour is in front.
 
 use super::walk;
 use crate::scene::{DepthKind, DepthMap, LabelMap, Occluders};
@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 /// Returns the distances for [`occluders_by_mean`], `[H, W]`; 0 and NaN are holes.
 ///
-/// For inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the image. Its nearest pixel
-/// becomes 0 and so a hole. Metric depth stays as it is.
+/// For inverse depth d the paper takes 1 - (d - min) / (max - min), with the extremes of the image. The nearest pixel
+/// becomes 0, which is a hole. Metric depth is not changed.
 pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
     let values = map.values.iter().map(|&value| f64::from(value));
     match kind {
@@ -21,7 +21,7 @@ pub fn distances(map: &DepthMap, kind: DepthKind) -> Vec<f64> {
 }
 
 /// Returns the occluders of each object (LabelGS, occlusion analysis). k' hides k if they touch and the mean distance
-/// of the contour of k' with k is smaller than that of k with k'. What has no label hides nothing. There is no margin,
+/// of the contour of k' with k is smaller than that of k with k'. Unlabelled pixels hide nothing. There is no margin,
 /// because the scale of the distances is unknown.
 pub fn occluders_by_mean(labels: &LabelMap, distance: &[f64]) -> Occluders {
     // Sum and number of the distances along each contour.

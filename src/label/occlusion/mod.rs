@@ -1,10 +1,9 @@
-//! Occluders: which objects hide which in one view. They are the paper's O_k; U_k leaves out the pixels of the
-//! occluders of k.
+//! Occluders: which objects hide which in one view. They are the paper's O_k; U_k excludes the pixels of k's occluders.
 //!
-//! [`occluders_by_mean`] is the rule of the paper, for monocular depth of a network. [`occluders_by_contour`] needs consistent depth, such
-//! as that of the model. Both use the contours between objects: a pixel is on the contour of k with k' if its label is
-//! k and one of its 8 neighbours is k'. What has no label (0) is not hidden; [`occluders_by_contour`] lets it hide, because masks
-//! seldom cover everything that stands before an object.
+//! [`occluders_by_mean`] is the paper's rule, for a network's monocular depth. [`occluders_by_contour`] needs
+//! consistent depth, such as that of the model. Both use the contours between objects: a pixel is on the contour of k
+//! with k' if its label is k and one of its 8 neighbours is k'. Unlabelled pixels (0) are not hidden;
+//! [`occluders_by_contour`] lets them hide objects, because masks rarely cover everything in front of an object.
 
 mod contour;
 mod depths;

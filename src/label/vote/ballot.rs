@@ -1,9 +1,9 @@
 //! Votes for labels: sums over all contributors of all pixels of all masked views, background included (as in
 //! FlashSplat).
 //!
-//! In the paper the main Gaussian of a pixel takes its label, and the last view wins. Sums over all views do not depend
-//! on the order of views and reach Gaussians that dominate no pixel. The background can outvote a label, and the share
-//! of the winner is a confidence.
+//! In the paper, the main Gaussian of a pixel takes the pixel's label, and the last view wins. Sums over all views do
+//! not depend on view order, and also reach Gaussians that dominate no pixel. The background can outvote a label, and
+//! the winner's share is the confidence.
 
 use crate::engine::{Engine, ListKey, VoteInput};
 use crate::error::{Error, Result};
@@ -26,17 +26,17 @@ pub struct Voter<'a> {
     pub mask: &'a Pixels<LabelMap>,
     /// Photo of the view; its invalid pixels do not vote.
     pub photo: Option<&'a Pixels<Photo>>,
-    /// Weight of the votes of this view by label, 0 to 1; 1 for labels without an entry.
+    /// Weight of this view's votes by label, 0 to 1; 1 for labels without an entry.
     pub trust: Option<&'a BTreeMap<u16, f32>>,
 }
 
 impl<'a> Voter<'a> {
-    /// Makes a voter of a view and any mask of its size.
+    /// Makes a voter from a view and a mask of the same size.
     pub fn for_view(view: &'a View, mask: &'a Pixels<LabelMap>) -> Self {
         Self { camera: &view.camera, mask, photo: view.photo.as_ref(), trust: None }
     }
 
-    /// Makes voters of the views that have masks.
+    /// Makes voters from the views with masks.
     pub fn for_views(views: &[&'a View]) -> Vec<Self> {
         views.iter().filter_map(|view| Some(Self::for_view(view, view.mask.as_ref()?))).collect()
     }
@@ -49,21 +49,22 @@ pub struct Sweep {
     pub near: f32,
     /// Width of the band along mask contours without votes, px.
     pub border: u32,
-    /// Gaussians vote with their alpha, as if nothing were in front of them.
+    /// Ignores occlusion: Gaussians vote with their alpha.
     pub alone: bool,
-    /// Only pixels with a label vote: in photos of objects alone, all that is there belongs to one.
+    /// Only labelled pixels vote: in photos of objects alone, everything visible belongs to an object.
     pub labelled_only: bool,
 }
 
 impl Sweep {
-    /// Takes votes by blending weight.
+    /// Makes options for votes by blending weight.
     pub fn new(near: f32, border: u32) -> Self {
         Self { near, border, alone: false, labelled_only: false }
     }
 }
 
 /// The votes for one Gaussian: column and sum of blending weights, in the order of columns; a pixel of weight 1 is
-/// [`VOTE_ONE`]. Columns without votes are absent, because a Gaussian meets only a few of thousands of objects.
+/// [`VOTE_ONE`]. Columns without votes are absent, because a Gaussian gets votes for only a few of thousands of
+/// objects.
 pub(crate) type Row = [(u16, u64)];
 
 /// The votes of all views.
@@ -107,14 +108,14 @@ impl Ballot {
         self.row(row).iter().find(on).map_or(0.0, |&(_, votes)| weight(votes))
     }
 
-    /// Returns the weight of Gaussian `row` on all labels, and on other ones than its main one, px.
+    /// Returns the weight of Gaussian `row` on all labels, and on all but its main label, px.
     pub fn spread(&self, row: usize) -> (f64, f64) {
         let votes = || self.row(row).iter().map(|&(_, votes)| votes);
         let all: u64 = votes().sum();
         (weight(all), weight(all - votes().max().unwrap_or(0)))
     }
 
-    /// Returns the blending weights of all columns, px, `[N, columns]`, in the layout of the mirrors.
+    /// Returns the blending weights of all columns, px, `[N, columns]`, in the reference's layout.
     pub fn weights(&self) -> Vec<f64> {
         let mut dense = vec![0.0; self.len() * self.labels.len()];
         for (row, cells) in dense.chunks_mut(self.labels.len()).enumerate() {
@@ -190,7 +191,7 @@ fn vote(engine: &mut Engine, voter: &Voter, chunk: &[u16], how: Sweep) -> Result
         }
         let base = engine.band_uniforms(voter.camera, band, how.near, [0.0; 3]);
         let uniforms = StepUniforms { vote_columns: chunk.len() as u32, ..base };
-        // Votes that do not fit are not counted, and the list runs again.
+        // If votes do not fit, none are counted and the list runs again.
         engine.run(ListKey::Vote(rounds, how.alone), &VoteInput { uniforms, columns, weights: &weights })?;
     }
     Ok(())
@@ -225,7 +226,7 @@ fn most_labels(columns: &[u32], width: u32, tile_width: u32, tile_height: u32) -
     most
 }
 
-/// Converts a number of votes to blending weight, px.
+/// Converts votes to blending weight, px.
 pub(crate) fn weight(votes: u64) -> f64 {
     votes as f64 / f64::from(VOTE_ONE)
 }

@@ -11,13 +11,13 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::num::NonZero;
 
-/// Weight over all views up to which neighbours vote too, px. A Gaussian with less than one pixel in all views is
-/// inside or behind an object, and its own votes mean little.
+/// Gaussians with less weight over all views, px, also get their neighbours' votes. With less than one pixel in all
+/// views, a Gaussian is inside or behind an object, and its own votes mean little.
 pub(crate) const EVIDENCE_MIN_PX: f64 = 1.0;
-/// Number of these neighbours.
+/// Number of neighbours that vote.
 const VOTING_NEIGHBOURS: usize = 8;
-/// Least longest side at which masks are compared with the labels of the model, px. An agreement is a ratio over many
-/// pixels, and needs fewer of them than the votes.
+/// Smallest longest side at which masks are compared with the model's labels, px. Agreement is a ratio over many
+/// pixels, and needs fewer pixels than votes.
 const JUDGED_SIDE_MIN_PX: f64 = 160.0;
 
 /// The labels of a model.
@@ -38,9 +38,8 @@ impl Decision {
     }
 }
 
-/// Decides for the label with the most votes; ties go to the smaller label. The nearest neighbours with enough weight
-/// vote too for a Gaussian with little weight. So the inside of an object gets its label and is
-/// removed with it.
+/// Decides for the label with the most votes; ties go to the smaller label. For a Gaussian with little weight, its
+/// nearest neighbours with enough weight vote too. The inside of an object thus gets its label, and is removed with it.
 pub fn decide(ballot: &Ballot, means: &[[f32; 3]]) -> Result<Decision> {
     if ballot.len() != means.len() {
         return Err(Error::Bug(format!("{} rows of votes for {} Gaussians", ballot.len(), means.len())));
@@ -72,9 +71,9 @@ pub fn decide(ballot: &Ballot, means: &[[f32; 3]]) -> Result<Decision> {
     Ok(Decision { labels, confidence })
 }
 
-/// Lowers the confidence of Gaussians that stick out of their object to the share of their alpha that falls on it: in all
-/// pixels where the masks show their label or nothing, whatever is in front of them. Such Gaussians hide behind
-/// other things in the scene, and would show when the object is taken out.
+/// Lowers the confidence of Gaussians that stick out of their object to the share of their alpha inside the object's
+/// masks, ignoring occlusion. Such Gaussians are hidden behind other things in the scene, and would show when the
+/// object is extracted.
 pub(crate) fn lower_outside(engine: &mut Engine, voters: &[Voter], how: Sweep, decision: &mut Decision) -> Result<()> {
     let ballot = sweep(engine, voters, Sweep { alone: true, ..how })?;
     let rows = decision.labels.iter().zip(&mut decision.confidence).enumerate();
@@ -87,7 +86,7 @@ pub(crate) fn lower_outside(engine: &mut Engine, voters: &[Voter], how: Sweep, d
     Ok(())
 }
 
-/// Returns the column with the largest share, the first of equals; 0 without columns.
+/// Returns the column with the largest share; ties go to the first, and it is 0 without columns.
 fn winner(shares: impl Iterator<Item = (u16, f64)>) -> u16 {
     shares.fold((0, 0.0), |best, at| if at.1 > best.1 { at } else { best }).0
 }
@@ -104,7 +103,7 @@ fn tree_of(means: &[[f32; 3]], totals: &[f64]) -> Result<Option<(ImmutableKdTree
     Ok(Some((tree, rows)))
 }
 
-/// Returns camera and mask at the size at which masks are judged: half of the full one, but no less than
+/// Returns camera and mask at the size for judging masks: half of full size, but not below
 /// [`JUDGED_SIDE_MIN_PX`].
 fn judged(voter: &Voter) -> Result<(Camera, LabelMap)> {
     let longest = voter.camera.width.max(voter.camera.height);
@@ -128,9 +127,9 @@ pub fn agreement(mask: &LabelMap, rendered: &LabelMap) -> Agreement {
 }
 
 /// Returns the trust in the mask of each view by label, at most 1: the squared ratio of the view's agreement with the
-/// model to the agreement of all views together. So masks with swapped or merged ids count little in the next round.
+/// model to the agreement of all views together. Masks with swapped or merged ids thus count little in the next round.
 /// The ratio is relative, because low agreement in every view indicates a hard label, not a bad mask: otherwise thin
-/// objects would lose to their background, and a lost label could not return.
+/// objects would lose to their background, and a lost label could never return.
 pub fn trust(views: &[Agreement]) -> Vec<BTreeMap<u16, f32>> {
     let mut together = Agreement::new();
     for (&id, &(same, all)) in views.iter().flatten() {
@@ -154,8 +153,8 @@ pub(crate) fn apply(model: &mut Gaussians, decision: Decision) {
     model.label_confidence = Some(decision.confidence);
 }
 
-/// Counts the votes of `voters` for the model in the engine and decides. If it `is_judged`, masks that disagree with the
-/// labels in the engine count less ([`trust`]). Nothing may be in flight.
+/// Counts the votes of `voters` for the model in the engine and decides. If `is_judged`, masks that disagree with the
+/// engine's labels count less ([`trust`]). Nothing may be in flight.
 pub(crate) fn count(
     engine: &mut Engine,
     voters: &[Voter],

@@ -1,10 +1,10 @@
-//! The lift of the paper on a trained model, for comparison with votes.
+//! The paper's label lifting on a trained model, for comparison with votes.
 
 use crate::render::Render;
 use crate::scene::{Camera, LabelMap, UNLABELLED};
 use glam::DVec3;
 
-/// Least blending weight with which the main Gaussian of a pixel takes its label (LabelGS, equation 6).
+/// Smallest blending weight at which a pixel's main Gaussian takes the pixel's label (LabelGS, equation 6).
 const WEIGHT_MIN: f32 = 0.6;
 
 /// Writes the labels of one view's mask to the main Gaussians of its pixels, over previous labels. Within the view the

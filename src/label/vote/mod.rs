@@ -1,4 +1,4 @@
-//! Labels for a trained model from masks: votes of all views, and the lift of the paper for comparison.
+//! Labels a trained model from masks: votes of all views, and the paper's lifting for comparison.
 
 pub mod ballot;
 pub mod decide;

@@ -1,4 +1,4 @@
-//! Labels for a trained model of any trainer.
+//! Labels a trained model of any trainer.
 
 use super::ballot::{Sweep, Voter, columns_for};
 use super::decide::{apply, count, lower_outside};
@@ -16,9 +16,9 @@ use rand_pcg::Pcg64Mcg;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Counts of votes. In the second, masks that disagree with the result of the first count less.
+/// Rounds of voting. In the second round, masks that disagree with the first result count less.
 pub(crate) const VOTE_ROUNDS: u32 = 2;
-/// Seed of the order of the views by the rule of the paper.
+/// Seed of the view order for the paper's rule.
 const SEED: u64 = 0;
 
 /// The options for counting votes.
@@ -28,7 +28,7 @@ pub struct VoteOptions {
     pub near: f32,
     /// Width of the band along mask contours without votes, px.
     pub mask_border: u32,
-    /// Labels of less confidence become 0 at the end, 0 to 1.
+    /// Labels with less confidence become 0 at the end, 0 to 1.
     pub min_confidence: f32,
 }
 
@@ -37,7 +37,7 @@ pub fn vote_engine(gpu: Arc<Gpu>, model: &Gaussians, views: &[&View], columns: u
     limited_vote_engine(gpu, model, views, columns, SchedulerOptions::default())
 }
 
-/// The same with options, such as a limit of the memory.
+/// Same as [`vote_engine`] with scheduler options, such as a memory limit.
 pub(crate) fn limited_vote_engine(
     gpu: Arc<Gpu>,
     model: &Gaussians,
@@ -53,12 +53,12 @@ pub(crate) fn limited_vote_engine(
     Ok(engine)
 }
 
-/// Returns the objects in the masks of some views.
+/// Returns the objects in the masks of views.
 pub(crate) fn objects_of(views: &[&View]) -> BTreeSet<u16> {
     views.iter().filter_map(|view| view.mask.as_ref()).flat_map(Pixels::objects).collect()
 }
 
-/// Returns the number of vote columns for the objects in the masks of some views.
+/// Returns the number of vote columns for the objects in the masks of views.
 pub fn columns_of(views: &[&View]) -> u32 {
     columns_for(objects_of(views).len())
 }
@@ -86,7 +86,7 @@ pub fn label_by_votes(
     Ok(())
 }
 
-/// Labels a model by the rule of the paper: every view writes its labels, in a random order.
+/// Labels a model by the paper's rule: every view writes its labels, in random order.
 pub fn label_by_lift(engine: &mut Engine, model: &mut Gaussians, views: &[&View], near: f32) -> Result<()> {
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.shuffle(&mut Pcg64Mcg::seed_from_u64(SEED));

@@ -104,7 +104,7 @@ fn missing_weights_are_named() {
     let text = super::message(Weights::read(&file));
     assert!(text.contains("features.14.bias") && text.contains("torchvision"), "{text}");
     std::fs::write(&file, "not weights").expect("written");
-    assert!(super::message(Weights::read(&file)).contains("no readable safetensors"));
+    assert!(super::message(Weights::read(&file)).contains("not a readable safetensors"));
 }
 
 /// The mean difference of the red channel, in place of LPIPS.

@@ -1,31 +1,34 @@
-//! The groups that are objects.
+//! Chooses the groups that are objects.
 
 use super::group::{Group, Scene};
 use crate::masks::explain;
 use std::collections::BTreeSet;
 
-/// Least quality of an object, and least share of views that confirm it: what other views do not confirm gets no object.
+/// Smallest quality of an object.
 const QUALITY_MIN: f64 = 0.15;
+/// Smallest share of the views that must confirm an object.
 const SUPPORT_MIN: f64 = 0.5;
-/// Share of a group that no better one covers, which it needs to be an object.
+/// Smallest share of a group that no better group covers, for it to be an object.
 const OWN_SHARE_MIN: f64 = 0.5;
-/// A part is an object beside the rest of its whole if it has this share of it, quality and support: two things that touch in
-/// most views.
+/// A part is a separate object if it has at least this share of the whole, and the quality and support below: for
+/// example two things that touch in most views.
 const APART_SHARE_MIN: f64 = 0.2;
+/// Smallest quality of such a part.
 const APART_QUALITY_MIN: f64 = 0.5;
+/// Smallest support of such a part.
 const APART_SUPPORT_MIN: f64 = 0.9;
-/// Share that two such parts may have in common.
+/// Largest share that two such parts may have in common.
 const APART_SHARED_MAX: f64 = 0.3;
 
-/// Returns the groups of which enough views have masks: half of those that see it, and `least`.
+/// Returns the groups that enough views have masks of: at least half of the views that see it, and at least `least`.
 pub(super) fn confirmed(groups: Vec<Group>, least: usize) -> Vec<Group> {
     let holds =
         |group: &Group| group.quality >= QUALITY_MIN && group.support >= SUPPORT_MIN && group.best.len() >= least;
     groups.into_iter().filter(holds).collect()
 }
 
-/// Chooses objects among groups: numbers of groups, those that lie on top of others last. Wholes and parts compete as masks of one
-/// photo do ([`explain::objects`]).
+/// Chooses objects among groups. Returns group indices, with groups that lie on top of others last. Wholes and parts
+/// compete like the masks of one photo ([`explain::objects`]).
 pub(super) fn objects(scene: &Scene, groups: &[Group]) -> Vec<usize> {
     let areas: Vec<f64> = groups.iter().map(|group| group.area).collect();
     let qualities: Vec<f64> = groups.iter().map(|group| group.quality).collect();
@@ -44,14 +47,14 @@ pub(super) fn objects(scene: &Scene, groups: &[Group]) -> Vec<usize> {
         keeps
     });
     let on_top: Vec<usize> = best.iter().flat_map(|&whole| apart(scene, groups, whole, &parts[whole])).collect();
-    // Surer groups lie on those that are less sure.
+    // Groups of higher quality lie on top.
     best.sort_by(|&a, &b| groups[a].quality.total_cmp(&groups[b].quality).then(a.cmp(&b)));
     best.retain(|group| !on_top.contains(group));
     best.extend(on_top);
     best
 }
 
-/// Returns the parts of a whole that are objects of their own.
+/// Returns the parts of a whole that are separate objects.
 fn apart(scene: &Scene, groups: &[Group], whole: usize, parts: &[usize]) -> Vec<usize> {
     let value = |group: usize| groups[group].area * groups[group].quality;
     let holds = |&part: &usize| {
@@ -75,7 +78,7 @@ fn apart(scene: &Scene, groups: &[Group], whole: usize, parts: &[usize]) -> Vec<
     able
 }
 
-/// Returns the sum over Gaussians of their weight times the best quality of the groups there.
+/// Returns the sum over Gaussians of weight times the best quality among their groups.
 fn explained(scene: &Scene, groups: &[Group], chosen: &BTreeSet<usize>) -> f64 {
     let mut best = std::collections::BTreeMap::new();
     for &group in chosen {

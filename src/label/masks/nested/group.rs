@@ -5,28 +5,28 @@ use crate::label::masks::associate::{Overlap, Segment, join};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
-/// Overlap above which masks of different views are joined. Parts and wholes stay apart.
+/// Smallest overlap at which masks of different views are joined. Parts and wholes stay separate.
 const JOINED_MIN: f64 = 0.4;
-/// Overlap of two masks below which it is not kept: sums over many views rarely come above `JOINED_MIN`.
+/// Overlaps of two masks below this are dropped: summed over many views, they rarely exceed `JOINED_MIN`.
 const LINKED_MIN: f64 = 0.1;
-/// Share of the weight, over the views of a group, in its masks above which a Gaussian belongs to it.
+/// A Gaussian belongs to a group if at least this share of its weight, over the group's views, is in the group's masks.
 const MEMBER_SHARE_MIN: f32 = 0.5;
-/// Overlap of two groups above which they are one: a view may have two masks of one thing, a tight and a loose one.
+/// Smallest overlap at which two groups are the same: a view may have a tight and a loose mask of one thing.
 const SAME_GROUP_MIN: f64 = 0.65;
-/// A view sees a group if it shows this share of what its masks have in the median.
+/// A view sees a group if it shows at least this share of the group's median mask.
 const SEEN_SHARE_MIN: f64 = 0.3;
 
 /// A group of masks.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
     masks: Vec<Segment>,
-    /// Its Gaussians, sorted.
+    /// Gaussians of the group, sorted.
     pub rows: Vec<u32>,
     /// Their pixels in all views.
     pub area: f64,
-    /// Mean quality of its best masks over the views that see it; views without a mask count as 0.
+    /// Mean quality of the best masks over the views that see the group; views without a mask count as 0.
     pub quality: f64,
-    /// Share of the views that see it which have a mask of it.
+    /// Share of the views that see the group and have a mask of it.
     pub support: f64,
     /// The best mask of each view that has one.
     pub best: BTreeMap<usize, u16>,
@@ -51,7 +51,7 @@ impl Scene {
         Self { sights, rows, weights }
     }
 
-    /// Returns the groups of masks, of at least `least` of them.
+    /// Returns the groups with at least `least` masks.
     pub(super) fn groups(&self, least: usize) -> Vec<Group> {
         let segments: Vec<Segment> = (self.sights.iter().enumerate())
             .flat_map(|(view, sight)| (0..sight.qualities.len()).map(move |mask| (view, mask as u16)))
@@ -121,7 +121,7 @@ impl Scene {
         Some(Group { masks, rows, area, quality: quality / seen, support: best.len() as f64 / seen, best })
     }
 
-    /// Joins groups that are one, the most alike first.
+    /// Joins groups that are the same, by descending overlap.
     fn merged(&self, mut groups: Vec<Group>) -> Vec<Group> {
         loop {
             let mut pairs: Vec<(f64, usize, usize)> = (self.shared(&groups).into_iter())
@@ -150,14 +150,14 @@ impl Scene {
         }
     }
 
-    /// Returns the weight that two groups share, of all pairs that share any, the smaller number first.
+    /// Returns the shared weight of each pair of groups that share any, with the smaller index first.
     pub(super) fn shared(&self, groups: &[Group]) -> BTreeMap<(usize, usize), f64> {
         let mut of_row: HashMap<u32, Vec<usize>> = HashMap::new();
         for (group, found) in groups.iter().enumerate() {
             found.rows.iter().for_each(|&row| of_row.entry(row).or_default().push(group));
         }
         let mut rows: Vec<(u32, Vec<usize>)> = of_row.into_iter().collect();
-        // Sums in one order, so that they have the same bits.
+        // A fixed summation order gives the same bits in every run.
         rows.sort_unstable();
         let mut shared = BTreeMap::new();
         for (row, groups) in rows {

@@ -1,8 +1,8 @@
-//! Objects from nested masks: a segmenter of single photos finds parts, things and several things as one, in each photo
-//! others. What is an object, all views decide together.
+//! Finds objects from nested masks. A single-image segmenter finds parts, things, and several things as one,
+//! differently in each photo. All views together decide what an object is.
 //!
-//! Masks of different views that own the same Gaussians are a group; `choose` keeps those that enough views confirm,
-//! leaves out patterns of sheets, and takes of nested ones those that explain the views best.
+//! Masks of different views that own the same Gaussians form a group. `choose` keeps groups that enough views confirm,
+//! drops repeated patterns such as tiles, and picks the nested groups that explain the views best.
 
 mod choose;
 mod group;
@@ -19,19 +19,19 @@ use sight::ViewSight;
 
 pub use crate::masks::nested::NestedMasks;
 
-/// Fewest views with a mask of an object where nothing else is asked for, if as many have masks.
+/// Default for the fewest views with a mask of an object, if at least as many views have masks.
 pub const OBJECT_VIEWS_MIN: usize = 3;
 
 /// An object: the best mask of it in each view that has one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// Views and numbers of masks there, from 0.
+    /// Views, and mask indices there.
     pub masks: Vec<Segment>,
 }
 
-/// Finds the objects in nested masks of views, of the size of the views; `None` for views without. Those that lie on top of
-/// others come last. Each has masks in `min_views` views or more, else in [`OBJECT_VIEWS_MIN`]. `engine` holds the model; `tick` is
-/// called once per view.
+/// Finds the objects in nested masks, which have the size of their views; `None` for views without masks. Objects that
+/// lie on top of others come last. Each has masks in at least `min_views` views, by default [`OBJECT_VIEWS_MIN`].
+/// `engine` holds the model; `tick` is called once per view.
 pub fn objects(
     engine: &mut Engine,
     model: &Gaussians,
@@ -50,14 +50,14 @@ pub fn objects(
     let scene = Scene::new(sights, model.len());
     let with_masks = views.iter().filter(|(_, masks)| masks.is_some()).count();
     let least = min_views.unwrap_or(OBJECT_VIEWS_MIN.min(with_masks));
-    // Masks of one view alone are many, and no object unless they are asked for.
+    // Masks in only one view are numerous, and objects only on request.
     let groups = choose::confirmed(scene.groups(least.min(2)), least);
     let groups = pattern::without_patterns(&scene, groups, &model.means);
     let chosen = choose::objects(&scene, &groups).into_iter();
     Ok(chosen.map(|group| Object { masks: groups[group].best.clone().into_iter().collect() }).collect())
 }
 
-/// Paints the masks of objects in a view, with the numbers of objects from 1; later ones lie on top.
+/// Paints the masks of objects in a view, with object numbers from 1; later objects lie on top.
 pub fn painted(objects: &[Object], view: usize, masks: &NestedMasks) -> Option<LabelMap> {
     let mut painted = masks.layers.first()?.clone();
     painted.ids.fill(0);
@@ -102,8 +102,8 @@ mod tests {
 
     #[test]
     fn a_whole_stands_for_its_parts_and_a_sheet_does_not() {
-        // A thing of 20, of which two parts of 6 are found everywhere; and a sheet under it and another thing, of which
-        // the network is less sure.
+        // An object of 20 with two parts of 6 found everywhere; and a sheet below, and another object, with lower
+        // scores.
         let view = vec![(10..30, 0.5), (10..16, 0.45), (20..26, 0.45), (0..60, 0.15), (40..55, 0.6)];
         let scene = scene(80, &vec![view; 4]);
         assert_eq!(chosen(&scene, 4), vec![10..30, 40..55]);
@@ -120,7 +120,7 @@ mod tests {
     fn an_object_needs_as_many_views_as_are_asked_for() {
         let [all, one] = [vec![(0..10, 0.6), (20..30, 0.7), (40..45, 0.8)], vec![(0..10, 0.6)]];
         let two = all[..2].to_vec();
-        // What lies at 20 is seen by two views, what lies at 40 by one: others show nothing there.
+        // Two views see the object at 20 and one view the object at 40; the others show nothing there.
         let mut scene = scene(50, &[all, two, one]);
         let hide = |sight: &mut ViewSight, from: u32| sight.seen.retain(|&(row, _)| row < from);
         hide(&mut scene.sights[1], 40);

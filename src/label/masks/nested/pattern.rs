@@ -1,31 +1,33 @@
-//! Tiles, planks, stripes: pieces of one sheet, which are no objects.
+//! Detects tiles, planks and stripes: pieces of one sheet, which are not objects.
 
 use super::group::{Group, Scene};
 use crate::scene::principal::principal_axes;
 use glam::{DMat3, DVec3};
 
-/// Thickness over width up to which a group is flat.
+/// Largest ratio of thickness to width of a flat group.
 const FLAT_MAX: f64 = 0.35;
-/// Distance of the middle of a flat group from the plane of another, in sizes, up to which they lie in one plane.
+/// Largest distance of a flat group's centre from another's plane, in sizes, for both to be coplanar.
 const COPLANAR_SIZES_MAX: f64 = 0.1;
-/// Cosine of the angle between their planes from which on they do: 20 degrees.
+/// Smallest cosine of the angle between coplanar groups' normals (20 degrees).
 const PARALLEL_MIN: f64 = 0.94;
-/// Ratio of the sizes of pieces of one pattern.
+/// Largest ratio of the sizes of two pieces of one pattern.
 const SIZE_RATIO_MAX: f64 = 3.0;
-/// Like pieces in its plane from which on a group is a tile.
+/// Fewest similar coplanar pieces for a group to be a tile.
 const LIKE_MIN: usize = 5;
-/// Tiles that make a pattern.
+/// Fewest tiles of a pattern.
 const TILES_MIN: usize = 8;
-/// Share of a group within `NEAR_SIZES` of a tile's plane from which on it is one too, and the largest distance of both.
+/// Smallest share of a group within `NEAR_SIZES` of a tile's plane for the group to be a tile too.
 const LYING_SHARE_MIN: f64 = 0.7;
+/// Largest distance from the plane for that, in sizes.
 const NEAR_SIZES: f64 = 0.4;
+/// Largest distance from the tile for that, in sizes.
 const REACH_SIZES: f64 = 20.0;
-/// Share that two tiles may have in common.
+/// Largest share that two tiles may have in common.
 const SHARED_MAX: f64 = 0.3;
-/// Distance from the middle of a group, in medians, beyond which its Gaussians say nothing of its shape.
+/// Distance from a group's centre, in medians, beyond which Gaussians are ignored as outliers.
 const STRAY_MEDIANS: f64 = 3.0;
 
-/// A group as a piece of a plane.
+/// A group as a planar piece.
 struct Piece {
     middle: DVec3,
     normal: DVec3,
@@ -73,7 +75,7 @@ impl Piece {
     }
 }
 
-/// Leaves out the pieces of patterns. `means` are the positions of the Gaussians.
+/// Drops groups that are pieces of patterns. `means` are the positions of the Gaussians.
 pub(super) fn without_patterns(scene: &Scene, groups: Vec<Group>, means: &[[f32; 3]]) -> Vec<Group> {
     let pieces: Vec<Piece> = groups.iter().map(|group| Piece::from_group(scene, group, means)).collect();
     let shared = scene.shared(&groups);

@@ -1,19 +1,19 @@
-//! What a view shows of the Gaussians, and which of its nested masks own them.
+//! The Gaussians that a view shows, and the nested masks that own them.
 
 use super::NestedMasks;
 use crate::label::masks::associate::Overlap;
 
-/// Share of a Gaussian's pixels in a mask above which the mask owns it.
+/// A mask owns a Gaussian if it has more than this share of the Gaussian's pixels.
 const OWNED_SHARE_MIN: f32 = 0.5;
 
-/// The Gaussians that are the main ones of pixels of a view.
+/// The main Gaussians of a view's pixels.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ViewSight {
-    /// Row and number of pixels, by row.
+    /// Row and pixel count of each visible Gaussian, sorted by row.
     pub seen: Vec<(u32, f32)>,
-    /// For each of these, where its masks begin in `owners`; one more at the end.
+    /// For each of these, the start of its masks in `owners`; plus one end entry.
     starts: Vec<u32>,
-    /// Masks, from 0.
+    /// Mask indices.
     owners: Vec<u16>,
     /// Quality of each mask, 0 to 1.
     pub qualities: Vec<f64>,
@@ -22,7 +22,7 @@ pub(crate) struct ViewSight {
 }
 
 impl ViewSight {
-    /// Reads a view: the main Gaussian of each pixel, -1 for none, and masks of that size.
+    /// Reads a view from the main Gaussian of each pixel (-1 for none) and masks of the same size.
     pub(crate) fn new(main: &[i32], masks: &NestedMasks) -> Self {
         let mut seen: Vec<(u32, f32)> = Vec::new();
         let mut pixels: Vec<(u32, u32)> =
@@ -49,12 +49,12 @@ impl ViewSight {
         &self.owners[self.starts[at] as usize..self.starts[at + 1] as usize]
     }
 
-    /// Returns the pixels of a Gaussian, 0 if it is not seen.
+    /// Returns the pixel count of a Gaussian, 0 if it is not visible.
     pub(super) fn weight(&self, row: u32) -> f32 {
         self.seen.binary_search_by_key(&row, |seen| seen.0).map_or(0.0, |at| self.seen[at].1)
     }
 
-    /// Returns the rows that each mask owns, with their pixels.
+    /// Returns the rows that each mask owns, with pixel counts.
     pub(super) fn rows_of_masks(&self) -> Vec<Vec<(u32, f32)>> {
         let mut rows = vec![Vec::new(); self.qualities.len()];
         for (at, seen) in self.seen.iter().enumerate() {
@@ -63,8 +63,8 @@ impl ViewSight {
         rows
     }
 
-    /// Returns how the masks of two views overlap, over the Gaussians that both see: numbers of both masks, the weight that
-    /// both own and the weight that either owns.
+    /// Returns the overlaps of two views' masks over the Gaussians that both see: both mask indices, the weight owned
+    /// by both, and the weight owned by either.
     pub(crate) fn overlaps(&self, other: &Self) -> Vec<(u16, u16, Overlap)> {
         let (rows, columns) = (self.qualities.len(), other.qualities.len());
         let (mut both, mut first, mut second) = (vec![0.0; rows * columns], vec![0.0; rows], vec![0.0; columns]);
