@@ -1,9 +1,9 @@
 //! Label-aware 3D Gaussian Splatting on Vulkan compute.
 //!
 //! From posed photos and object masks, labelgs trains a scene of 3D Gaussians in which every Gaussian carries the id of
-//! its object, so that objects can be listed, taken out, removed, rendered and scored. It follows *LabelGS*
-//! (arXiv 2508.19699) on *3D Gaussian Splatting* (Kerbl et al. 2023), and runs on any Vulkan 1.2 device: a graphics card,
-//! or the processor through Mesa's lavapipe. It needs no CUDA, no Python and no network.
+//! its object, so that objects can be listed, taken out, removed, rendered and scored. It follows *LabelGS* (arXiv
+//! 2508.19699) on *3D Gaussian Splatting* (Kerbl et al. 2023), and runs on any Vulkan 1.2 device: a graphics card, or
+//! the processor through Mesa's lavapipe. It needs no CUDA, no Python and no network.
 //!
 //! A made scene, a training, one object out of it, and a picture of the rest:
 //!
@@ -48,10 +48,10 @@
 //!
 //! # Conventions
 //!
-//! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre at
-//! (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential. Labels
-//! are ids from 1 to 65535, in models to 2^31 - 1; 0 is none. Functions return [`Result`] with one [`Error`] type and print nothing; progress and
-//! warnings go to `tracing`.
+//! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre
+//! at (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential.
+//! Labels are ids from 1 to 65535, in models to 2^31 - 1; 0 is none. Functions return [`Result`] with one [`Error`]
+//! type and print nothing; progress and warnings go to `tracing`.
 //!
 //! # Features
 //!

@@ -51,8 +51,8 @@ fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
     memory
 }
 
-/// The commit that this program was built from, as `tools/setup` exports it. Only this file reads the variable, so that a
-/// commit compiles neither library nor shaders anew.
+/// The commit that this program was built from, as `tools/setup` exports it. Only this file reads the variable, so that
+/// a commit compiles neither library nor shaders anew.
 const BUILD_COMMIT: Option<&str> = option_env!("LABELGS_COMMIT");
 
 fn main() -> std::process::ExitCode {

@@ -23,7 +23,8 @@ pub(crate) fn note_commit(commit: Option<&'static str>) {
 }
 
 /// Returns version, commit and features, as in `0.2.0 (commit 0123456789ab, features cli viewer)`. The commit of a
-/// library in another program is unknown. Files that must have the same bytes after every commit hold the version alone.
+/// library in another program is unknown. Files that must have the same bytes after every commit hold the version
+/// alone.
 pub(crate) fn text() -> String {
     let features: Vec<&str> = PACKAGE_FEATURES.iter().filter(|(_, is_on)| *is_on).map(|(name, _)| *name).collect();
     let commit = PROGRAM_COMMIT.get().copied().unwrap_or("unknown");

@@ -118,7 +118,8 @@ impl EngineSize {
         let rounds = (u64::from(tiles_x) + 1) * u64::from(tiles_y);
         let Some(most) = self.most_rounds(shape).filter(|&most| rounds > u64::from(most)) else { return Ok(()) };
         let problem = format!(
-            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} tiles and rows are supported on this \
+            "{width} x {height} px make {tiles_x} x {tiles_y} tiles, at most {most} tiles and rows are supported on \
+            this \
              device; choose a smaller size"
         );
         Err(Error::usage(Setting("max_resolution"), problem))
@@ -130,7 +131,8 @@ impl EngineSize {
             return Ok(());
         }
         let problem = format!(
-            "the image has {width} x {height} px, but the engine has memory for {} x {} px; call Engine::grow_image first",
+            "the image has {width} x {height} px, but the engine has memory for {} x {} px; call Engine::grow_image \
+            first",
             self.image.0, self.image.1
         );
         Err(Error::usage("camera", problem))

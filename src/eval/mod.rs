@@ -1,8 +1,8 @@
 //! Scores of a model against ground truth.
 //!
 //! [`evaluate`] renders held-out views and objects and returns their [`Scores`]: PSNR, SSIM, IoU. [`protocol`] runs
-//! published benchmarks of object masks. [`psnr`] and [`ssim()`] score single pictures. A [`PictureObserver`] receives every scored
-//! picture with its ground truth. [`removals`] scores what is left where objects were removed.
+//! published benchmarks of object masks. [`psnr`] and [`ssim()`] score single pictures. A [`PictureObserver`] receives
+//! every scored picture with its ground truth. [`removals`] scores what is left where objects were removed.
 
 pub mod boundary;
 pub(crate) mod compared;

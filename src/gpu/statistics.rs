@@ -22,7 +22,8 @@ pub(super) type StatisticFunctions = ash::khr::pipeline_executable_properties::D
 /// The error for a driver without the extension.
 pub(super) fn unknown(device: &Capabilities) -> Error {
     Error::NoDevice(format!(
-        "{} ({} {}) does not report statistics of compiled kernels: the driver lacks VK_KHR_pipeline_executable_properties",
+        "{} ({} {}) does not report statistics of compiled kernels: the driver lacks \
+        VK_KHR_pipeline_executable_properties",
         device.name, device.driver_name, device.driver_info
     ))
 }

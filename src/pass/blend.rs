@@ -1,4 +1,4 @@
-//! Blends the tiles, forward and backward. A list that is too long for one dispatch is walked in segments.
+//! Blends the tiles, forward and backward. Lists that are too long for one dispatch are processed in segments.
 
 use super::Supervision;
 use super::build::{Builder, args};
@@ -7,7 +7,7 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// Blends all tiles front to back; with object layers these too, with their loss and the lift of labels.
+/// Blends all tiles front to back. With object layers, it also blends these, with their loss and the label lift.
 pub(super) fn blend_forward(b: &mut Builder, pairs: Buf) {
     forward(b, pairs, false);
 }
@@ -17,8 +17,8 @@ pub(super) fn blend_forward_main(b: &mut Builder, pairs: Buf) {
     forward(b, pairs, true);
 }
 
-/// Returns the length beyond which the lists of a step are walked forward in parts, if the walk has parts; [`u32::MAX`] where no
-/// list is longer, or where a lift needs the main splat of each pixel, which parts do not remember.
+/// Returns the list length beyond which the forward pass works in parts; [`u32::MAX`] if no list is longer, or if a
+/// lift needs each pixel's main splat, which parts do not record.
 pub(super) fn long_list(b: &Builder) -> Option<u32> {
     let length = b.shape.group_blend?.long_list;
     let has_some = !b.supervision.lifts() && b.capacity.gaussians > u64::from(length);
@@ -43,7 +43,8 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
         pass!(b, group_forward(labels: labels, main: main, disagreement: disagreement, depth: depth) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
+            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+            main_gaussian: Buf::MAIN_GAUSSIAN,
             main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
             label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
@@ -59,17 +60,19 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
         pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
             instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, main_gaussian: Buf::MAIN_GAUSSIAN,
+            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+            main_gaussian: Buf::MAIN_GAUSSIAN,
             main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
             view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
             label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
             label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
             segment_colours: Buf::SEGMENT_COLOURS, segment_rest: Buf::SEGMENT_REST,
-        } [lift: lift.into(), counts: counts.into(), segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        } [lift: lift.into(), counts: counts.into(), segment: segment, segments: segments],
+            args(constants::ARGS_BLEND));
     }
 }
 
-/// Walks all tiles back to front and writes one gradient record per (splat, tile) pair.
+/// Processes all tiles back to front and writes one gradient record per (splat, tile) pair.
 pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let (segments, supervision) = (b.segments(), b.supervision);
     let labels = supervision.has_layers();
@@ -78,7 +81,8 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     if let Some(blend) = b.shape.group_blend {
         pass!(b, group_backward(labels: labels, disagreement: disagreement, depth: depth) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
+            v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
             counters: Buf::COUNTERS, chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES,
             layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE, layer_weights: Buf::LAYER_WEIGHTS,
@@ -90,7 +94,8 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     for segment in (0..segments).rev() {
         pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1) {
             step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST, v_image: Buf::V_IMAGE,
+            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
+            v_image: Buf::V_IMAGE,
             v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
             counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE,
             layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK, target: Buf::TARGET,
@@ -101,7 +106,7 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     }
 }
 
-/// Whether the scene's own walk has labels, or known depths, as a channel.
+/// Returns whether the scene's blend pass has labels or known depths as a channel.
 fn channels(supervision: Supervision) -> (bool, bool) {
     (supervision == Supervision::Disagreement, supervision == Supervision::Depth)
 }

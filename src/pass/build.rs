@@ -1,4 +1,4 @@
-//! Builds a pass list; all pass families use it.
+//! Builds pass lists; all pass families use it.
 
 use super::{KernelShape, Supervision};
 use crate::pass::buffers::Capacity;
@@ -9,31 +9,31 @@ use crate::shaders::{ShaderDesc, constants};
 pub struct Builder<'a> {
     /// Shape of the kernels.
     pub shape: &'a KernelShape,
-    /// Capacities; recorded grids and limits follow from them.
+    /// Capacities, which determine recorded grids and limits.
     pub capacity: &'a Capacity,
-    /// What is compared with the view.
+    /// What the step compares with the view.
     pub supervision: Supervision,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
     /// True if the blend passes count the pairs with a weight.
     pub counts: bool,
-    /// Row of the step with the exposure of its photo, if it has one.
+    /// The step's row with the photo's exposure, if any.
     pub exposure: Option<u32>,
     /// Partial sums that the photo loss writes.
     pub loss_partials: u32,
-    /// Gaussians may have missed updates, which what reads them adds.
+    /// True if Gaussians may have missed updates, which readers must apply.
     pub late: bool,
-    /// Lists of more splats are walked forward by a workgroup for each chunk; `None` if the blends have no such form.
+    /// Lists with more splats are processed forward with a workgroup per chunk; `None` if blends do not use chunks.
     pub long_list: Option<u32>,
-    /// Both moments of a parameter are packed in one word.
+    /// True if both moments of a parameter are packed into one word.
     pub half: bool,
-    /// Passes of sorts, and scans, so far in this list that look back.
+    /// Look-back sort passes and scans so far in this list.
     pub sweeps: Sweeps,
     /// The list so far.
     pub list: PassList,
 }
 
-/// Numbers of passes that look back; each has words of its own in `Buf::SWEEP`.
+/// Numbers of look-back passes; each has its own words in `Buf::SWEEP`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sweeps {
     /// Passes of sorts.
@@ -42,7 +42,7 @@ pub struct Sweeps {
     pub scans: u32,
 }
 
-/// Which number of items a scan or sort works on (glsl/include/count.glsl).
+/// The counter that gives the number of items of a scan or sort (glsl/include/count.glsl).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count {
     /// All Gaussians.
@@ -56,7 +56,7 @@ pub enum Count {
 }
 
 impl Count {
-    /// Grid over partitions of so many items.
+    /// Grid over partitions of `items` items.
     pub(super) fn partitions(self) -> Grid {
         args(match self {
             Self::Gaussians => constants::ARGS_SWEEP_GAUSSIANS,
@@ -68,7 +68,7 @@ impl Count {
 }
 
 impl<'a> Builder<'a> {
-    /// An empty list, without bands of colour.
+    /// Makes an empty list with spherical harmonics of degree 0.
     pub fn new(name: &str, shape: &'a KernelShape, capacity: &'a Capacity) -> Self {
         let list = PassList { stage: Stage::PROJECT, ..PassList::new(name) };
         Self {
@@ -87,12 +87,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Number of dispatches that walk the longest list of a tile, at least 1.
+    /// Returns the number of dispatches for the longest tile list, at least 1.
     pub fn segments(&self) -> u32 {
         self.capacity.segments.max(1) as u32
     }
 
-    /// Slot of the next scan that looks back.
+    /// Returns the slot of the next look-back scan.
     pub(super) fn next_scan(&mut self) -> u32 {
         self.sweeps.scans += 1;
         constants::SWEEP_SORTS + self.sweeps.scans - 1
@@ -119,8 +119,8 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Finds the variant with these macros and those of the shape. A kernel without texel reads or subgroup operations has
-/// no such variant.
+/// Finds the variant with these macros and those of the shape. Kernels without texel reads or subgroup operations
+/// ignore these macros.
 fn variant(kernel: &'static [ShaderDesc], mut macros: Vec<&str>, shape: &KernelShape) -> &'static ShaderDesc {
     let of_shape = [("ANTIALIASED", shape.antialiased), ("EMULATED", shape.emulated), ("TEXEL", shape.texel)];
     let known = |name| kernel.iter().any(|variant| variant.macros.contains(&name));

@@ -1,4 +1,4 @@
-//! Clones, splits and prunes on the device: marks and counts Gaussians, then rewrites attributes in the new order.
+//! Clones, splits and prunes on the device: marks and counts Gaussians, then rewrites the attributes in the new order.
 
 use super::build::{Builder, Count, args, over_gaussians};
 use super::optimize::MODEL_ATTRIBUTES;
@@ -10,7 +10,8 @@ use crate::scheduler::plan::{Buf, Stage};
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, mark_near(lazy: b.late, half: b.late && b.half) {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS, counters: Buf::COUNTERS,
+        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
+        counters: Buf::COUNTERS,
         m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
         touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
     } [], over_gaussians());
@@ -36,7 +37,7 @@ pub(super) fn weigh(b: &mut Builder) {
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
-/// Draws Gaussians and decides their numbers of copies.
+/// Draws Gaussians and decides how many copies each gets.
 pub(super) fn relocate(b: &mut Builder) {
     weigh(b);
     pass!(b, relocate_draw {
@@ -46,14 +47,15 @@ pub(super) fn relocate(b: &mut Builder) {
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
-/// Rewrites the model, with `labels` also its labels; needs [`mark`] or [`relocate`] before it in the same list.
+/// Rewrites the model, and its labels if `labels`; needs [`mark`] or [`relocate`] earlier in the same list.
 pub(super) fn apply(b: &mut Builder, labels: bool) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
     pass!(b, densify_geometry {
         step: Buf::STEP, old_means: Buf::OLD_MEANS, old_scales: Buf::OLD_SCALES, old_quats: Buf::OLD_QUATS,
-        densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS, scales: Buf::SCALES,
+        densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS,
+        scales: Buf::SCALES,
         quats: Buf::QUATS,
     } [], over_gaussians());
     for a in &MODEL_ATTRIBUTES {

@@ -1,4 +1,4 @@
-//! What a device's compiler makes of every kernel.
+//! Compiler statistics of every kernel on a device.
 
 use super::{GroupBlend, KernelShape};
 use crate::error::Result;
@@ -12,11 +12,11 @@ pub struct CompiledKernel {
     pub name: &'static str,
     /// Subgroup size.
     pub subgroup: u32,
-    /// All that the driver tells.
+    /// All statistics that the driver reports.
     pub statistics: Vec<Statistic>,
 }
 
-/// Names under which drivers (Mesa's for AMD and Intel, NVIDIA's) tell the same figure.
+/// Names that drivers (Mesa's for AMD and Intel, NVIDIA's) use for the same statistic.
 pub const STATISTIC_NAMES: [(&str, &[&str]); 7] = [
     ("registers", &["VGPRs", "Register Count", "Max live registers"]),
     ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size"]),
@@ -28,14 +28,14 @@ pub const STATISTIC_NAMES: [(&str, &[&str]); 7] = [
 ];
 
 impl CompiledKernel {
-    /// Sum of the statistics with these names; `None` if the driver tells none of them.
+    /// Returns the sum of the statistics with these names; `None` if the driver reports none of them.
     pub fn figure(&self, names: &[&str]) -> Option<f64> {
         let values =
             self.statistics.iter().filter(|found| names.contains(&found.name.as_str())).map(|found| found.value);
         values.fold(None, |sum, value| Some(sum.unwrap_or(0.0) + value))
     }
 
-    /// Registers that did not fit, and were put into memory.
+    /// Returns the registers that were spilled to memory.
     pub fn spills(&self) -> f64 {
         STATISTIC_NAMES
             .iter()
@@ -45,8 +45,8 @@ impl CompiledKernel {
     }
 }
 
-/// Compiles every variant of every kernel with the default constants: for each subgroup size that the device offers, and
-/// with emulated subgroups. `gpu` must be open for statistics.
+/// Compiles every variant of every kernel with default constants, for each subgroup size of the device and with
+/// emulated subgroups. `gpu` must be opened for statistics.
 pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
     let (own, is_cpu) = (&gpu.capabilities().subgroup, gpu.is_cpu());
     let own_sizes = [8, 16, 32, 64].into_iter().filter(|size| !own.is_emulated && (own.min..=own.max).contains(size));

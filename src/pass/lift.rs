@@ -1,5 +1,5 @@
-//! Labels from masks: the lift of a step (`blend_forward_labels` casts its votes), and sweeps of votes over all views.
-//! And back: the label map of a view.
+//! Labels from masks: the lift of a step (`blend_forward_labels` casts its votes), and vote sweeps over all views. Also
+//! renders the label map of a view.
 
 use super::build::{Builder, args, over_gaussians};
 use super::project::GAUSSIAN_FROM_SPLAT;
@@ -15,8 +15,8 @@ pub(super) fn resolve(b: &mut Builder) {
     } [], over_gaussians());
 }
 
-/// Finds the label with the largest sum of weights in each pixel. Each tile is walked up to `rounds` times, for four
-/// labels each time.
+/// Finds the label with the largest sum of weights in each pixel. Each tile is processed up to `rounds` times, for four
+/// labels each.
 pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
     let segments = b.segments();
     b.list.stage = Stage::LABELS;
@@ -27,11 +27,13 @@ pub(super) fn label_map(b: &mut Builder, pairs: Buf, rounds: u32) {
             gaussian_from_splat: GAUSSIAN_FROM_SPLAT, labels: Buf::LABELS, label_map: Buf::LABEL_MAP,
             label_weights: Buf::LABEL_WEIGHTS, label_tables: Buf::LABEL_TABLES, segment_colours: Buf::SEGMENT_COLOURS,
             segment_rest: Buf::SEGMENT_REST,
-        } [later: u32::from(round > 0), walk: round, walks: rounds, segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        } [later: u32::from(round > 0), walk: round, walks: rounds, segment: segment, segments: segments],
+            args(constants::ARGS_BLEND));
     }
 }
 
-/// Adds the weight of every contributor to the vote for its pixel's label; with `alone` its alpha, whatever is in front.
+/// Adds the weight of every contributor to the votes for its pixel's label. With `alone`, it adds alpha and ignores
+/// occlusion.
 pub(super) fn vote(b: &mut Builder, pairs: Buf, rounds: u32, alone: bool) {
     let segments = b.segments();
     b.list.stage = Stage::LABELS;

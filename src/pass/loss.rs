@@ -1,7 +1,7 @@
 //! L1 and D-SSIM against the photo: value and gradient, also through the exposure of the photo.
 //!
-//! Two forms, chosen by [`KernelShape::loss_tile`]: a dispatch for each direction of each separable filter, without barriers;
-//! or one for all, whose tiles go through shared memory.
+//! There are two forms, chosen by [`KernelShape::loss_tile`]: one dispatch per direction of each separable filter,
+//! without barriers, or a single dispatch with tiles in shared memory.
 
 use super::build::{Builder, ONE_GROUP};
 use super::{KernelShape, Supervision};
@@ -9,7 +9,7 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
-/// Rows or columns that one lane filters in registers (glsl/include/ssim.glsl).
+/// Rows or columns that one lane filters in registers, px (glsl/include/ssim.glsl).
 const STRIP_PIXELS: u32 = 8;
 
 /// Writes `v_image` and the loss sums, for an image of at most `width` x `height` px.
@@ -45,7 +45,7 @@ fn tiled_loss(b: &mut Builder, width: u32, height: u32) {
     } [row: b.exposure.unwrap_or(0)], Grid::Groups(width.div_ceil(side), height.div_ceil(side), 1));
 }
 
-/// Multiplies the picture by the exposure of its photo, row `row` of the step; or has the loss do so.
+/// Applies the photo's exposure (row `row` of the step) to the picture, unless the loss pass does so.
 pub(crate) fn expose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::LOSS;
     b.exposure = Some(row);
@@ -57,8 +57,8 @@ pub(crate) fn expose(b: &mut Builder, row: u32) {
     } [row: row], over_pixels(b, 64));
 }
 
-/// Turns the gradient of the exposed picture into that of the blended one, unless the loss does so, and writes the gradient of
-/// the exposure, row `row` of the `stride` rows of a photo.
+/// Converts the gradient of the exposed picture to that of the blended picture, unless the loss pass does so. Writes
+/// the gradient of the exposure, row `row` of a photo's `stride` rows.
 pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
     b.list.stage = Stage::LOSS;
     let mut count = b.loss_partials;
@@ -82,7 +82,7 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
     Grid::Groups(groups.min(constants::FOLD), groups.div_ceil(constants::FOLD), 1)
 }
 
-/// Sums the loss; of a disagreement of labels after the backward walk, which finds it.
+/// Sums the loss. For label disagreement, it runs after the backward blend, which computes it.
 pub(super) fn reduce(b: &mut Builder) {
     b.list.stage = Stage::LOSS;
     pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
@@ -91,7 +91,7 @@ pub(super) fn reduce(b: &mut Builder) {
     } [partials: b.loss_partials], ONE_GROUP);
 }
 
-/// Number of partial loss sums of an image: one for each tile, or for each subgroup of each strip.
+/// Returns the number of partial loss sums of an image: one per tile, or per subgroup of each strip.
 pub(crate) fn partials(shape: &KernelShape, width: u32, height: u32) -> u32 {
     match shape.loss_tile {
         0 => width.div_ceil(64) * (64 / shape.subgroup) * height.div_ceil(STRIP_PIXELS),

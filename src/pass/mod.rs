@@ -33,18 +33,18 @@ use crate::scheduler::plan::{Buf, Grid, PassList};
 
 pub use crate::scheduler::plan::Stage;
 
-/// What a training step compares with the view, besides the picture with the photo.
+/// What a training step compares with the view, besides render and photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Supervision {
     /// Nothing more.
     Photo,
-    /// The depths of the splats with known ones.
+    /// Splat depths with known depths.
     Depth,
-    /// The labels of the splats with the mask.
+    /// Splat labels with the mask.
     Disagreement,
-    /// Object layers with the photo inside the mask.
+    /// Object layers with the photo inside each mask.
     Layers {
-        /// The step lifts labels from the mask, as in the paper.
+        /// True if the step lifts labels from the mask, as in the paper.
         lift: bool,
     },
 }
@@ -68,18 +68,18 @@ pub struct Variant {
     pub supervision: Supervision,
     /// Active degree of the spherical harmonics.
     pub sh_degree: u32,
-    /// Largest image, px; the grids of the loss cover it.
+    /// Largest image size, px, which loss grids cover.
     pub size: (u32, u32),
-    /// The step ends with an update of the parameters.
+    /// True if the step ends with a parameter update.
     pub update: bool,
-    /// The step counts (pixel, splat) pairs with a weight, which costs time.
+    /// True if the step counts contributing (pixel, splat) pairs, which costs time.
     pub counts: bool,
-    /// Before the step, all Gaussians get the updates that they have missed. The engine decides it.
+    /// True if all missed updates are applied before the step. The engine decides this.
     pub catch_up: bool,
 }
 
 impl Variant {
-    /// A step of the scene alone with an update, of full degree.
+    /// A step without labels, with an update, at full degree.
     pub const fn plain(size: (u32, u32)) -> Self {
         Self { supervision: Supervision::Photo, sh_degree: 3, size, update: true, counts: false, catch_up: false }
     }
@@ -88,12 +88,12 @@ impl Variant {
 /// Points where an extension can add passes to a training step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hook {
-    /// Before the first pass that needs the camera, whose pose in `Buf::STEP` may be changed.
+    /// Before the first pass that uses the camera. The extension may change its pose in `Buf::STEP`.
     Camera,
-    /// After `blend_forward`: the picture is complete. Its colours may be changed, because only the photo loss reads them;
-    /// not its transmittance.
+    /// After `blend_forward`: the picture is complete. The extension may change its colours, which only the photo loss
+    /// reads, but not its transmittance.
     Picture,
-    /// After the photo loss: its gradient with respect to the picture is complete and may be changed.
+    /// After the photo loss: its gradient with respect to the picture is complete. The extension may change it.
     Loss,
     /// After `project_backward`: the gradients of the visible Gaussians are complete.
     Gradients,
@@ -101,21 +101,21 @@ pub enum Hook {
     Updated,
 }
 
-/// Changes to training steps, by a strategy or an owner of shared parameters. `passes` numbers the variants of the
-/// extension from 1; each variant has its own recording.
+/// Adds passes to training steps, for a strategy or an owner of shared parameters. `passes` is the number of the
+/// extension's variant, from 1; each variant has its own recording.
 pub trait Extension: std::fmt::Debug + Send + Sync {
     /// Adds passes at a hook.
     fn extend(&self, _passes: u32, _hook: Hook, _b: &mut Builder) {}
 
-    /// Returns true if Adam also moves Gaussians outside the view, whose gradient is 0, as 3DGS does. Otherwise those
+    /// Returns true if Adam also moves Gaussians outside the view, whose gradient is 0, as 3DGS does. Otherwise these
     /// Gaussians and their moments stay unchanged.
     fn updates_unseen(&self, _passes: u32) -> bool {
         true
     }
 
-    /// Returns true if its passes read or change parameters, moments or gradients of Gaussians. A step then has a pass for each
-    /// part of its update, and all Gaussians are up to date. Otherwise one kernel may make the update, without
-    /// [`Hook::Gradients`], and Gaussians outside of the view may be late.
+    /// Returns true if its passes read or change parameters, moments or gradients of Gaussians. Each part of the update
+    /// is then a separate pass, and all Gaussians are up to date. Otherwise one kernel may do the whole update without
+    /// [`Hook::Gradients`], and Gaussians outside the view may have missed updates.
     fn splits_update(&self, _passes: u32) -> bool {
         true
     }
@@ -198,19 +198,19 @@ pub fn extended_step(
     end(b)
 }
 
-/// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth. With `label_rounds` above 0 it
-/// has a label map too, of up to so many walks of each tile.
+/// One picture of the scene: colour, transmittance, main Gaussian and its weight, depth. If `label_rounds` is above 0,
+/// it also has a label map, with at most that many walks per tile.
 pub fn render_view(shape: &KernelShape, capacity: &Capacity, sh_degree: u32, label_rounds: u32) -> PassList {
     let mut b = begin("render", shape, capacity, sh_degree);
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
-    // The picture comes last, because it is read from scratch memory.
+    // The picture is last, because it is read from scratch memory.
     lift::label_map(&mut b, pairs, label_rounds);
     blend::blend_forward_main(&mut b, pairs);
     end(b)
 }
 
-/// The label map of one view. Each tile is walked up to `rounds` times, for four labels each time.
+/// The label map of one view, with up to `rounds` walks per tile of four labels each.
 pub fn label_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> PassList {
     let mut b = begin("label map", shape, capacity, 0);
     project::visible_splats(&mut b);
@@ -219,8 +219,8 @@ pub fn label_view(shape: &KernelShape, capacity: &Capacity, rounds: u32) -> Pass
     end(b)
 }
 
-/// Votes of one view for the label of every Gaussian. Each tile is walked `rounds` times, for four labels each time. With
-/// `alone`, Gaussians vote as if nothing were in front of them.
+/// Votes of one view for the label of every Gaussian, with `rounds` walks per tile of four labels each. With `alone`,
+/// occlusion is ignored.
 pub fn vote_view(shape: &KernelShape, capacity: &Capacity, rounds: u32, alone: bool) -> PassList {
     let mut b = begin("votes", shape, capacity, 0);
     project::visible_splats(&mut b);
@@ -242,7 +242,7 @@ pub fn weigh_view(shape: &KernelShape, capacity: &Capacity) -> PassList {
     end(b)
 }
 
-/// Gives all Gaussians the updates that they have missed.
+/// Applies all missed updates.
 pub fn catch_up(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> PassList {
     let mut b = begin("catch up", shape, capacity, sh_degree);
     b.list.stage = Stage::OPTIMISE;
@@ -250,14 +250,14 @@ pub fn catch_up(shape: &KernelShape, capacity: &Capacity, sh_degree: u32) -> Pas
     end(b)
 }
 
-/// Counts the Gaussians that densification would leave.
+/// Counts the Gaussians after a densification, without changing the model.
 pub fn densify_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
     let mut b = begin("densify: count", shape, capacity, 0);
     densify::mark(&mut b);
     end(b)
 }
 
-/// Densifies the model; it must have room for the count from [`densify_count`].
+/// Densifies the model, which must have room for the count from [`densify_count`].
 pub fn densify_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
     let mut b = begin("densify", shape, capacity, 0);
     densify::mark(&mut b);
@@ -272,7 +272,7 @@ pub fn relocate_count(shape: &KernelShape, capacity: &Capacity) -> PassList {
     end(b)
 }
 
-/// Removes Gaussians and draws others to copy; the model must have room for them.
+/// Removes Gaussians and copies others at random; the model must have room for them.
 pub fn relocate_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) -> PassList {
     let mut b = begin("relocation", shape, capacity, 0);
     densify::relocate(&mut b);
@@ -280,7 +280,7 @@ pub fn relocate_apply(shape: &KernelShape, capacity: &Capacity, labels: bool) ->
     end(b)
 }
 
-/// Looks for numbers of these planes of a training's state that are not finite.
+/// Searches these state planes for values that are not finite.
 pub fn find_nonfinite(shape: &KernelShape, capacity: &Capacity, planes: &[Buf]) -> PassList {
     let mut b = begin("finite state", shape, capacity, 0);
     state::find_nonfinite(&mut b, planes);

@@ -6,14 +6,14 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
 
-/// An attribute of the Gaussians as the optimiser sees it.
+/// A Gaussian attribute, as the optimiser sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Attribute {
     /// Parameters, first moments, second moments.
     pub planes: [Buf; 3],
     /// Gradients, by splat.
     pub gradient: Buf,
-    /// vec4 per Gaussian.
+    /// Number of vec4 per Gaussian.
     pub stride: u32,
     /// Index of the learning rate (glsl/optimize/adam.comp).
     pub rate: u32,
@@ -35,7 +35,7 @@ pub(crate) const MODEL_ATTRIBUTES: [Attribute; 7] = [
 ];
 
 impl Attribute {
-    /// Planes with its moments; `half`: packed in one.
+    /// Returns the planes of its moments; a single one if packed (`half`).
     pub(crate) fn moments(&self, half: bool) -> &[Buf] {
         if half { &self.planes[1..2] } else { &self.planes[1..] }
     }
@@ -45,11 +45,11 @@ const fn attribute(planes: [Buf; 3], gradient: Buf, stride: u32, rate: u32, from
     Attribute { planes, gradient, stride, rate, from_degree, args }
 }
 
-/// Parameters shared by Gaussians, their moments, and the bias corrections of the moments. With a capacity of no rows,
+/// Parameters shared by Gaussians, their moments, and the bias corrections of the moments. If their capacity is 0,
 /// neither these buffers nor their passes exist.
 pub(crate) const SHARED_PLANES: [Buf; 4] = [Buf::SHARED, Buf::M_SHARED, Buf::U_SHARED, Buf::W_SHARED];
 
-/// One Adam update of the active attributes: of all Gaussians if `unseen`, else only of those in the view.
+/// One Adam update of the active attributes, of all Gaussians if `unseen`, else only of those in the view.
 pub(super) fn adam(b: &mut Builder, unseen: bool) {
     let (degree, seen_only) = (b.sh_degree, u32::from(!unseen));
     b.list.stage = Stage::OPTIMISE;
@@ -91,7 +91,7 @@ fn update(
     } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
 
-/// Adds the gradients of the mean opacity and size to those of the visible Gaussians.
+/// Adds the gradients of mean opacity and size to the gradients of the visible Gaussians.
 pub(crate) fn regularise(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
     pass!(b, regularise {
@@ -103,7 +103,8 @@ pub(crate) fn regularise(b: &mut Builder) {
 /// Keeps Gaussians from becoming finer than the photos can show.
 pub(crate) fn smooth(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, smooth { step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales_in: Buf::SCALES, scales: Buf::SCALES } [],
+    pass!(b, smooth { step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales_in: Buf::SCALES,
+        scales: Buf::SCALES } [],
         over_gaussians());
 }
 
@@ -119,7 +120,8 @@ pub(crate) fn explore(b: &mut Builder) {
 /// Limits opacities to 0.01 and zeroes their moments.
 pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, opacity_reset(half: b.half) { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS, u_means: Buf::U_MEANS } [],
+    pass!(b, opacity_reset(half: b.half) { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS,
+        u_means: Buf::U_MEANS } [],
         over_gaussians());
 }
 
@@ -128,7 +130,7 @@ mod tests {
     use super::MODEL_ATTRIBUTES;
     use crate::pass::buffers::TABLE;
 
-    /// Three vec4 of geometry, and 16 rgb triples without padding; moments and gradients likewise.
+    /// Three vec4 of geometry, and 16 rgb triples without padding; the same for moments and gradients.
     #[test]
     fn a_gaussian_of_degree_3_has_15_vec4() {
         for (degree, vectors) in [(0, 4), (1, 6), (2, 10), (3, 15)] {

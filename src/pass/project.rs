@@ -13,8 +13,8 @@ pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 /// Bits of a depth key.
 const DEPTH_BITS: u32 = 32;
 
-/// Lists the visible Gaussians, projects them, and sorts them by depth. Afterwards splats are numbered in the order of depth; or,
-/// where passes look back, in that of the model, and `Buf::DEPTH_ORDER` has their order.
+/// Lists the visible Gaussians, projects them, and sorts them by depth. Afterwards splats are numbered by depth. With
+/// look-back passes, they are numbered in model order instead, and `Buf::DEPTH_ORDER` has the depth order.
 pub(super) fn visible_splats(b: &mut Builder) {
     b.list.stage = Stage::PROJECT;
     if b.shape.group_walks {
@@ -54,7 +54,7 @@ fn project_forward(b: &mut Builder) {
     } [sh_degree: sh_degree], over_splats());
 }
 
-/// All of these in one pass, but for the sort.
+/// Does all of this in one pass, except the sort.
 fn project_visible(b: &mut Builder, keys: Buf) {
     let (sh_degree, sort_slot) = (b.sh_degree, b.sweeps.sorts);
     let labels = b.supervision.has_layers();
@@ -71,7 +71,7 @@ fn project_visible(b: &mut Builder, keys: Buf) {
     } [sh_degree: sh_degree, sort_slot: sort_slot], args(constants::ARGS_VISIBLE));
 }
 
-/// Corrects the pose of the step's camera by rows `row` and the next of the step.
+/// Corrects the pose of the step's camera by rows `row` and `row + 1` of the step.
 pub(crate) fn pose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::PROJECT;
     pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE_GROUP);
@@ -79,7 +79,7 @@ pub(crate) fn pose(b: &mut Builder, row: u32) {
 
 /// Writes the gradient of that correction.
 pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
-    // The gradients of the splats are not needed any more.
+    // The splat gradients are no longer needed.
     let (sh_degree, partials) = (b.sh_degree, Buf::V_SPLATS);
     b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, pose_backward {

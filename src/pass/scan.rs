@@ -1,4 +1,5 @@
-//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait, so it runs on any device.
+//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait for each other, so it runs on any
+//! device.
 
 use super::build::{Builder, Count, ONE_GROUP};
 use crate::pass::build::pass;
@@ -17,8 +18,8 @@ pub enum Total {
     Densified = 3,
 }
 
-/// Writes `offsets[i]` = sum of `values[..i]`, the sum of all values to the counter `total`, and the sizes of the dispatches that
-/// follow from it.
+/// Writes `offsets[i]` = sum of `values[..i]`, the total to the counter `total`, and the dispatch sizes that depend on
+/// it.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
     if b.shape.sweeps() {
         sweep(b, (values, offsets), count, total, false);
@@ -27,7 +28,7 @@ pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Tot
     }
 }
 
-/// Writes the tiles whose value is not 0, and the number of them to `layer_tile_count`, in one pass.
+/// Writes the tiles with nonzero values, and their number to `layer_tile_count`, in one pass.
 pub fn list_by_sweep(b: &mut Builder, occupied: Buf, tiles: Buf) {
     sweep(b, (occupied, tiles), Count::VirtualTiles, Total::LayerTiles, true);
 }
@@ -40,7 +41,7 @@ fn sweep(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: Total,
     } [count_source: count as u32, total: total as u32, sweep_slot: slot], count.partitions());
 }
 
-/// Same as [`scan`]; each key other than `KEY_INVISIBLE` counts as 1.
+/// Same as [`scan`], with each key other than `KEY_INVISIBLE` counting as 1.
 pub fn scan_visible(b: &mut Builder, keys: Buf, offsets: Buf) {
     reduce_then_scan(b, (keys, offsets), Count::Gaussians, Total::Visible, true);
 }

@@ -9,12 +9,12 @@ use crate::shaders::constants::{
 use crate::shaders::{self, ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
 use std::borrow::Cow;
 
-/// Shape of the kernels: fixed for a device, but for what the model needs.
+/// Shape of the kernels: fixed for a device, except for fields that depend on the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KernelShape {
     /// Invocations per subgroup: 4, 8, 16, 32 or 64.
     pub subgroup: u32,
-    /// Subgroup operations go through shared memory: workgroups of any size then serve as subgroups.
+    /// Subgroup operations are emulated in shared memory, for any subgroup size.
     pub emulated: bool,
     /// Tile width, px.
     pub tile_width: u32,
@@ -24,52 +24,53 @@ pub struct KernelShape {
     pub texel: bool,
     /// Bits per digit of the radix sort.
     pub digit_bits: u32,
-    /// Items of an invocation in sorts and scans of one dispatch a pass, which look back; 0 with several dispatches a pass.
+    /// Items per invocation in look-back sorts and scans (one dispatch per pass); 0 with several dispatches per pass.
     pub sweep_items: u32,
-    /// Sorts of one dispatch a pass have keys of tiles of 16 bits, where all tiles of all layers have one.
+    /// Look-back sorts use 16-bit tile keys if all tiles of all layers fit.
     pub narrow_keys: bool,
-    /// Side of the tiles of the photo loss in one dispatch, px; 0 with a dispatch for each filter.
+    /// Tile side of the single-dispatch photo loss, px; 0 with a dispatch per filter.
     pub loss_tile: u32,
-    /// Pixels of a mask on the device have 16 bits.
+    /// Mask pixels on the device have 16 bits.
     pub narrow_labels: bool,
-    /// Splats are listed, projected and numbered by passes that look back (glsl/include/look_back.glsl), and their tiles, and the
-    /// records of those with many, are shared out among the invocations of a workgroup; else one invocation walks those of a splat.
+    /// Splats are listed, projected and numbered by look-back passes (glsl/include/look_back.glsl). Workgroups
+    /// distribute the tiles of their splats, and the records of splats with many tiles, among their invocations;
+    /// otherwise one invocation processes all tiles of a splat.
     pub group_walks: bool,
-    /// The blends of a card; `None` with a subgroup for each tile.
+    /// Workgroup blends, as on GPUs; `None` for one subgroup per tile.
     pub group_blend: Option<GroupBlend>,
     /// How a step updates the parameters.
     pub update: Update,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
-    /// Splats per tile that one dispatch of a blend pass walks; a multiple of the subgroup size.
+    /// Splats per tile that one blend dispatch processes; a multiple of the subgroup size.
     pub segment_length: u32,
-    /// Most rounds of a loop of an invocation, a little fewer; `None` without a limit.
+    /// Most loop iterations per invocation, with a small reserve; `None` without a limit.
     pub loop_rounds: Option<u32>,
-    /// Blur takes opacity from splats, as the model on the device needs it
+    /// Blur reduces the opacity of splats, if the model on the device needs it
     /// ([`Gaussians::antialiased`](crate::scene::Gaussians::antialiased)).
     pub antialiased: bool,
 }
 
-/// Blends with a workgroup for each tile, and backward for each chunk of its list (glsl/include/group_tile.glsl).
+/// Blends with a workgroup per tile, and backward with a workgroup per list chunk (glsl/include/group_tile.glsl).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroupBlend {
-    /// Pixels of an invocation of the forward walk.
+    /// Pixels per invocation of the forward pass.
     pub forward_rows: u32,
-    /// Pixels of an invocation of the backward walk.
+    /// Pixels per invocation of the backward pass.
     pub backward_rows: u32,
-    /// Splats of a chunk, a power of 2.
+    /// Splats per chunk, a power of 2.
     pub chunk_length: u32,
-    /// Splats of a list of a training step that one workgroup walks forward in any case; longer ones may have one for each chunk
-    /// (glsl/include/long_lists.glsl).
+    /// Longest list of a training step that a single workgroup always processes forward; longer lists may get a
+    /// workgroup per chunk (glsl/include/long_lists.glsl).
     pub long_list: u32,
-    /// A subgroup skips splats that its pixels do not see; `false` for tests.
+    /// Subgroups skip splats that none of their pixels sees; `false` for tests.
     pub culls: bool,
-    /// Workgroups take their work in the opposite order, for tests.
+    /// Workgroups process their work in reverse order, for tests.
     pub turned: bool,
 }
 
 impl GroupBlend {
-    /// What cards use.
+    /// The values for GPUs.
     pub const DEFAULT: Self =
         Self { forward_rows: 2, backward_rows: 4, chunk_length: 256, long_list: 1024, culls: true, turned: false };
 }
@@ -77,31 +78,32 @@ impl GroupBlend {
 /// How a step updates the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Update {
-    /// A pass sums gradients, one carries them back to the parameters, and one for each attribute updates all Gaussians.
+    /// Separate passes: one sums gradients, one propagates them to the parameters, and one per attribute updates all
+    /// Gaussians.
     Split,
-    /// One pass does that for those that the view touched, after one that updates all others.
+    /// One pass does this for Gaussians that the view touched, after a pass that updates all others.
     Fused,
-    /// One pass, for those that the view touched; the others are late until something touches or changes them.
+    /// One pass, for Gaussians that the view touched; the others miss updates until something touches or changes them.
     Lazy,
 }
 
-/// Largest id of a pixel of 16 bits, the highest of which is a flag.
+/// Largest id of a 16-bit mask pixel, whose highest bit is a flag.
 const NARROW_MAX: u32 = 0x7fff;
 
-/// Most tiles of all layers whose numbers have 16 bits.
+/// Most tiles of all layers whose indices fit 16 bits.
 const NARROW_TILES: u64 = 1 << 16;
 
 /// Lavapipe ends all loops of an invocation after 65,535 rounds.
 const LOOP_ROUNDS: u32 = 65_000;
 
-/// Longest segment, for [`LOOP_ROUNDS`] on all devices. A walk over n splats takes n rounds
-/// and one more per load of a subgroup.
+/// Longest segment, for [`LOOP_ROUNDS`] on all devices. Processing n splats takes n rounds, and one more per load of a
+/// subgroup.
 const SEGMENT_LENGTH: u32 = 40_960;
 
-/// Most shared memory of a blend by workgroups, bytes: the forward walk keeps 128 splats, of 52 each.
+/// Most shared memory of a workgroup blend, bytes: the forward pass stores 128 splats of 52 bytes.
 const GROUP_BLEND_SHARED: u32 = 8192;
 
-/// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would bound the model before memory does.
+/// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would restrict the model before memory does.
 const TEXELS_MIN: u64 = 1 << 26;
 
 impl KernelShape {
@@ -136,8 +138,7 @@ impl KernelShape {
         if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
     }
 
-    /// Returns this shape with the largest tiles of the loss whose pixels fit in shared memory; `None` if the device can run
-    /// none.
+    /// Returns this shape with the largest loss tiles that fit in shared memory; `None` if the device can run none.
     fn with_loss_tiles(self, device: &Capabilities) -> Option<Self> {
         let limits = &device.limits;
         let fits = |&tile: &u32| {
@@ -149,7 +150,7 @@ impl KernelShape {
         [16, 8].into_iter().find(fits).map(|loss_tile| Self { loss_tile, ..self })
     }
 
-    /// Returns this shape with blends by workgroups; `None` if the device cannot run them.
+    /// Returns this shape with workgroup blends; `None` if the device cannot run them.
     pub fn with_group_blend(self, device: &Capabilities) -> Option<Self> {
         let (limits, subgroup) = (&device.limits, &device.subgroup);
         let shape = self.with_group_blend_of(GroupBlend::DEFAULT);
@@ -162,32 +163,34 @@ impl KernelShape {
         fits.then_some(shape)
     }
 
-    /// Returns this shape with such blends by workgroups.
+    /// Returns this shape with these workgroup blends.
     pub fn with_group_blend_of(self, blend: GroupBlend) -> Self {
-        // No tile is waited for, and fewer tiles are fewer pairs to sort.
+        // Tiles do not wait for each other, and fewer tiles mean fewer pairs to sort.
         let (tile_width, tile_height) =
             if self.subgroup >= 32 { (16, 16) } else { (self.tile_width, self.tile_height) };
         Self { group_blend: Some(blend), tile_width, tile_height, ..self }
     }
 
-    /// Chunks of so many pairs in the lists of so many tiles; 0 if the backward blend walks tiles.
+    /// Returns the most chunks for this many pairs in the lists of this many tiles; 0 if the backward blend processes
+    /// whole tiles.
     pub fn chunks(&self, instances: u64, jobs: u64) -> u64 {
         self.group_blend.map_or(0, |blend| instances / u64::from(blend.chunk_length) + jobs)
     }
 
-    /// Returns this shape with an update in one kernel; `None` if that, or a projection of late Gaussians, cannot have its buffers.
+    /// Returns this shape with the update in one kernel; `None` if the device cannot bind the buffers of the update, or
+    /// of a projection that applies missed updates.
     pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
         let fits = self.binds([&update::VARIANTS, &project_visible::VARIANTS, &emit_ordered::VARIANTS], true, device);
         fits.then_some(Self { update: Update::Lazy, group_walks: true, ..self })
     }
 
-    /// True if the device can run passes that list splats and look back.
+    /// Returns true if the device can run the look-back passes that list splats.
     fn can_look_back(&self, device: &Capabilities) -> bool {
         self.binds([&project_visible::VARIANTS, &emit_ordered::VARIANTS], false, device)
     }
 
-    /// True if these kernels, with the reads of this shape, bind no more storage buffers than the device has places for; `late`:
-    /// also for Gaussians that are late.
+    /// Returns true if the device can bind all storage buffers of these kernels with this shape's reads; with `late`,
+    /// also of variants for missed updates.
     fn binds<const N: usize>(&self, kernels: [&[ShaderDesc]; N], late: bool, device: &Capabilities) -> bool {
         let own = |shader: &&ShaderDesc| {
             shader.macros.contains(&"TEXEL") == self.texel && (late || !shader.macros.contains(&"LAZY"))
@@ -196,7 +199,7 @@ impl KernelShape {
         most.unwrap_or(0) <= device.limits.plan.max_storage_buffers
     }
 
-    /// Returns this shape with sorts and scans of one dispatch a pass; `None` if the device cannot run them.
+    /// Returns this shape with look-back sorts and scans; `None` if the device cannot run them.
     pub fn with_sweeps(self, device: &Capabilities) -> Option<Self> {
         let (limits, subgroup) = (&device.limits, &device.subgroup);
         let fits = limits.max_invocations.min(limits.max_group_size[0]) >= SWEEP_LANES
@@ -209,30 +212,30 @@ impl KernelShape {
         fits.then(|| self.with_sweeps_of(items))
     }
 
-    /// Returns this shape with sorts and scans of one dispatch a pass, of so many items an invocation.
+    /// Returns this shape with look-back sorts and scans, with this many items per invocation.
     pub fn with_sweeps_of(self, items: u32) -> Self {
         let digit_bits = if self.subgroup >= 16 { 8 } else { 4 };
         Self { sweep_items: items, digit_bits, group_walks: true, ..self }
     }
 
-    /// Shared memory of a pass of the sort that looks back, bytes.
+    /// Returns the shared memory of a look-back sort pass, bytes.
     fn sweep_bytes(&self, items: u32) -> u32 {
         let (digits, subgroups) = (1 << self.digit_bits, SWEEP_LANES / self.subgroup);
         let exchange = if self.emulated { 2 * 12 * SWEEP_LANES } else { 0 };
         4 * (subgroups * digits + 2 * digits + SWEEP_LANES + 2 * subgroups + 8 + SWEEP_LANES * items) + exchange
     }
 
-    /// True if sorts and scans take one dispatch a pass.
+    /// Returns true if sorts and scans look back, with one dispatch per pass.
     pub fn sweeps(&self) -> bool {
         self.sweep_items > 0
     }
 
-    /// True if so many tiles of all layers have keys of 16 bits.
+    /// Returns true if this many tiles of all layers get 16-bit keys.
     pub fn has_narrow_keys(&self, virtual_tiles: u64) -> bool {
         self.narrow_keys && self.sweeps() && virtual_tiles <= NARROW_TILES
     }
 
-    /// Words of `Buf::SWEEP` for so many items.
+    /// Returns the words of `Buf::SWEEP` for this many items.
     pub fn sweep_cells(&self, items: u64) -> u64 {
         if !self.sweeps() {
             return 0;
@@ -241,7 +244,7 @@ impl KernelShape {
         u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
     }
 
-    /// Words of `Buf::LOOK_BACK` for so many Gaussians.
+    /// Returns the words of `Buf::LOOK_BACK` for this many Gaussians.
     pub fn look_cells(&self, gaussians: u64) -> u64 {
         if !self.group_walks {
             return 0;
@@ -250,13 +253,14 @@ impl KernelShape {
         2 + partitions + gaussians.div_ceil(u64::from(ORDERED_LANES))
     }
 
-    /// Returns the shape for a subgroup size; `cpu` is true if the device is a processor.
+    /// Returns the shape for a subgroup size; `cpu` is true if the device is a CPU.
     pub fn new(subgroup: u32, cpu: bool) -> Self {
         let (tile_width, tile_height) = match subgroup {
             ..=4 => (4, 8),
             8 => (8, 8),
             16 => (16, 8),
-            // A card waits for the subgroup of the fullest tile; a processor saves the loads of splats.
+            // A GPU waits for the subgroup with the fullest tile, so tiles are small; a CPU saves splat loads with
+            // larger tiles.
             32 if !cpu => (16, 8),
             _ => (16, 16),
         };
@@ -323,7 +327,8 @@ impl KernelShape {
         self.tile_width * self.tile_height
     }
 
-    /// Number of lanes of a sort or scan over at most `items` items; each lane walks at most 30,000 of them.
+    /// Returns the number of lanes of a sort or scan over at most `items` items; each lane processes at most 30,000
+    /// items.
     pub fn lanes(&self, items: u64) -> u32 {
         let groups = items.div_ceil(u64::from(self.subgroup) * 30_000) as u32;
         groups.next_multiple_of(2).max(self.lane_groups) * self.subgroup
@@ -348,7 +353,7 @@ impl KernelShape {
     }
 }
 
-/// Returns whether a variable of developers names the second of two forms; `None` if it names neither.
+/// Returns whether a developer's environment variable names the second of two forms; `None` if it names neither.
 fn chosen(variable: &str, [first, second]: [&str; 2]) -> Option<bool> {
     let name = lab::var(variable)?;
     (name == first || name == second).then_some(name == second)

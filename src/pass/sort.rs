@@ -12,12 +12,12 @@ pub struct SortBuffers {
     pub keys: [Buf; 2],
     /// Values.
     pub values: [Buf; 2],
-    /// Keys have 16 bits, not 32; in sorts that look back alone.
+    /// True for 16-bit instead of 32-bit keys; only in look-back sorts.
     pub narrow: bool,
 }
 
 impl SortBuffers {
-    /// Keys and values after a sort by `bits` bits.
+    /// Returns the buffers with keys and values after a sort by `bits` bits.
     pub fn sorted(self, shape: &KernelShape, bits: u32) -> (Buf, Buf) {
         let last = (passes(shape, bits) % 2) as usize;
         (self.keys[last], self.values[last])
@@ -37,8 +37,8 @@ fn passes(shape: &KernelShape, bits: u32) -> u32 {
 }
 
 /// Sorts by the low `bits` bits. With `identity`, the values are the positions of the keys before the sort. `by` is
-/// appended to the pass titles. Returns the buffers with the sorted keys and values. Where the shape's passes look back, the
-/// pass that writes the keys has counted their digits (glsl/include/digit_counts.glsl).
+/// appended to the pass titles. Returns the buffers with the sorted keys and values. In look-back sorts, the pass that
+/// writes the keys must count their digits (glsl/include/digit_counts.glsl).
 pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: &str, identity: bool) -> (Buf, Buf) {
     let (first, around) = (b.list.work.len(), std::mem::replace(&mut b.list.stage, Stage::SORT));
     let lanes = b.capacity.sort_lanes as u32;

@@ -1,4 +1,4 @@
-//! Looks for numbers of a training's state that are not finite.
+//! Searches a training's state for values that are not finite.
 
 use super::build::Builder;
 use crate::pass::buffers::TABLE;
@@ -6,7 +6,7 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Domain, Grid, Stage};
 use crate::shaders::constants::{FINITE_GROUPS, NO_ROW};
 
-/// Writes the first row of each plane of floats that has a NaN or infinity, in the order of the planes.
+/// Writes the first row with a NaN or infinity of each float plane, in plane order.
 pub(super) fn find_nonfinite(b: &mut Builder, planes: &[Buf]) {
     b.list.stage = Stage::OPTIMISE;
     b.list.fill(Buf::NONFINITE_ROWS, NO_ROW);

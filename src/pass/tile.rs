@@ -10,7 +10,7 @@ use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 use crate::shaders::constants;
 
-/// The sort of the (splat, tile) pairs of a list of passes.
+/// The sort of the (splat, tile) pairs in a pass list.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileSort {
     /// Bits of the keys.
@@ -20,8 +20,8 @@ pub(crate) struct TileSort {
 }
 
 impl TileSort {
-    /// Sorts by the tiles of the scene, and those of object layers if the list has these. Without sweeps, digits for the
-    /// layers are there in any case.
+    /// Makes the sort for the scene's tiles, and for object layers if the list has them. Without look-back passes, the
+    /// keys always include the layer digits.
     pub(crate) fn new(shape: &KernelShape, capacity: &Capacity, layers: bool) -> Self {
         let tiles = if layers || !shape.sweeps() { capacity.virtual_tiles } else { capacity.tiles() };
         let buffers = SortBuffers {

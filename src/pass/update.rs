@@ -1,5 +1,5 @@
-//! The update of a step in one kernel, of the Gaussians that the step touched. All others are late: they catch up at once when
-//! something touches or reads them.
+//! Updates the Gaussians that a step touched in one kernel. All others miss the update, and catch up when something
+//! touches or reads them.
 
 use super::build::{Builder, over_gaussians};
 use super::shape::Update;
@@ -7,12 +7,12 @@ use super::{Extension, KernelShape};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Stage};
 
-/// Returns true if one kernel makes the update of a step, or its statistic alone: no extension takes part in it.
+/// Returns true if one kernel does a step's update, or only its statistic, because no extension interferes.
 pub(crate) fn is_fused(shape: &KernelShape, (extension, passes): (&dyn Extension, u32)) -> bool {
     shape.update != Update::Split && !extension.splits_update(passes) && extension.updates_unseen(passes)
 }
 
-/// Sums the gradient records of the trained Gaussians that the view shows, and with `changes` updates those with a gradient.
+/// Sums the gradient records of the visible trained Gaussians. With `changes`, it also updates those with a gradient.
 pub(super) fn update(b: &mut Builder, changes: bool) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::OPTIMISE;

@@ -1,4 +1,4 @@
-//! The files of a scene that is trained in blocks: `blocks.json` of all, and `block.json` of each.
+//! The files of a scene that is trained in blocks: `blocks.json` for all blocks, and `block.json` for each.
 
 use crate::error::{Error, Result};
 use crate::files::{atomic, read};
@@ -8,22 +8,22 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Name of the file of all blocks, in the folder of the blocks and in that of the merged model.
+/// File that lists all blocks, in the folder of the blocks and in the merged model's folder.
 pub(crate) const BLOCKS_FILE: &str = "blocks.json";
-/// Name of the file of a block, in its folder and in that of its training.
+/// File of a block, in the block's folder and in its run's folder.
 pub(crate) const BLOCK_FILE: &str = "block.json";
-/// Name of the model of what no block trains.
+/// Model of the Gaussians that no block trains.
 pub(crate) const REST_MODEL_FILE: &str = "rest.ply";
-/// Version of both layouts.
+/// Version of both file formats.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
-/// Sides of a box along the axes of all blocks; none is open.
+/// Bounds of a box along the ground axes; `None` is open.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bounds {
-    /// Smaller corner, world units.
+    /// Lower corner, world units.
     pub low: [Option<f64>; 3],
-    /// Larger corner, not part of the box.
+    /// Upper corner, exclusive, world units.
     pub high: [Option<f64>; 3],
 }
 
@@ -31,7 +31,7 @@ impl Bounds {
     /// The whole space.
     pub const ALL: Self = Self { low: [None; 3], high: [None; 3] };
 
-    /// Returns the box for some axes.
+    /// Returns the box in the world, given the ground axes.
     pub fn zone(&self, axes: [[f64; 3]; 3]) -> Zone {
         let corner = |sides: [Option<f64>; 3], open: f64| DVec3::from_array(sides.map(|side| side.unwrap_or(open)));
         let (low, high) = (corner(self.low, f64::NEG_INFINITY), corner(self.high, f64::INFINITY));
@@ -39,7 +39,7 @@ impl Bounds {
     }
 }
 
-/// A block as it is trained.
+/// A block, as training needs it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlockFile {
@@ -47,11 +47,11 @@ pub struct BlockFile {
     pub schema_version: u32,
     /// Name, such as `b007`.
     pub id: String,
-    /// CRC-32 of `blocks.json` that it belongs to.
+    /// CRC-32 of the `blocks.json` that it belongs to.
     pub blocks: u32,
     /// Axes of the boxes, unit vectors in the world.
     pub axes: [[f64; 3]; 3],
-    /// What the merged model takes from it.
+    /// Box of the Gaussians that the merged model takes from it.
     pub core: Bounds,
     /// Where Gaussians grow.
     pub zone: Bounds,
@@ -67,22 +67,22 @@ pub struct BlockFile {
     pub test_every: u32,
     /// CRC-32 of the poses of all these views.
     pub poses: u32,
-    /// Matrices of the colours of photos that stay as they are.
+    /// Fixed exposure matrices of the photos.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub exposures: BTreeMap<String, ColourMatrix>,
-    /// Seed of all random numbers.
+    /// Random seed.
     pub seed: u64,
     /// Number of steps.
     pub steps: u32,
     /// Gaussians at the end of growth, without the frozen ones.
     pub gaussians: u64,
-    /// Gaussians at the end of its first model that stay as they are.
+    /// Frozen Gaussians at the end of its first model.
     pub frozen: u32,
     /// Factors of the learning rates of positions and of scales.
     pub rate_factors: [f64; 2],
 }
 
-/// A block in the list of all.
+/// A block in the list of all blocks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlockRow {
@@ -90,7 +90,7 @@ pub struct BlockRow {
     pub id: String,
     /// False if too few photos see it: the merged model has the coarse Gaussians there.
     pub trained: bool,
-    /// What the merged model takes from it.
+    /// Box of the Gaussians that the merged model takes from it.
     pub core: Bounds,
     /// Where its Gaussians grow.
     pub zone: Bounds,
@@ -108,11 +108,11 @@ pub struct BlockRow {
     pub host_mib: u64,
     /// Number of steps.
     pub steps: u32,
-    /// Predicted time, minutes, at the pace of the coarse training; null if that has noted none.
+    /// Predicted time, minutes, at the pace of the coarse run; null if unknown.
     pub minutes: Option<f64>,
 }
 
-/// All blocks of a scene.
+/// The list of all blocks of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlocksFile {
@@ -126,9 +126,9 @@ pub struct BlocksFile {
     pub poses: u32,
     /// Axes of the boxes, unit vectors in the world; the third is up.
     pub axes: [[f64; 3]; 3],
-    /// Middle of the cameras, world position.
+    /// Mean camera position, world units.
     pub centre: [f64; 3],
-    /// Gaussians farther than this from there are coarse everywhere, world units.
+    /// Gaussians farther than this from the centre stay coarse, world units.
     pub far: f64,
     /// Extent of the scene, world units.
     pub extent: f64,
@@ -143,12 +143,12 @@ pub struct BlocksFile {
 }
 
 impl BlocksFile {
-    /// Reads the file in a folder, with the checksum by which blocks know it.
+    /// Reads the file in a folder. Also returns the checksum that blocks refer to it by.
     pub fn read(folder: &Path) -> Result<(Self, u32)> {
         let path = folder.join(BLOCKS_FILE);
         require(&path, folder, "blocks")?;
         let text = read::bytes(&path)?;
-        let file: Self = read::parse_json(&path, &text, "expected the file of all blocks; split the scene again")?;
+        let file: Self = read::parse_json(&path, &text, "expected the list of all blocks; split the scene again")?;
         check_version(&path, file.schema_version)?;
         Ok((file, crc32fast::hash(&text)))
     }
@@ -158,7 +158,7 @@ impl BlocksFile {
         serde_json::to_vec_pretty(self).map_err(|error| Error::Bug(format!("JSON: {error}")))
     }
 
-    /// Returns true for a place that is coarse everywhere.
+    /// Returns true for a position in the region that always stays coarse.
     pub fn is_far(&self, world: DVec3) -> bool {
         world.distance(DVec3::from_array(self.centre)) > self.far
     }
@@ -172,7 +172,7 @@ impl BlockFile {
         let file: Self = read::json(&path, "expected the file of a block; split the scene again")?;
         check_version(&path, file.schema_version)?;
         if file.views.is_empty() {
-            return Err(Error::data(&path, "views", "lists no view to train on; split the scene again"));
+            return Err(Error::data(&path, "views", "lists no training views; split the scene again"));
         }
         Ok(file)
     }
@@ -182,7 +182,7 @@ impl BlockFile {
         atomic::write_json(&folder.join(BLOCK_FILE), self)
     }
 
-    /// Returns the names of all its views.
+    /// Returns the names of all views.
     pub fn names(&self) -> BTreeSet<String> {
         self.views.iter().chain(&self.test).cloned().collect()
     }
@@ -193,7 +193,7 @@ impl BlockFile {
     }
 }
 
-/// Refuses a folder of something else.
+/// Refuses a folder of another kind.
 fn require(path: &Path, folder: &Path, what: &str) -> Result<()> {
     if path.is_file() {
         return Ok(());
@@ -210,7 +210,7 @@ fn check_version(path: &Path, found: u32) -> Result<()> {
     Err(Error::data(path, "schema_version", problem))
 }
 
-/// Returns the CRC-32 of poses, whatever the size of the photos.
+/// Returns the CRC-32 of poses, independent of photo sizes.
 pub(crate) fn poses_crc<'a>(cameras: impl Iterator<Item = &'a Camera>) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     for camera in cameras {

@@ -1,5 +1,4 @@
-//! The file format of checkpoints: named planes of 32-bit words, and JSON for everything else. A damaged file is
-//! refused.
+//! The checkpoint format: named planes of 32-bit words, and JSON for everything else. Damaged files are refused.
 //!
 //! | byte | content, little-endian |
 //! | --- | --- |
@@ -27,7 +26,7 @@ const HEADER_BYTES: usize = 24;
 #[cfg(target_endian = "big")]
 compile_error!("checkpoints have the words of planes as the machine has them, little-endian");
 
-/// A table of words with one name, such as the positions of all Gaussians.
+/// A named table of words, such as the positions of all Gaussians.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plane {
     /// Name, unique in its file.
@@ -89,18 +88,19 @@ impl Checkpoint {
         self.planes.iter().try_for_each(|plane| out.write_all(bytemuck::cast_slice(&plane.data)))
     }
 
-    /// Reads a file. A truncated, extended or changed file, or another version, is an error that says so. Memory use is
-    /// about the size of the file, whatever its content.
+    /// Reads a file. A truncated, extended or modified file, or another version, is an error that says so. Memory use
+    /// is about the size of the file, whatever its content.
     pub fn read(path: &Path) -> Result<Self> {
         let mut file = read::open(path)?;
         let length = file.get_ref().length().map_err(Error::read(path))?;
         check(&mut file, path, length)?;
         file.seek(SeekFrom::Start(HEADER_BYTES as u64)).map_err(Error::read(path))?;
-        // The checksum was right: an inconsistency from here on was written that way.
+        // The checksum is right, so the file was written with any inconsistency below.
         let odd = |problem: String| Error::data(path, "contents", problem);
         let mut rest = length - HEADER_BYTES as u64;
         let mut take = |bytes: u64| {
-            rest = rest.checked_sub(bytes).ok_or_else(|| odd(format!("{bytes} bytes are more than the file has")))?;
+            rest =
+                rest.checked_sub(bytes).ok_or_else(|| odd(format!("expected {bytes} more bytes than the file has")))?;
             Ok::<usize, Error>(bytes as usize)
         };
         let mut word = [0; 8];
@@ -150,16 +150,17 @@ fn check(file: &mut impl Read, path: &Path, length: u64) -> Result<()> {
     file.take(HEADER_BYTES as u64).read_to_end(&mut header).map_err(Error::read(path))?;
     let magic = &header[..header.len().min(MAGIC.len())];
     if !MAGIC.starts_with(magic) {
-        return refuse("is no checkpoint of labelgs".to_owned());
+        return refuse("is not a labelgs checkpoint".to_owned());
     }
     let Ok::<[u8; HEADER_BYTES], _>(header) = header.try_into() else {
-        return refuse(format!("was cut short: {length} bytes, a checkpoint has more than {HEADER_BYTES}"));
+        return refuse(format!("was cut short: it has {length} bytes, a checkpoint has more than {HEADER_BYTES}"));
     };
     let u32_at = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
     let version = u32_at(8);
     if version != VERSION {
         return refuse(format!(
-            "has version {version} of the format, labelgs {} reads version {VERSION}; go on with the labelgs that wrote it",
+            "has version {version} of the format, labelgs {} reads version {VERSION}; resume with the labelgs \
+            version that wrote it",
             env!("CARGO_PKG_VERSION")
         ));
     }
@@ -167,13 +168,13 @@ fn check(file: &mut impl Read, path: &Path, length: u64) -> Result<()> {
     let whole = body.saturating_add(HEADER_BYTES as u64);
     if length != whole {
         let what = if length < whole { "was cut short" } else { "grew" };
-        return refuse(format!("{what}: {length} bytes, {whole} were written"));
+        return refuse(format!("{what}: it has {length} bytes, but {whole} were written"));
     }
     let mut body = Body::default();
     io::copy(file, &mut body).map_err(Error::read(path))?;
     let (found, written) = (body.sum.finalize(), u32_at(12));
     if found != written {
-        return refuse(format!("was damaged after it was written: its checksum is {found:08x}, it was {written:08x}"));
+        return refuse(format!("is corrupt: its checksum is {found:08x}, expected {written:08x}"));
     }
     Ok(())
 }

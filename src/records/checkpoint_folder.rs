@@ -1,5 +1,5 @@
-//! The checkpoints of a run: `checkpoints/NUMBER-step-STEP.ckpt`. Numbers increase over all runs in a folder. So the
-//! newest file is known without a clock, also after a restart from step 1.
+//! The checkpoints of a run: `checkpoints/NUMBER-step-STEP.ckpt`. Numbers increase over all runs in a folder, so the
+//! newest file is known without a clock, even after a restart from step 1.
 
 use crate::error::{Error, Result};
 use crate::files::read;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const CHECKPOINTS_FOLDER: &str = "checkpoints";
 const CHECKPOINT_EXTENSION: &str = ".ckpt";
 
-/// A checkpoint, known by its file name only.
+/// A checkpoint file, described by its name only.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct CheckpointFile {
     /// Number in the file name; larger is newer.
@@ -43,7 +43,7 @@ pub fn next(out: &Path, step: u32) -> Result<PathBuf> {
     Ok(out.join(CHECKPOINTS_FOLDER).join(format!("{}-step-{step}{CHECKPOINT_EXTENSION}", newest.saturating_add(1))))
 }
 
-/// Removes all checkpoints except `kept`. Leftovers do no harm, so a failure is only logged.
+/// Removes all checkpoints except `kept`. Leftovers are harmless, so failures are only logged.
 pub fn keep(out: &Path, kept: &[PathBuf]) -> Result<()> {
     for found in list(out)?.into_iter().filter(|found| !kept.contains(&found.path)) {
         if let Err(error) = std::fs::remove_file(&found.path) {

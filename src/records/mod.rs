@@ -1,4 +1,4 @@
-//! What a training leaves for later ones: checkpoints, blocks, occluders, compiled pipelines.
+//! Files for later runs: checkpoints, blocks, occluders, compiled pipelines.
 
 pub mod block_file;
 pub mod checkpoint;

@@ -18,7 +18,7 @@ pub struct OcclusionTable {
     pub schema_version: u32,
     /// Source of the lists: `none`, `depth` or `rendered`.
     pub kind: String,
-    /// By name of the view and by object: the objects that hide a part of it, 0 for what has no label.
+    /// For each view (by name) and object: the objects that hide a part of it, 0 for unlabelled areas.
     pub views: BTreeMap<String, Occluders>,
 }
 
@@ -28,7 +28,7 @@ impl OcclusionTable {
         Self { schema_version: SCHEMA_VERSION, kind: kind.to_owned(), views }
     }
 
-    /// Reads a table and sorts its lists. Another version, 0 as an object and an object that hides itself are errors.
+    /// Reads a table and sorts its lists. Other versions, 0 as an object, and objects that hide themselves are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let expected = r#"expected {"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1]}}}"#;
         let mut table: Self = read::json(path, expected)?;
@@ -40,7 +40,7 @@ impl OcclusionTable {
             for (&label, hidden_by) in objects {
                 let place = || format!("view {name}, object {label}");
                 if label == 0 {
-                    return Err(Error::data(path, place(), "0 is no object; objects are from 1 to 65535"));
+                    return Err(Error::data(path, place(), "0 is not an object; objects have ids from 1 to 65535"));
                 }
                 if hidden_by.contains(&label) {
                     return Err(Error::data(path, place(), "hides itself"));

@@ -15,17 +15,17 @@ pub struct PipelineFolder {
 }
 
 impl PipelineFolder {
-    /// Uses a folder; saving creates it.
+    /// Uses a folder, which is created on the first save.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
     }
 
-    /// Uses the folder of the user's caches.
+    /// Uses the user's cache folder.
     pub fn for_user() -> Option<Self> {
         user_cache().map(Self::new)
     }
 
-    /// Returns the folder for locks of the user's processes: that of the caches, else the system's for temporary files.
+    /// Returns the folder for device locks: the user's cache folder, or else the system's temporary folder.
     pub fn locks_folder() -> PathBuf {
         Self::for_user().map_or_else(|| std::env::temp_dir().join("labelgs"), |cache| cache.folder)
     }
@@ -35,7 +35,8 @@ impl PipelineFolder {
     }
 }
 
-/// Returns the folder in `LABELGS_CACHE`, else the user's cache folder; none for `off` or without a cache folder.
+/// Returns the folder in `LABELGS_CACHE`, or else the user's cache folder; `None` for `off` or if there is no cache
+/// folder.
 pub(crate) fn user_cache() -> Option<PathBuf> {
     match std::env::var_os("LABELGS_CACHE").filter(|value| !value.is_empty()) {
         Some(value) if value == "off" => None,
@@ -52,7 +53,7 @@ impl PipelineStore for PipelineFolder {
         let path = self.path(device);
         let Ok(bytes) = read::bytes(&path) else { return Vec::new() };
         unpack(&bytes).map(<[u8]>::to_vec).unwrap_or_else(|| {
-            tracing::warn!("{} is damaged; pipelines are compiled and written again", path.display());
+            tracing::warn!("{} is corrupt; pipelines are compiled and saved again", path.display());
             Vec::new()
         })
     }
@@ -65,12 +66,14 @@ impl PipelineStore for PipelineFolder {
             file.write_all(data)
         });
         if let Err(error) = written {
-            tracing::warn!("compiled pipelines could not be saved, the next start compiles them again: {error}");
+            tracing::warn!(
+                "compiled pipelines could not be saved and will be compiled again at the next start: {error}"
+            );
         }
     }
 }
 
-/// Returns the data if it is undamaged: a driver may trust it without checks.
+/// Returns the data if it is intact: a driver may trust it without checks.
 fn unpack(bytes: &[u8]) -> Option<&[u8]> {
     let (header, data) = bytes.split_at_checked(HEADER_BYTES)?;
     let (magic, rest) = header.split_at(MAGIC.len());

@@ -4,10 +4,10 @@ use super::Rules;
 use super::splat::{Splat, SplatGradient};
 use super::tile::exponent;
 
-/// Distances of decisions to their opposite.
+/// Margins: distances of decisions to their opposite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
-    /// Distance of the exponent to the smallest that counts, log2 units.
+    /// Distance of the exponent to the smallest exponent that counts, log2 units.
     pub cut: f64,
     /// Distance of the remaining transmittance to the stop threshold, relative.
     pub stop: f64,
@@ -77,7 +77,7 @@ pub fn reach(rules: &Rules, splat: &Splat) -> Option<[f64; 2]> {
     (level > -0.1).then(|| [c, a].map(|other| (level.max(0.0) * other / det).sqrt()))
 }
 
-/// Splats with their boxes, one pixel wider than exact, so that margins near the border are included.
+/// Splats with their bounding boxes, one pixel wider than exact, so that margins near the border are included.
 struct BoxedSplats<'a> {
     splats: &'a [Splat],
     reaches: Vec<[f64; 2]>,
@@ -132,11 +132,11 @@ pub struct Pixel {
     pub transmittance: f64,
     /// Sum of alpha T z, world units, not normalised.
     pub depth: f64,
-    /// Gaussian with the largest weight, the nearer of equals; -1 without any.
+    /// Gaussian with the largest weight, ties to the nearer; -1 if there is none.
     pub main: i32,
     /// Largest weight.
     pub main_weight: f64,
-    /// 1 + index of the last blended splat in the list; 0 without any.
+    /// 1 + index of the last blended splat in the list; 0 if there is none.
     pub last: usize,
     /// Number of blended splats.
     pub count: usize,
@@ -306,9 +306,9 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Adds one ray's share. With C = sum w_i c_i + T b: dC/d alpha_i = T_i c_i - (everything behind i) / (1 - alpha_i).
-/// `v_transmittance` is the gradient with respect to the final transmittance: b times that of the colour, minus that of
-/// the opacity.
+/// Adds one ray's contribution. With C = sum w_i c_i + T b: dC/d alpha_i = T_i c_i - (everything behind i) / (1 -
+/// alpha_i). `v_transmittance` is the gradient with respect to the final transmittance: b times that of the colour,
+/// minus that of the opacity.
 fn ray_backward(
     splats: &[Splat],
     ray: &Trace,
@@ -341,8 +341,8 @@ fn ray_backward(
     }
 }
 
-/// The scene and its objects: layer 0 blends every splat over `background`, layer 1 + j only the splats of `slots[j]` over
-/// black, each layer with its own transmittance.
+/// The scene and its objects: layer 0 blends every splat over `background`, layer 1 + j only the splats of `slots[j]`
+/// over black, each layer with its own transmittance.
 pub fn blend_layers_forward(
     rules: &Rules,
     splats: &[Splat],

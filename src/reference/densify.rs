@@ -21,12 +21,12 @@ pub struct Population {
     pub gradient_sum: Vec<f64>,
     /// Number of views that saw the Gaussian, `[N]`.
     pub gradient_count: Vec<f64>,
-    /// Number of rows at the end that stay as they are; their moments and statistics mean nothing.
+    /// Number of frozen rows at the end; their moments and statistics are meaningless.
     pub frozen: usize,
 }
 
 impl Population {
-    /// Returns true for a row that stays as it is.
+    /// Returns true for a frozen row.
     pub fn is_frozen(&self, index: usize) -> bool {
         index + self.frozen >= self.model.rows.len()
     }
@@ -82,8 +82,8 @@ pub fn split_long_child(rules: &Rules, parent: &Row, child: u32) -> Row {
     Row { mean: mean.into(), scale, opacity: (opacity / (1.0 - opacity)).ln(), ..*parent }
 }
 
-/// Returns true if a Gaussian fogs a camera or one on the way to `other`, where the near plane is that of the pair, and
-/// the distance of this decision.
+/// Returns true if a Gaussian fogs the camera, or a camera on the way to `other`, given as centre and near plane. Also
+/// returns the decision's margin.
 pub fn is_near(rules: &Rules, camera: &Camera, other: Option<(DVec3, f64)>, row: &Row) -> (bool, f64) {
     let mean = DVec3::from(row.mean);
     let place = camera.to_camera(mean);
@@ -97,8 +97,8 @@ pub fn is_near(rules: &Rules, camera: &Camera, other: Option<(DVec3, f64)>, row:
     (slacks.iter().flatten().any(|&slack| slack >= 0.0), margin)
 }
 
-/// How much of the way from the first to the last place, in camera space, is before the near plane and inside the image
-/// with its margin. Negative: by how much it is outside.
+/// Returns how much of the path between two positions, in camera space, is before the near plane and inside the image
+/// plus margin. Negative values say how far outside the path is.
 fn before(rules: &Rules, camera: &Camera, places: [DVec3; 2], near: f64) -> f64 {
     let limits = |focal: f64, centre: f64, side: u32| {
         let (side, spare) = (f64::from(side), rules.jacobian_margin * 0.5 * f64::from(side));
@@ -190,7 +190,7 @@ pub fn absolute_gradient2d(
 ) -> Vec<f64> {
     let mut sums = vec![[0.0; 2]; splats.len()];
     for corner in (0..size.1).step_by(tile.1).flat_map(|y| (0..size.0).step_by(tile.0).map(move |x| (x, y))) {
-        // The gradient is linear in that of the image: that of a tile has zeros elsewhere.
+        // The gradient is linear in the image gradient, which is zero outside of the tile.
         let inside = |index: usize| {
             let (x, y) = (index % size.0, index / size.0);
             (corner.0..corner.0 + tile.0).contains(&x) && (corner.1..corner.1 + tile.1).contains(&y)

@@ -1,4 +1,4 @@
-//! The weight of wrong labels in the scene's own picture, and its gradient by opacity.
+//! The weight of wrong labels in the scene's picture, and its gradient by opacity.
 
 use super::Rules;
 use super::blend::{Trace, centre, trace};
@@ -16,7 +16,7 @@ pub struct Disagreement {
 }
 
 /// Sums E(v) = sum_i w_i [label of i is not L] + T [L is not 0] over the pixels v with a label L and its weight;
-/// pixels with none are left out. `labels` is by Gaussian, `pixels` is `[height, width]`.
+/// unlabelled pixels are left out. `labels` is by Gaussian, `pixels` is `[height, width]`.
 pub fn disagreement(
     rules: &Rules,
     splats: &[Splat],
@@ -33,8 +33,8 @@ pub fn disagreement(
     })
 }
 
-/// Sums E(v) = sum_i w_i min(|z_i / z - 1|, 1) + T over the pixels v with a known depth z. `inverse` has 1 / z, or 0 where it
-/// is not known, `[height, width]`; `weight` is that of a pixel.
+/// Sums E(v) = sum_i w_i min(|z_i / z - 1|, 1) + T over the pixels v with a known depth z. `inverse` has 1 / z, or 0 if
+/// unknown, `[height, width]`; `weight` is the weight of a pixel.
 pub fn depth_error(
     rules: &Rules,
     splats: &[Splat],
@@ -51,7 +51,7 @@ pub fn depth_error(
     })
 }
 
-/// Sums over all pixels of a picture what `add` adds for the ray of each.
+/// Sums what `add` returns for the ray of each pixel of a picture.
 fn summed(
     rules: &Rules,
     splats: &[Splat],

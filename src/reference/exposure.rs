@@ -3,7 +3,7 @@
 /// The rows of a photo: ln of the gains, two of shares.
 pub type ExposureRows = [[f64; 3]; 3];
 
-/// Limit of what a channel takes of another one.
+/// Largest share that a channel takes from another one.
 const CHANNEL_SHARE_MAX: f64 = 0.24;
 
 /// Returns gains and shares of a channel.
@@ -11,7 +11,7 @@ fn channel_exposure(rows: &ExposureRows, k: usize) -> (f64, [f64; 2]) {
     (rows[0][k].exp(), [rows[1][k], rows[2][k]].map(|x| x / (1.0 + x.abs() / CHANNEL_SHARE_MAX)))
 }
 
-/// Gives a picture the exposure of its photo.
+/// Applies the photo's exposure to a picture.
 pub fn exposed(image: &[[f64; 3]], rows: &ExposureRows) -> Vec<[f64; 3]> {
     let pixel = |c: &[f64; 3]| {
         [0, 1, 2].map(|k| {
@@ -22,8 +22,8 @@ pub fn exposed(image: &[[f64; 3]], rows: &ExposureRows) -> Vec<[f64; 3]> {
     image.iter().map(pixel).collect()
 }
 
-/// Gradients with respect to picture and rows. `v` is that with respect to the exposed picture, `photo` the photo: a
-/// channel above 1 where the photo is saturated does not count. `prior` pulls the mean over all photos, `mean`, to 0.
+/// Gradients with respect to picture and rows. `v` is the gradient of the exposed picture. Channels above 1 do not
+/// count where `photo` is saturated. `prior` pulls the mean over all photos, `mean`, to 0.
 pub fn backward(
     image: &[[f64; 3]],
     rows: &ExposureRows,

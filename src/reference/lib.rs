@@ -1,8 +1,8 @@
 //! The method in f64, written from its equations: one function per pass, with the name of the pass.
 //!
-//! The code does not imitate the kernels. The rules (all constants) are an argument, so that a mutant can change one.
-//! Every function with decisions also returns a *margin*: the distance of the nearest decision to its opposite, as a
-//! fraction of the threshold (for the exponent of alpha: an absolute distance in units of log2).
+//! The code does not imitate the kernels. The rules (all constants) are an argument, so that mutation tests can change
+//! one. Every function with decisions also returns a *margin*: the distance of the nearest decision to its opposite, as
+//! a fraction of the threshold (for the exponent of alpha: an absolute distance in units of log2).
 
 pub mod adam;
 pub mod blend;

@@ -1,4 +1,4 @@
-//! Labels from masks: main Gaussian labelling and the Gaussian projection filter. And back: the label map of a view.
+//! Labels from masks: main Gaussian labelling and the Gaussian projection filter. Also the label map of a view.
 
 use super::Rules;
 use super::blend::{BlendedImage, centre, trace};
@@ -107,9 +107,9 @@ pub fn vote(
 /// Label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLabel {
-    /// Label with the largest sum of blending weights, the smaller of equals; 0 without any.
+    /// Label with the largest sum of blending weights, ties to the smaller; 0 if there is none.
     pub label: u32,
-    /// That sum.
+    /// Sum of blending weights of the label.
     pub weight: f64,
     /// Number of labels with a weight.
     pub labels: usize,
@@ -143,8 +143,7 @@ pub fn label_map(rules: &Rules, splats: &[Splat], labels: &[u32], size: (usize, 
     (0..size.0 * size.1).map(pixel).collect()
 }
 
-/// Votes of one view as if nothing were in front of a Gaussian, `[N, columns]`, px: sums of alpha over the pixels of each
-/// column.
+/// Votes of one view without occlusion, `[N, columns]`, px: sums of alpha over the pixels of each column.
 pub fn vote_alone(
     rules: &Rules,
     splats: &[Splat],

@@ -198,7 +198,7 @@ pub struct ObjectPixel {
     pub weight: f64,
 }
 
-/// |U_k (R_k - M_k I)|, and what |U_k (alpha_k - M_k)| is beyond a slack with its weight, over the valid pixels, times the
+/// |U_k (R_k - M_k I)|, plus the weighted excess of |U_k (alpha_k - M_k)| over a slack, over the valid pixels, times the
 /// label weight.
 /// `picture` is R_k over black and alpha_k.
 pub fn label_loss(

@@ -1,25 +1,25 @@
-//! Both moments of Adam of a parameter in one word: their ratio, and the logarithm of the root of the second one.
+//! Packs both Adam moments of a parameter into one word: their ratio, and the logarithm of the second moment's root.
 
 use super::Rules;
 use super::random::hash;
 
-/// First of the numbers that moments draw of those of an element.
+/// First random draw of an element that is used for moments.
 const FIRST_DRAW: u32 = 64;
-/// Parts of an element, each a parameter.
+/// Parts per element; each is a parameter.
 const ELEMENT_PARTS: u32 = 4;
 
-/// What is drawn for a parameter: part `part` of an element of a plane.
+/// Returns the random draw for a parameter: part `part` of an element of a plane.
 pub fn draw(seed: u32, element: u32, plane: u32, part: u32) -> u32 {
     hash(seed, element, FIRST_DRAW + ELEMENT_PARTS * plane + part)
 }
 
-/// Rounds to a whole number below or above, to the latter with a probability of what is above the former. `draw` has 16 bits.
+/// Rounds stochastically to an integer: up with a probability equal to the fractional part. `draw` has 16 bits.
 pub fn round_at_random(x: f64, draw: u32) -> f64 {
     let share = (f64::from(draw) + 0.5) / 65_536.0;
     x.floor() + if x - x.floor() > share { 1.0 } else { 0.0 }
 }
 
-/// The root of the second moment of a word.
+/// Returns the root of a word's second moment.
 fn root(rules: &Rules, word: u32) -> f64 {
     match word & 0xffff {
         0 => 0.0,
@@ -27,7 +27,7 @@ fn root(rules: &Rules, word: u32) -> f64 {
     }
 }
 
-/// Returns the word of a first and a second moment.
+/// Packs a first and a second moment into a word.
 pub fn pack(rules: &Rules, (m, v): (f64, f64), draw: u32) -> u32 {
     if v < f64::from(f32::MIN_POSITIVE) {
         return 0;
@@ -38,7 +38,7 @@ pub fn pack(rules: &Rules, (m, v): (f64, f64), draw: u32) -> u32 {
     u32::from(ratio as i16 as u16) << 16 | code
 }
 
-/// Returns the first and the second moment of a word.
+/// Unpacks a word into first and second moment.
 pub fn unpack(rules: &Rules, word: u32) -> (f64, f64) {
     let root = root(rules, word);
     (f64::from((word >> 16) as u16 as i16) / rules.moment_ratio * root, root * root)

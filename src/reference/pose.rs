@@ -1,19 +1,19 @@
-//! Pose of a photo: the camera that two rows of the photo correct, and the gradient of the rows.
+//! Pose correction of a photo by two trained rows, and the gradient of these rows.
 
 use super::{Model, Row, Rules, sh};
 use glam::DVec3;
 use labelgs_scene::Camera;
 
-/// The rows of a photo: six trained numbers in two rows, whose fourth numbers are 1 once the pose is settled, and the unit of
-/// the move; and the six rows of the preconditioner, in two rows each.
+/// The rows of a photo: two rows of three trained numbers, whose fourth components are 1 once the pose is settled, and
+/// the unit of translation; then the six rows of the preconditioner, in two rows each.
 pub type PoseRows = [[f64; 4]; 14];
 
 fn three([x, y, z, _]: [f64; 4]) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// The turn (Rodrigues vector in camera space) and the move (camera space, in its unit): the preconditioner times the
-/// numbers.
+/// Rotation (Rodrigues vector in camera space) and translation (camera space, in its unit): the preconditioner times
+/// the trained numbers.
 fn correction(rows: &PoseRows) -> (DVec3, DVec3) {
     let of = |k: usize| three(rows[2 * k + 2]).dot(three(rows[0])) + three(rows[2 * k + 3]).dot(three(rows[1]));
     (DVec3::new(of(0), of(1), of(2)), DVec3::new(of(3), of(4), of(5)))
@@ -25,8 +25,8 @@ pub fn corrected(camera: &Camera, rows: &PoseRows) -> Camera {
     camera.corrected(turn, camera.rotation.transpose() * (rows[1][3] * shift))
 }
 
-/// Gradient of the trained numbers. `camera` is the camera before the correction; `v_rows` are the gradients of the Gaussians with the
-/// corrected one; `prior` pulls turn and move to 0.
+/// Gradient of the trained numbers. `camera` is the uncorrected camera; `v_rows` are the Gaussians' gradients with the
+/// corrected camera; `prior` pulls rotation and translation to 0.
 pub fn backward(
     rules: &Rules,
     camera: &Camera,
@@ -41,11 +41,11 @@ pub fn backward(
         let (mean, centre) = (DVec3::from(row.mean), posed.centre());
         let v_colour = v.sh[0].map(|of_constant| of_constant / rules.sh_c0);
         let (_, of_direction) = sh::sh_backward(rules, model.sh_degree, &row.sh, (mean, centre), v_colour);
-        // A move of the camera is a move of all Gaussians the other way.
+        // Moving the camera is moving all Gaussians the other way.
         force += DVec3::from(v.mean);
-        // A turn around its centre changes no direction of view in the world.
+        // A rotation around its centre changes no view direction in the world.
         torque += (mean - centre).cross(DVec3::from(v.mean) - of_direction);
-        // dq = (0, d / 2) q for a small turn d in world space.
+        // dq = (0, d / 2) q for a small rotation d in world space.
         let ([w, x, y, z], [vw, vx, vy, vz]) = (row.quat, v.quat);
         let (q, v_q) = (DVec3::new(x, y, z), DVec3::new(vx, vy, vz));
         torque += 0.5 * (w * v_q - vw * q + q.cross(v_q));

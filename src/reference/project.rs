@@ -151,7 +151,8 @@ pub fn project_forward(rules: &Rules, camera: &Camera, model: &Model, gaussian: 
     })
 }
 
-/// True if the Gaussian counts somewhere between the outermost pixel centres. A kernel may keep more, never fewer.
+/// True if the Gaussian counts somewhere between the outermost pixel centres. A kernel may keep more Gaussians, never
+/// fewer.
 pub fn cull(rules: &Rules, camera: &Camera, model: &Model, gaussian: usize) -> bool {
     let size = (camera.width as usize, camera.height as usize);
     project_forward(rules, camera, model, gaussian)

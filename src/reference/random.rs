@@ -1,4 +1,4 @@
-//! Random numbers of densification and of packed moments; they depend only on the seed, the Gaussian and the index of the draw.
+//! Random numbers for densification and packed moments; they depend only on seed, Gaussian and draw index.
 
 fn pcg_hash(v: u32) -> u32 {
     let state = v.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -11,7 +11,7 @@ pub fn hash(seed: u32, index: u32, draw: u32) -> u32 {
     pcg_hash(pcg_hash(pcg_hash(seed).wrapping_add(index)).wrapping_add(draw))
 }
 
-/// A number in 0 to 1, both excluded.
+/// A number between 0 and 1, exclusive.
 pub fn uniform_draw(seed: u32, index: u32, draw: u32) -> f64 {
     (f64::from(hash(seed, index, draw) >> 8) + 0.5) / 16_777_216.0
 }

@@ -55,7 +55,7 @@ pub fn relocate(rules: &Rules, before: &Population, draws: u32, phase: f64) -> D
     let weights = weights(rules, before);
     let counts = copies(rules, &weights.iter().map(|&(weight, _)| weight).collect::<Vec<_>>(), draws, phase);
     let count_of = |(index, (row, (count, margin))): (usize, (&Row, (u32, f64)))| {
-        // Draws where nothing grows are void.
+        // Draws outside of the growth box are ignored.
         let grows = rules.grows_at(row.mean) && !before.is_frozen(index);
         (if grows { count } else { count.min(1) }, margin)
     };
@@ -98,7 +98,7 @@ pub fn regularised(row: &Row, [opacity_weight, scale_weight]: [f64; 2]) -> (f64,
 mod tests {
     use super::*;
 
-    /// The light that rows at one place take: the integral of 1 - (1 - alpha)^count over the picture.
+    /// The light that coincident rows absorb: the integral of 1 - (1 - alpha)^count over the picture.
     fn light(row: &Row, count: i32) -> f64 {
         let (deviation, opacity) = (row.scale[0].exp(), sigmoid(row.opacity));
         let step = 1e-3;

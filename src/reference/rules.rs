@@ -1,7 +1,7 @@
 //! All constants of the method: the engine's f32 values, widened to f64.
 //!
-//! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; a test of the engine
-//! compares the two (`tests/verify/constants.rs`).
+//! This is an independent copy, so that an error in the shaders' constants does not enter the mirrors; a test of the
+//! engine compares the two (`tests/verify/constants.rs`).
 
 use glam::DVec3;
 use labelgs_scene::Zone;
@@ -36,11 +36,11 @@ rules! {
     near: f64 = wide(0.2),
     /// Added to the diagonal of the 2-D covariance, px^2.
     dilation: f64 = wide(0.3),
-    /// Opacity pays for the dilation, so that the light of a splat stays the same.
+    /// Reduces opacity to compensate for the dilation, so that a splat's light stays the same.
     antialiased: bool = false,
-    /// Least standard deviation of a smooth Gaussian, pixels of its nearest view.
+    /// Smallest standard deviation of a smooth Gaussian, in pixels of its nearest view.
     finest: f64 = 0.2_f64.sqrt(),
-    /// Share of its size to which a view counts beyond its borders for that.
+    /// Margin around the image within which a view counts for that, as a share of the image size.
     smooth_margin: f64 = wide(0.15),
     /// Limit of x/z and y/z in the Jacobian beyond the image, in units of tan(fov/2).
     jacobian_margin: f64 = wide(0.3),
@@ -69,7 +69,7 @@ rules! {
     label_weight: f64 = 1.0,
     /// Weight of the alpha term within the label loss.
     label_alpha: f64 = 0.1,
-    /// What the opacity of an object alone may be off without a loss.
+    /// Opacity error of an object rendered alone that causes no loss.
     alpha_slack: f64 = 0.5,
     /// Standard deviation of the SSIM window, px.
     ssim_sigma: f64 = 1.5,
@@ -86,11 +86,11 @@ rules! {
     adam_beta2: f64 = 0.999,
     /// Added to Adam's denominator.
     adam_eps: f64 = wide(1e-15),
-    /// Steps of packed moments: of m / sqrt(v),
+    /// Quantisation steps of packed moments: per unit of m / sqrt(v),
     moment_ratio: f64 = 4096.0,
-    /// of an octave of sqrt(v),
+    /// per octave of sqrt(v),
     moment_log: f64 = 1024.0,
-    /// and octaves of it below 1.
+    /// and octaves of sqrt(v) below 1.
     moment_floor: f64 = 50.0,
     /// Mean 2-D gradient (NDC units) at which a Gaussian is cloned or split.
     densify_gradient: f64 = wide(2e-4),
@@ -110,9 +110,9 @@ rules! {
     split_others: f64 = 0.85,
     /// Factor of the opacity.
     split_opacity: f64 = wide(0.6),
-    /// Number of views with which a Gaussian counts as marked for removal.
+    /// View count that marks a Gaussian for removal.
     stat_near: f64 = 1e9,
-    /// Largest standard deviation in distances from a camera; larger Gaussians are marked.
+    /// Largest standard deviation relative to the distance from a camera; larger Gaussians are marked.
     free_size: f64 = 0.5,
     /// Gaussians below this opacity are removed.
     prune_opacity: f64 = wide(0.005),
@@ -124,13 +124,13 @@ rules! {
     relocate_one: f64 = 255.0,
     /// Most copies of a Gaussian in a stack.
     relocate_most: u32 = 51,
-    /// Steepness in opacity at which Gaussians stop to move at random.
+    /// Steepness in opacity at which Gaussians stop moving at random.
     noise_steep: f64 = 100.0,
-    /// The opacity at which they do.
+    /// Opacity at which Gaussians stop moving at random.
     noise_opacity: f64 = wide(0.005),
     /// Ceiling of an opacity reset.
     reset_opacity: f64 = wide(0.01),
-    /// Minimum weight at which a main Gaussian takes the label of its pixel.
+    /// Minimum weight for a main Gaussian to take its pixel's label.
     lift_threshold: f64 = wide(0.6),
     /// The label of a pixel has the largest sum of weights; otherwise it is that of the main Gaussian.
     label_sums: bool = true,

@@ -1,11 +1,12 @@
-//! The least size of Gaussians that photos can show.
+//! The smallest Gaussian size that photos can resolve.
 
 use super::{Row, Rules};
 use glam::DVec3;
 use labelgs_scene::Camera;
 
-/// Returns the row with its least size, given the limit of the views before, 0 if there is none; the limit after this
-/// view, whose photo has `focal` px at full size; and the distance of the nearest decision, relative to the view.
+/// Returns the row limited to its smallest size, given the limit from earlier views (0 if none); the limit after this
+/// view, whose photo has `focal` px focal length at full size; and the margin of the nearest decision, relative to the
+/// view.
 pub fn smooth(rules: &Rules, camera: &Camera, focal: f64, row: &Row, before: f64) -> (Row, f64, f64) {
     let at = camera.to_camera(DVec3::from(row.mean));
     let pixel = camera.project(at);

@@ -1,5 +1,5 @@
-//! Tiles in which a splat counts: by testing every pixel, by a continuous test over the tile's pixel centres, and in closed form
-//! for a row of tiles.
+//! Tiles in which a splat counts: by testing every pixel, by a continuous test over the tile's pixel centres, and in
+//! closed form for a row of tiles.
 
 use super::Rules;
 use super::splat::Splat;
@@ -106,8 +106,8 @@ pub fn touched_tiles(rules: &Rules, splat: &Splat, grid: &TileGrid) -> (Vec<u32>
     (tiles, margin)
 }
 
-/// Columns of tiles `[start, end)` with a column of pixel centres that the splat's ellipse reaches within a row of tiles, between
-/// its first and last row of pixel centres; in closed form.
+/// Columns of tiles `[start, end)` with a column of pixel centres that the splat's ellipse reaches within a row of
+/// tiles, between its first and last row of pixel centres; in closed form.
 pub fn row_interval(rules: &Rules, splat: &Splat, grid: &TileGrid, row: usize) -> (usize, usize) {
     // A dx^2 + 2 B dx dy + C dy^2 <= size is A (dx + B dy / A)^2 + (C - B^2 / A) dy^2 <= size.
     let [a, b, c] = splat.conic;

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::scene::{Camera, LABEL_MAX, LabelMap, UNLABELLED};
 use crate::shaders::structs::StepUniforms;
 
-/// Default near plane, of 3DGS, world units.
+/// Default near plane, world units (3DGS).
 pub const NEAR_DEFAULT: f32 = crate::shaders::constants::NEAR;
 
 /// Alpha below which a pixel shows no surface.
@@ -56,11 +56,11 @@ pub struct RenderOptions {
     pub sh_degree: Option<u32>,
     /// Parts to read back.
     pub parts: Parts,
-    /// Pixels that are more clear than opaque have no label: around objects that were trained alone there is nothing else.
+    /// Pixels with an opacity below one half have no label, for objects that were trained alone.
     pub clear_labels: bool,
 }
 
-/// Opacity below which a pixel counts as clear.
+/// Opacity below which a pixel is clear.
 const CLEAR_OPACITY_MAX: f32 = 0.5;
 
 impl Default for RenderOptions {
@@ -80,7 +80,7 @@ impl RenderOptions {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::MAIN) }
     }
 
-    /// Makes options for depth only, which needs no colours either.
+    /// Makes options for depth only, also at degree 0.
     pub fn for_depth(near: f32) -> Self {
         Self { sh_degree: Some(0), ..Self::new(near, Parts::DEPTH) }
     }
@@ -99,24 +99,24 @@ pub struct Render {
     pub alpha: Vec<f32>,
     /// Weighted sum of camera-space z, not normalised, world units, `[H, W]`.
     pub depth: Vec<f32>,
-    /// Row of the Gaussian with the largest blending weight, -1 without any, `[H, W]`.
+    /// Row of the Gaussian with the largest blending weight, -1 if there is none, `[H, W]`.
     pub top_id: Vec<i32>,
     /// Blending weight of that Gaussian, `[H, W]`.
     pub top_weight: Vec<f32>,
-    /// Label with the largest sum of blending weights, the smaller of equals; 0 is a label like others, and that of
-    /// pixels without a Gaussian, `[H, W]`.
+    /// Label with the largest sum of blending weights, `[H, W]`; ties go to the smaller. 0 competes like other labels,
+    /// and is the label of pixels without a Gaussian.
     pub labels: Vec<u32>,
 }
 
 impl Render {
-    /// Returns the label of each pixel: of all labels, the one with the largest sum of blending weights. Returns an error
+    /// Returns the label of each pixel: the one with the largest sum of blending weights. Returns an error
     /// without [`Parts::labels`], or for a label above [`LABEL_MAX`].
     pub fn label_map(&self) -> Result<LabelMap> {
         self.check_part(self.labels.len(), "labels")?;
         as_mask((self.width, self.height), self.labels.iter().copied())
     }
 
-    /// Returns the label of the main Gaussian of each pixel (LabelGS, inference), 0 without any. `labels` has one label
+    /// Returns the label of each pixel's main Gaussian (LabelGS, inference), 0 if there is none. `labels` has one label
     /// per Gaussian. Returns an error without [`Parts::main`], or for a label above [`LABEL_MAX`].
     pub fn main_label_map(&self, labels: &[u32]) -> Result<LabelMap> {
         self.check_part(self.top_id.len(), "main Gaussians")?;
@@ -131,13 +131,13 @@ impl Render {
         Ok((0..self.depth.len()).map(|pixel| self.depth_at(pixel).unwrap_or(0.0)).collect())
     }
 
-    /// Returns the depth of the surface at a pixel of a picture with [`Parts::depth`], world units; `None` where alpha is below one
-    /// half.
+    /// Returns the depth of the surface at a pixel of a picture with [`Parts::depth`], world units; `None` where alpha
+    /// is below one half.
     pub(crate) fn depth_at(&self, pixel: usize) -> Option<f32> {
         (self.alpha[pixel] >= SURFACE_ALPHA_MIN).then(|| self.depth[pixel] / self.alpha[pixel])
     }
 
-    /// Returns the picture below another one of the same width, if there is one.
+    /// Appends this picture below another one of the same width, if there is one.
     fn below(self, above: Option<Self>) -> Self {
         let Some(mut whole) = above else { return self };
         whole.height += self.height;
@@ -208,8 +208,8 @@ fn as_mask((width, height): (u32, u32), labels: impl Iterator<Item = u32>) -> Re
     let id = |label| {
         let problem = || {
             format!(
-                "the picture shows label {label}, and masks, with which it is compared, have ids up to {LABEL_MAX}; give the \
-                 label a smaller id, or choose labels by id or name"
+                "the picture shows label {label}, but masks have ids up to {LABEL_MAX}; give the label a smaller id, \
+                 or choose labels by id or name"
             )
         };
         u16::try_from(label).map_err(|_| Error::usage("labels", problem()))
@@ -217,8 +217,8 @@ fn as_mask((width, height): (u32, u32), labels: impl Iterator<Item = u32>) -> Re
     Ok(LabelMap { width, height, ids: labels.map(id).collect::<Result<_>>()? })
 }
 
-/// Renders the label of each pixel of the model in the engine, without a picture, which takes about half the time. Fails if
-/// one is above [`LABEL_MAX`]. The engine has the labels of [`Engine::upload_model`] or [`Engine::set_labels`]; without any, all are 0.
+/// Renders the label map of the engine's model without a picture, in about half the time. Fails for labels above
+/// [`LABEL_MAX`]. Labels come from [`Engine::upload_model`] or [`Engine::set_labels`]; without them, all are 0.
 pub fn label_map(engine: &mut Engine, camera: &Camera, near: f32) -> Result<LabelMap> {
     let pixels = camera.width as usize * camera.height as usize;
     let mut ids = Vec::with_capacity(pixels);

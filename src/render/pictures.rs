@@ -9,7 +9,7 @@ use crate::{Error, Result, Setting};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Largest whole number up to which a 32-bit float holds all of them.
+/// Largest integer below which 32-bit floats represent every integer.
 const FLOAT_EXACT: i32 = 1 << 24;
 
 /// A kind of picture.
@@ -18,11 +18,11 @@ const FLOAT_EXACT: i32 = 1 << 24;
 pub enum PictureKind {
     /// Colour.
     Rgb,
-    /// Mean z per pixel, world units; a PNG only shows it in grey, an EXR has the values.
+    /// Mean z per pixel, world units; a PNG shows it in grey, an EXR has the values.
     Depth,
     /// Opacity, 0 to 1.
     Alpha,
-    /// Object ids as 16-bit PNG, and in colours; ids of a model with one above 65535 as 32-bit EXR.
+    /// Object ids as 16-bit PNG, plus a coloured PNG. A model with ids above 65535 gives a 32-bit EXR.
     Labels,
     /// Row of the Gaussian with the largest weight, -1 for none; EXR only. A picture with a row above 16777216 has
     /// unsigned integers, 4294967295 for none.
@@ -42,8 +42,8 @@ pub enum Format {
     Exr,
 }
 
-/// Writes pictures of the view `stem` into `folder`. With `wide_labels`, ids have 32 bits, in an EXR: for models with one
-/// above [`LABEL_MAX`]. Returns the paths of the files.
+/// Writes pictures of the view `stem` into `folder`. With `wide_labels`, ids are written as a 32-bit EXR, for models
+/// with ids above [`LABEL_MAX`]. Returns the paths of the files.
 pub fn write_pictures(
     folder: &Path,
     stem: &str,
@@ -87,13 +87,13 @@ pub fn write_pictures(
     Ok(written)
 }
 
-/// Returns ids for a 16-bit PNG, or `None` if they are for an EXR.
+/// Returns ids for a 16-bit PNG, or `None` if they go into an EXR.
 fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>> {
     match (wide, format) {
         (true, Format::Exr) => Ok(None),
         (true, Format::Png) => {
             let problem =
-                format!("a 16-bit PNG has no place for labels above {LABEL_MAX}; choose exr, or give them smaller ids");
+                format!("a 16-bit PNG cannot hold labels above {LABEL_MAX}; choose exr, or give them smaller ids");
             Err(Error::usage(Setting("format"), problem))
         }
         (false, _) => {
@@ -103,8 +103,8 @@ fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>
     }
 }
 
-/// Returns the colours of a picture in a video; fails for kinds that are no colours. Depths are grey between two bounds, which
-/// the first picture with some sets: else a surface would flicker.
+/// Returns the colours of a video frame; fails for kinds that are not colours. Depth is grey between two bounds, which
+/// the first frame with depth sets, so that surfaces do not flicker.
 pub(crate) fn frame(rendered: &Render, what: PictureKind, depths: &mut Option<[f32; 2]>) -> Result<Vec<[u8; 3]>> {
     check_size("a video", rendered, what)?;
     Ok(match what {
@@ -123,7 +123,7 @@ pub(crate) fn frame(rendered: &Render, what: PictureKind, depths: &mut Option<[f
     })
 }
 
-/// Writes rows, as floats where these hold them, else as unsigned integers with 4294967295 for none.
+/// Writes rows, as floats if these represent them exactly, else as unsigned integers with 4294967295 for none.
 fn write_rows(path: &Path, (width, height): (u32, u32), rows: &[i32]) -> Result<()> {
     if rows.iter().all(|&row| row <= FLOAT_EXACT) {
         let values: Vec<f32> = rows.iter().map(|&row| row as f32).collect();
@@ -159,12 +159,12 @@ fn check_size(stem: &str, rendered: &Render, what: PictureKind) -> Result<()> {
     Err(Error::Bug(format!("a picture of {stem} has {length} pixels instead of {pixels}")))
 }
 
-/// Returns the 16-bit value of a value from 0 to 1 in a picture.
+/// Converts a value from 0 to 1 to 16 bits.
 pub(crate) fn to_word(value: f32) -> u16 {
     (value.clamp(0.0, 1.0) * 65_535.0).round() as u16
 }
 
-/// Returns the nearest and the farthest depth; infinity and 0 without any.
+/// Returns the nearest and the farthest depth; infinity and 0 if there is none.
 pub(crate) fn depth_range(depth: &[f32]) -> [f32; 2] {
     let there = depth.iter().copied().filter(|z| is_depth(*z));
     there.fold([f32::INFINITY, 0.0], |[near, far], z| [near.min(z), far.max(z)])
@@ -179,7 +179,7 @@ pub(crate) fn depth_preview(depth: &[f32]) -> Vec<u16> {
     depth_grey(depth, depth_range(depth))
 }
 
-/// The same between two bounds.
+/// Same as [`depth_preview`], between two bounds.
 fn depth_grey(depth: &[f32], [near, far]: [f32; 2]) -> Vec<u16> {
     let grey = |z: f32| if far > near { 1.0 - 0.9 * (z - near) / (far - near) } else { 1.0 };
     depth.iter().map(|z| if is_depth(*z) { to_word(grey(*z)) } else { 0 }).collect()

@@ -125,8 +125,8 @@ impl Checkpoints {
         Ok(None)
     }
 
-    /// Begins a checkpoint unless this step has one. Nothing may be in flight, so that the history has all steps, and no other
-    /// checkpoint is being written.
+    /// Begins a checkpoint unless this step has one. Nothing may be in flight, so that the history has all steps, and
+    /// no other checkpoint is being written.
     fn begin(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<()> {
         let step = trainer.steps_done();
         if step == self.step {
@@ -142,8 +142,8 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Waits for the checkpoint that is being written, and deletes old ones after it is complete. Returns its step and its path,
-    /// `None` if there is none.
+    /// Waits for the checkpoint that is being written, and deletes old ones after it is complete. Returns its step and
+    /// its path, `None` if there is none.
     fn settle(&mut self) -> Option<(u32, Result<PathBuf>)> {
         let (step, written) = self.writer.take()?.end();
         let written = written.and_then(|path| {
@@ -207,8 +207,8 @@ impl Run<'_> {
         if self.checkpoints.writer.as_ref().is_some_and(Writer::is_done) { self.end_checkpoint() } else { Ok(()) }
     }
 
-    /// Waits for the checkpoint that is being written, if there is one, and tells of it. A failed write or listing is only a
-    /// warning: the next one may succeed.
+    /// Waits for the checkpoint that is being written, if there is one, and tells of it. A failed write or listing is
+    /// only a warning: the next one may succeed.
     pub(super) fn end_checkpoint(&mut self) -> Result<()> {
         let Some((step, written)) = self.checkpoints.settle() else { return Ok(()) };
         // It takes long enough for another run to come between.

@@ -140,8 +140,8 @@ impl Run<'_> {
         atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
     }
 
-    /// Writes the refined poses, if there are any: as a reconstruction, and in the cameras of the run. Held-out views keep
-    /// theirs.
+    /// Writes the refined poses, if there are any: as a reconstruction, and in the cameras of the run. Held-out views
+    /// keep theirs.
     fn save_poses(&mut self) -> Result<()> {
         let refined = self.trainer.poses()?;
         if refined.is_empty() {

@@ -69,7 +69,8 @@ pub enum Start<'a> {
 pub struct Inputs {
     /// Folder of id masks, one per view by name. Without it the model has no labels.
     pub masks: Option<PathBuf>,
-    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See [`crate::scenes::LoadOptions::ignore`].
+    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See
+    /// [`crate::scenes::LoadOptions::ignore`].
     #[serde(default)]
     pub ignore: Option<PathBuf>,
     /// Folder of depth maps in world units, in place of the points of the reconstruction, for
@@ -97,10 +98,11 @@ pub struct Request<'a> {
     pub start: Start<'a>,
     /// Masks and limits. In a resumed run, empty fields take the values of the checkpoint.
     pub inputs: Inputs,
-    /// Model to start from in place of the scene's points: a file of any format, of any trainer, or the folder of a run.
+    /// Model to start from in place of the scene's points: a file of any format, of any trainer, or the folder of a
+    /// run.
     pub init: Option<PathBuf>,
-    /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, from the first model of the block. The
-    /// settings are those of [`Settings::for_block`].
+    /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, from the first model of the
+    /// block. The settings are those of [`Settings::for_block`].
     pub block: Option<PathBuf>,
     /// File of occluder lists, for [`Occlusion::File`].
     pub occluders: Option<PathBuf>,
@@ -109,7 +111,8 @@ pub struct Request<'a> {
     pub restart: bool,
     /// The command as it was typed, for the report.
     pub command: Option<String>,
-    /// The warnings of the log since the run began, for the report. Without it, the report has only those of the run itself.
+    /// The warnings of the log since the run began, for the report. Without it, the report has only those of the run
+    /// itself.
     pub warnings: Option<&'a Warnings<'a>>,
 }
 

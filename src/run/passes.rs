@@ -24,7 +24,8 @@ pub(crate) struct Pass {
 }
 
 impl Run<'_> {
-    /// Times the passes of the last steps, once more. Nothing is noted of a short run, or where the device has no clock.
+    /// Times the passes of the last steps, once more. Nothing is noted of a short run, or where the device has no
+    /// clock.
     pub(super) fn time_passes(&mut self, model: &Gaussians) {
         let has_clock = self.trainer.engine_mut().gpu().limits().timestamp_bits > 0;
         let count = (self.trainer.steps_done() / RUN_STEPS_PER_TIMED_STEP).min(TIMED_STEPS_MAX);

@@ -72,7 +72,8 @@ impl PictureObserver for WorstViews {
 }
 
 impl WorstViews {
-    /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst first.
+    /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst
+    /// first.
     pub(super) fn write(self, out: &Path) -> Result<Vec<PicturedView>> {
         remove_old(out)?;
         thumbnails::remove_old(out)?;

@@ -38,8 +38,8 @@ crate::options! {
         "Scene" {
             /// Memory for photos and masks, such as 800M or 4G.
             ///
-            /// In a larger scene some of them wait in a temporary file in OUT, decoded and of the size for training; it is
-            /// gone with the process. The model has the same bits.
+            /// In a larger scene some of them wait in a temporary file in OUT, decoded and of the size for training; it
+            /// is gone with the process. The model has the same bits.
             #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
             #[serde(with = "as_bytes")]
             photo_memory <"SIZE">: u64 = scenes::PHOTO_MEMORY;

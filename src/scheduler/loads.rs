@@ -1,7 +1,8 @@
 //! The data of steps on their way to device memory, on devices that have memory of their own.
 //!
-//! The host writes to staging of the step's frame, and copies in front of the list take the data to the frame's buffers. Data
-//! that come again, such as the photo of a view, are kept on the device while there is room, and come from there.
+//! The host writes to staging of the step's frame, and copies in front of the list take the data to the frame's
+//! buffers. Data that come again, such as the photo of a view, are kept on the device while there is room, and come
+//! from there.
 
 use super::Scheduler;
 use super::recorder::Recorder;
@@ -78,8 +79,8 @@ impl Loads {
         self.kept.values().map(|kept| kept.bytes()).sum()
     }
 
-    /// Submits the copies that the next list of a frame needs, by the queue for copies if the device has one. Returns what the
-    /// list has to wait for, `None` if it needs nothing. No list of the frame runs.
+    /// Submits the copies that the next list of a frame needs, by the queue for copies if the device has one. Returns
+    /// what the list has to wait for, `None` if it needs nothing. No list of the frame runs.
     pub(super) fn submit(&mut self, gpu: &Gpu, storage: &Storage, frame: usize) -> Result<Option<(&Timeline, u64)>> {
         let count = self.frames.len();
         let of = &mut self.frames[frame];
@@ -136,10 +137,11 @@ impl Loads {
 }
 
 impl Scheduler {
-    /// Writes the first elements of a PerFrame buffer, which have a key if they come again; then `data` makes them once.
+    /// Writes the first elements of a PerFrame buffer, which have a key if they come again; then `data` makes them
+    /// once.
     ///
-    /// Waits for the last list of the frame. On a device with memory of its own, data with a key come from the host once, as
-    /// long as half of the memory that is left has room for them.
+    /// Waits for the last list of the frame. On a device with memory of its own, data with a key come from the host
+    /// once, as long as half of the memory that is left has room for them.
     pub fn load<'a, T: Pod>(
         &mut self,
         buf: Buf,

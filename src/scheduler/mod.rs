@@ -1,7 +1,7 @@
 //! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays recordings.
 //!
-//! Two or four steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full barrier,
-//! so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
+//! Two or four steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full
+//! barrier, so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
 
 mod guard;
 mod loads;
@@ -178,7 +178,8 @@ impl Scheduler {
 
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
-    /// Allocates nothing. Blocks only if the same list still runs in the same frame; where data go through staging, if any does.
+    /// Allocates nothing. Blocks only if the same list still runs in the same frame; where data go through staging, if
+    /// any does.
     pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
         let index = self.index(id)?;
         self.check_frame(frame)?;

@@ -61,8 +61,8 @@ impl Scheduler {
             .collect()
     }
 
-    /// Moves all buffers outside of scratch to new blocks. Model buffers keep the common prefix. Needs room for old and new
-    /// blocks; without it, all stays as it was.
+    /// Moves all buffers outside of scratch to new blocks. Model buffers keep the common prefix. Needs room for old and
+    /// new blocks; without it, all stays as it was.
     pub(super) fn resize_packed(&mut self, counts: &[u64]) -> Result<()> {
         if (0..self.table.len()).all(|index| matches!(self.grows(index, counts), Ok(None))) {
             return Ok(());
@@ -90,7 +90,8 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Windows of a pass with the buffers of the first frame, for compiling; none where each buffer has its own binding.
+    /// Windows of a pass with the buffers of the first frame, for compiling; none where each buffer has its own
+    /// binding.
     pub(super) fn windows(&self, plan: &Plan, pass: &PassDecl) -> Result<Vec<u8>> {
         if !self.limits.is_packed() {
             return Ok(Vec::new());

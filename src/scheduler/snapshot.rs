@@ -11,7 +11,8 @@ use std::time::Duration;
 
 /// Copies of buffers in device memory.
 pub struct Snapshot {
-    /// Allocated with the copies: whoever reads needs no further memory of the device. First, since its drop waits for the reads.
+    /// Allocated with the copies: whoever reads needs no further memory of the device. First, since its drop waits for
+    /// the reads.
     halves: StagingHalves,
     /// Copies, in the order in which they were asked for; none for a buffer without words.
     copies: Vec<Option<Buffer>>,
@@ -22,8 +23,8 @@ pub struct Snapshot {
 }
 
 impl Scheduler {
-    /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice. Another
-    /// thread has to read or drop the copies: growth may wait for their memory.
+    /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice.
+    /// Another thread has to read or drop the copies: growth may wait for their memory.
     pub fn snapshot(&mut self, buffers: &[(Buf, u64)]) -> Result<Snapshot> {
         let bytes = buffers.iter().map(|(_, words)| words * 4).sum::<u64>();
         memory::check_total(self.table, "snapshot", self.memory_total().saturating_add(bytes), &self.limits)?;
@@ -49,8 +50,8 @@ impl Scheduler {
         Ok(Snapshot { copies, made, halves, _alive: alive })
     }
 
-    /// Waits until other threads have read all snapshots, so that what fits in memory does not depend on when they do. Returns
-    /// whether there were some.
+    /// Waits until other threads have read all snapshots, so that what fits in memory does not depend on when they do.
+    /// Returns whether there were some.
     pub(super) fn wait_for_snapshots(&mut self) -> bool {
         let was_there = self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0);
         while self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0) {

@@ -1,4 +1,5 @@
-//! Memory of a plan: a VkBuffer for each buffer outside of scratch, or a part of one (`packed`), and the pages of the Step arena.
+//! Memory of a plan: a VkBuffer for each buffer outside of scratch, or a part of one (`packed`), and the pages of the
+//! Step arena.
 
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};

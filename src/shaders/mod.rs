@@ -1,8 +1,8 @@
 //! Generated interface of the GLSL shaders, and its types.
 //!
 //! `build.rs` compiles every `glsl/**/*.comp`, reflects the SPIR-V and writes one module per file with `Macros`,
-//! `Bindings<B>`, `Spec` and the [`ShaderDesc`] of every variant. Fields have their GLSL names and cover all variants of the
-//! file. Layouts, bindings and access are defined in GLSL only.
+//! `Bindings<B>`, `Spec` and the [`ShaderDesc`] of every variant. Fields have their GLSL names and cover all variants
+//! of the file. Layouts, bindings and access are defined in GLSL only.
 // All generated items are public, even unused ones.
 #![allow(unreachable_pub)]
 
@@ -41,14 +41,14 @@ pub struct BindingDesc {
     pub element_bytes: u32,
 }
 
-/// One constant of a pass (always 32 bits): a specialisation constant, or a word that is pushed before the dispatch.
+/// A constant of a pass (always 32 bits): a specialisation constant, or a push constant word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpecDesc {
     /// GLSL name.
     pub name: &'static str,
     /// constant_id, or the index of the pushed word.
     pub id: u32,
-    /// True if it is pushed: passes that differ in it alone share a pipeline.
+    /// True for push constants: passes that differ only in these share a pipeline.
     pub is_pushed: bool,
     /// Bits of the default value.
     pub default: u32,
@@ -85,12 +85,12 @@ pub struct ShaderDesc {
 }
 
 impl ShaderDesc {
-    /// Number of storage buffers that it binds.
+    /// Returns the number of storage buffers that the shader binds.
     pub fn storage_buffers(&self) -> u32 {
         self.bindings_of(BindingKind::Storage)
     }
 
-    /// Number of texel buffers that it binds.
+    /// Returns the number of texel buffers that the shader binds.
     pub fn texel_buffers(&self) -> u32 {
         self.bindings_of(BindingKind::Texel)
     }
@@ -115,7 +115,8 @@ impl ShaderDesc {
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 impl structs::Counters {
-    /// Splats that tiles walked, over all tiles; times the pixels per tile, the number of (pixel, splat) pairs.
+    /// Splats that tiles processed, summed over tiles; times the pixels per tile, this is the number of (pixel, splat)
+    /// pairs.
     pub fn walked_splats(&self) -> u64 {
         u64::from(self.walked_first) + u64::from(self.walked_second)
     }

@@ -1,7 +1,8 @@
 //! Poses of views by a finished model: the Gaussians stay, the cameras move.
 //!
-//! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the reconstruction.
-//! Scores of such views tell quality only after their poses were refined by the model too (as in BARF, Lin et al. 2021).
+//! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the
+//! reconstruction. Scores of such views tell quality only after their poses were refined by the model too (as in BARF,
+//! Lin et al. 2021).
 
 use crate::error::Result;
 use crate::gpu::Gpu;

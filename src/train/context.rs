@@ -161,8 +161,8 @@ impl Context {
         keys
     }
 
-    /// Returns the rows of each photo that belong to an owner of shared parameters; none without the owner. Nothing may be
-    /// in flight.
+    /// Returns the rows of each photo that belong to an owner of shared parameters; none without the owner. Nothing may
+    /// be in flight.
     pub(super) fn photo_rows(&mut self, owner: &str) -> Result<Vec<Vec<[f32; 4]>>> {
         let Some(range) = self.shared.photo_rows(owner) else { return Ok(Vec::new()) };
         let rows = self.engine.shared()?;

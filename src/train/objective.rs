@@ -7,8 +7,8 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use std::sync::Arc;
 
-/// Something of the Gaussians that a training may change. [`SharedParameters`](super::shared::SharedParameters) have learning
-/// rates of their own.
+/// Something of the Gaussians that a training may change. [`SharedParameters`](super::shared::SharedParameters) have
+/// learning rates of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
     /// How many there are, by the [`Strategy`].
@@ -79,8 +79,8 @@ impl Objective {
         self.losses.contains(&loss)
     }
 
-    /// Returns the configuration without what the training has not: weights of losses that only they decide, and the rule of
-    /// the paper, by which steps set labels.
+    /// Returns the configuration without what the training has not: weights of losses that only they decide, and the
+    /// rule of the paper, by which steps set labels.
     pub(super) fn limit_config(&self, config: TrainConfig) -> TrainConfig {
         let depth_weight = if self.has(Loss::Depth) { config.depth_weight } else { Some(0.0) };
         let label_rule = if self.trains(Parameter::Labels) { config.label_rule } else { LabelRule::Votes };

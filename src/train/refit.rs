@@ -1,8 +1,9 @@
 //! Opacities of objects outside of their scene.
 //!
-//! In its scene, an object shares opacities with what is around it: haze behind other things and Gaussians across a contour
-//! cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers of LabelGS fit
-//! them: its colours and opacity alone against photos and masks, without the pixels in which something hides it.
+//! In its scene, an object shares opacities with what is around it: haze behind other things and Gaussians across a
+//! contour cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers
+//! of LabelGS fit them: its colours and opacity alone against photos and masks, without the pixels in which something
+//! hides it.
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
@@ -14,14 +15,15 @@ use std::sync::Arc;
 
 /// Steps of [`refitted`], each of one view.
 pub const REFIT_STEPS: u32 = 600;
-/// Weight of the alpha term. It is higher than in a scene, because a copy need not look right in the picture of the scene.
+/// Weight of the alpha term. It is higher than in a scene, because a copy need not look right in the picture of the
+/// scene.
 const ALPHA_WEIGHT: f32 = 3.0;
 
 /// Returns labelled Gaussians, those of whole objects, with opacities for a picture of these objects alone.
 ///
-/// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are those of the scene,
-/// by name of the view ([`occluders_by_contour`](crate::label::occlusion::occluders_by_contour)). `watch` is told the number of each step. Labels
-/// that no mask has are an error.
+/// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are those of
+/// the scene, by name of the view ([`occluders_by_contour`](crate::label::occlusion::occluders_by_contour)). `watch` is
+/// told the number of each step. Labels that no mask has are an error.
 pub fn refitted(
     gpu: &Arc<Gpu>,
     objects: &Gaussians,

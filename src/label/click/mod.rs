@@ -293,7 +293,8 @@ impl<'a> ObjectFinder<'a> {
         let views: &'a [View] = &self.photos.views;
         let voters: Vec<Voter> =
             // Photos and masks differ in size.
-            masks.iter().zip(&pixels).map(|((view, _), mask)| Voter { photo: None, ..Voter::for_view(&views[*view], mask) }).collect();
+            masks.iter().zip(&pixels).map(|((view, _), mask)| Voter { photo: None, ..Voter::for_view(&views[*view],
+            mask) }).collect();
         let decision = decide(&sweep(&mut self.engine, &voters, Sweep::new(self.near, 0))?, &self.means)?;
         self.engine.set_labels(&decision.labels)?;
         Ok(decision.labels.iter().map(|&label| label == u32::from(OBJECT_ID)).collect())

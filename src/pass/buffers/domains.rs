@@ -1,8 +1,8 @@
-//! Domains (the things that buffers count) and capacities (their maximum numbers): one table, with a row per domain.
+//! Domains (what the elements of buffers stand for) and capacities (their maximum numbers), in one table.
 
 use crate::scheduler::plan::{Count, Domain};
 
-/// Cures by the cause of a domain's size, given the number that fits and the domain's name.
+/// Advice by the cause of a domain's size, given the number that fits and the domain's name.
 pub(super) mod cures {
     use crate::error::Setting;
 
@@ -44,8 +44,8 @@ pub(super) mod cures {
 
 /// Declares the domains, and the capacities that count them.
 ///
-/// Each row is `DOMAIN field: "name", cure, "doc";`, with `optional` at its end if plans do not show it without elements.
-/// The rows after `..` are capacities without a buffer.
+/// Each row is `DOMAIN field: "name", cure, "doc";`, ending in `optional` if plans omit it when it is empty. The rows
+/// after `..` are capacities without a buffer.
 macro_rules! domains {
     ($($row:ident $field:ident: $name:literal, $cure:expr, $doc:literal $(, $optional:ident)?;)*
         .. $($other:ident: $other_doc:literal;)*) => {
@@ -82,13 +82,13 @@ domains! {
     TRAINED trained: "trained", cures::model,
         "Rows with optimiser state: Gaussians without the frozen ones at the end, or 0 without training.";
     SECOND_MOMENTS second_moments: "second moments", cures::model,
-        "Rows with second moments of their own: equal to Trained, or 0 where those are packed with the first ones.", optional;
+        "Rows with separate second moments: equal to Trained, or 0 if packed with the first moments.", optional;
     LABELLED labelled: "labelled", cures::model,
         "Rows with labels: equal to Gaussians, or 0 in a scene without masks.";
     INSTANCES instances: "instances", cures::pairs,
         "(splat, tile) pairs.";
     KEY_WORDS key_words: "instances", cures::pairs,
-        "Words of the keys of pairs: equal to Instances, or half of them where keys have 16 bits.";
+        "Words of the pairs' keys: equal to Instances, or half of them with 16-bit keys.";
     TRAINED_INSTANCES trained_instances: "trained instances", cures::pairs,
         "Pairs with a gradient record: equal to Instances, or 0 without training.";
     VIRTUAL_TILES virtual_tiles: "virtual tiles", cures::image,
@@ -104,13 +104,13 @@ domains! {
     LABELLED_TILES labelled_tiles: "labelled tiles", cures::image,
         "Tiles of one image, or 0 in a scene without masks.";
     KNOWN_DEPTHS known_depths: "known depths", cures::image,
-        "Pixels with room for a known depth: equal to Pixels, or 0 in a training without them.";
+        "Pixels with a known depth: equal to Pixels, or 0 in a training without known depths.";
     LABEL_TABLES label_tables: "label tables", cures::image,
         "Tiles times walks for the label map, or 0 in a scene without masks.";
     LABELS labels: "labels", cures::layers,
         "Label ids, including 0.";
     VOTE_COLUMNS vote_columns: "vote columns", cures::votes,
-        "Labels that a sweep of votes counts at once.";
+        "Labels that one vote sweep counts.";
     VOTE_CELLS vote_cells: "vote cells", cures::votes,
         "Gaussians times vote columns.";
     LAYERS layers: "layers", cures::layers,
@@ -118,55 +118,56 @@ domains! {
     OCCLUDER_WORDS occluder_words: "occluder words", cures::layers,
         "Words of occluder bits of all layers.";
     SORT_CELLS sort_cells: "sort cells", cures::pairs,
-        "Cells of the histogram of the sort.";
+        "Cells of the sort histogram.";
     SORT_TOTALS sort_totals: "sort totals", cures::pairs,
-        "Cells of the totals of the sort.";
+        "Cells of the sort totals.";
     SCAN_LANES scan_lanes: "scan lanes", cures::pairs,
         "Lanes of the scan.";
     SWEEP_CELLS sweep_cells: "sweep cells", cures::pairs,
-        "Words of the passes that look back, or 0 where sort and scan do without.", optional;
+        "Words of look-back passes, or 0 if sort and scan do not look back.", optional;
     LOOK_CELLS look_cells: "look cells", cures::model,
-        "Words of the passes that list splats, or 0 where they do not look back.", optional;
+        "Words of the passes that list splats, or 0 if they do not look back.", optional;
     LOSS_PARTIALS loss_partials: "loss partials", cures::image,
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,
-        "Pixels of all jobs of the blend passes, or 0 while one dispatch can walk each tile's list.";
+        "Pixels of all blend jobs, or 0 while one dispatch can process each tile's list.";
     CHUNKS chunks: "chunks", cures::pairs,
-        "Chunks of lists that the backward blend walks, or 0 where it walks tiles.", optional;
+        "List chunks of the backward blend, or 0 if it processes whole tiles.", optional;
     CHUNK_PIXELS chunk_pixels: "chunk pixels", cures::pairs,
-        "Pixels between two chunks of a list, or 0 where it walks tiles.", optional;
+        "Pixels between two chunks of a list, or 0 if it processes whole tiles.", optional;
     CHUNK_CHANNELS chunk_channels: "chunk channels", cures::pairs,
         "Pixels of all chunks of the scene's lists, or 0 in a training without labels and known depths.", optional;
     LATE_GAUSSIANS late_gaussians: "late gaussians", cures::model,
-        "Trained Gaussians that may miss updates: all of them, or none where each step updates all.", optional;
+        "Trained Gaussians that may miss updates: all, or 0 if each step updates all of them.", optional;
     MISSED_ROWS missed_rows: "missed rows", cures::none,
-        "Rows of the table of what they missed.", optional;
+        "Rows of the table of missed updates.", optional;
     SHARED_ROWS shared_rows: "shared rows", cures::none,
-        "Rows of four shared parameters, or 0 without any.", optional;
+        "Rows of four shared parameters, or 0 without shared parameters.", optional;
     .. sort_lanes: "Lanes of the sort.";
     segments: "Maximum number of dispatches for one walk of a tile's list.";
 }
 
 impl Domain {
-    /// True if its elements are rows of trained Gaussians.
+    /// Returns true if the domain's elements are rows of trained Gaussians.
     pub(crate) fn is_trained(&self) -> bool {
         [Self::TRAINED.count, Self::SECOND_MOMENTS.count].contains(&self.count)
     }
 }
 
 impl Capacity {
-    /// Tiles of the scene, without those of object layers.
+    /// Returns the tiles of the scene, without object layers.
     pub fn tiles(&self) -> u64 {
         self.virtual_tiles / self.layers.max(1)
     }
 
-    /// True if first and second moments share a plane of words (glsl/include/moments_store.glsl).
+    /// Returns true if first and second moments are packed (glsl/include/moments_store.glsl).
     pub fn packs_moments(&self) -> bool {
         self.second_moments < self.trained
     }
 
-    /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, on a card twice, because
-    /// growth costs it more steps; and at least 1.1 times `needed`, so that slow growth does not overflow at every step.
+    /// Returns the next capacity after `needed` elements did not fit into `current`: 1.5 times `current`, or twice on a
+    /// GPU, where growth costs more steps. It is at least 1.1 times `needed`, so that slow growth does not overflow at
+    /// every step.
     pub fn grown(current: u64, needed: u64, on_card: bool) -> u64 {
         let more = current.saturating_add(if on_card { current } else { current / 2 });
         let tenth_more = needed.saturating_add(needed.div_ceil(10));

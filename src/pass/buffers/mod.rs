@@ -1,4 +1,4 @@
-//! The buffers of the engine: what each holds, what its elements stand for, and how many there are.
+//! The buffers of the engine: contents, domains and capacities.
 
 mod domains;
 mod table;

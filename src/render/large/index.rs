@@ -1,4 +1,4 @@
-//! What the host keeps of every Gaussian of a large model: enough to tell which of them a view may show.
+//! Host-side index of a large model: enough data per Gaussian to decide whether a view may show it.
 
 use crate::error::{Error, Result};
 use crate::formats::{ModelRef, Row};
@@ -11,36 +11,41 @@ use crate::shaders::structs::StepUniforms;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Bound of what 32-bit floats round on the way to a pixel, as a share of the distance to the camera.
+/// Bound on the rounding errors of 32-bit floats in projection, as a share of the distance to the camera.
 const ROUNDING_SHARE_MAX: f64 = 1e-5;
-/// Margins of the cull pass, doubled: a factor of the radius of a splat, and px.
+/// Doubled margin of the cull pass: factor of the splat radius.
 const CULL_RADIUS_FACTOR: f64 = 1.002;
+/// Doubled margin of the cull pass, px.
 const CULL_MARGIN_PX: f64 = 1.0;
-/// Reach of a Gaussian that no pixel sees.
+/// Reach of a Gaussian that is never visible.
 const UNSEEN_REACH: f32 = -1.0;
 
-/// Places, reaches and labels of the Gaussians to be shown, 25 bytes each.
+/// Positions, reaches and labels of the Gaussians to draw, 25 bytes each.
 #[derive(Clone, Debug, Default)]
 pub struct GaussianIndex {
-    /// World position that `means` are relative to, and how far it is from the origin of the model.
+    /// World position that `means` are relative to, and its distance from the model's origin.
     pub(super) origin: DVec3,
     pub(super) far: DVec3,
     means: Vec<Vec3>,
-    /// Distance at which alpha falls to its least value along the longest axis, before blur, world units.
+    /// Distance at which alpha falls to its minimum along the longest axis, before blur, world units.
     reaches: Vec<f32>,
     labels: Option<Vec<u32>>,
-    /// True for Gaussians of objects that are shown alone.
+    /// True for Gaussians that are drawn when their object is shown alone.
     sure: Vec<bool>,
-    /// Numbers of the rows in the model.
+    /// Row indices in the model.
     numbers: Vec<u32>,
 }
 
 impl GaussianIndex {
-    /// Looks at every Gaussian of a model, and keeps some by their label and its confidence. Those with less than `least` are
-    /// no part of an object that is shown alone. Returns notes for the user too.
+    /// Indexes the Gaussians of a model that `keep` accepts by label and confidence. Gaussians with a confidence below
+    /// `least` are not drawn when an object is shown alone. Also returns notes for the user.
     pub fn new(model: ModelRef, least: f32, keep: impl Fn(u32, Option<f32>) -> bool) -> Result<(Self, Vec<String>)> {
         if i32::try_from(model.count()).is_err() {
-            let problem = format!("has {} Gaussians, at most {} are drawn; take a part of it", model.count(), i32::MAX);
+            let problem = format!(
+                "has {} Gaussians, but at most {} can be drawn; use a part of the model",
+                model.count(),
+                i32::MAX
+            );
             return Err(Error::usage("model", problem));
         }
         let mut index = Self { labels: model.has_labels().then(Vec::new), ..Self::default() };
@@ -65,12 +70,12 @@ impl GaussianIndex {
         Ok((index, notes))
     }
 
-    /// Returns true without any Gaussian.
+    /// Returns true if there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
 
-    /// Places of the Gaussians in the world.
+    /// Returns the world positions of the Gaussians.
     pub(crate) fn places(&self) -> impl Iterator<Item = DVec3> + Clone {
         self.means.iter().map(|mean| self.origin + mean.as_dvec3())
     }
@@ -80,12 +85,12 @@ impl GaussianIndex {
         self.labels.as_deref()
     }
 
-    /// Returns true if some objects have a Gaussian to be shown alone.
+    /// Returns true if any of these objects has a Gaussian to draw alone.
     pub(super) fn has_objects(&self, labels: &[u32]) -> bool {
         self.labels.iter().flatten().zip(&self.sure).any(|(own, &sure)| sure && labels.contains(own))
     }
 
-    /// Returns the places in the index of the Gaussians that a picture may show, sorted; of all, or of some objects alone.
+    /// Returns the sorted indices of the Gaussians that a picture may show, of all or of some objects alone.
     pub(super) fn seen(&self, uniforms: &StepUniforms, only: Option<&[u32]>) -> Vec<u32> {
         let sight = CullCamera::new(uniforms);
         let shows = |at: usize| match (only, &self.labels) {
@@ -98,7 +103,7 @@ impl GaussianIndex {
         all.into_par_iter().filter(seen).collect()
     }
 
-    /// Returns the numbers of Gaussians in the model.
+    /// Returns the model rows of these indices.
     pub(super) fn numbers<'a>(&'a self, of: &'a [u32]) -> impl Iterator<Item = u64> + 'a {
         of.iter().map(|&at| u64::from(self.numbers[at as usize]))
     }
@@ -107,7 +112,7 @@ impl GaussianIndex {
 /// Returns the reach of a Gaussian, world units.
 fn reach(row: &Row) -> f32 {
     let squared = 2.0 * (opacity_of(row.opacity) / f64::from(ALPHA_MIN)).ln();
-    // The device rounds opacities otherwise.
+    // The device rounds opacities differently.
     if squared < -1e-3 {
         return UNSEEN_REACH;
     }
@@ -140,8 +145,8 @@ impl CullCamera {
         }
     }
 
-    /// Returns true if the cull pass may keep a Gaussian. All lengths are multiplied by its depth, so that no rounding is
-    /// divided by a small one.
+    /// Returns true if the cull pass may keep a Gaussian. All lengths are multiplied by depth, so that rounding errors
+    /// are not divided by a small depth.
     fn sees(&self, mean: Vec3, reach: f32) -> bool {
         if reach == UNSEEN_REACH {
             return false;
@@ -153,7 +158,7 @@ impl CullCamera {
             return false;
         }
         let depth = z.max(0.0);
-        // Largest variance by the blur, of an opaque splat.
+        // Largest variance that blur adds, for an opaque splat.
         let blur = COV2D_BLUR * 2.0 * (1.0 / f64::from(ALPHA_MIN)).ln() * depth * depth;
         [x, y].into_iter().zip(&self.axes).all(|(along, &[focal, principal, size, slope])| {
             let stretch = focal * f64::from(reach);

@@ -1,4 +1,4 @@
-//! Pictures of models that are larger than the memory of the device: each view takes the Gaussians that it may show.
+//! Draws models that are larger than device memory: each view loads only the Gaussians that it may show.
 
 mod index;
 mod painter;

@@ -1,4 +1,4 @@
-//! Draws a large model: reads the Gaussians that a picture may show, and halves the picture until they fit.
+//! Draws a large model: loads the Gaussians that a picture may show, and halves the picture until they fit.
 
 use super::GaussianIndex;
 use crate::engine::{Band, Engine, EngineSize, LabelSize, tell_apart, uniforms};
@@ -21,7 +21,7 @@ fn labels_of(model: ModelRef) -> Option<LabelSize> {
     model.has_labels().then(LabelSize::default)
 }
 
-/// Returns the error with which an engine of a size does not fit, or `None` if it does.
+/// Returns the error if an engine of this size does not fit, or `None` if it fits.
 fn prediction(gpu: &Gpu, size: EngineSize, options: SchedulerOptions) -> Result<Option<Error>> {
     match Engine::predict(gpu, &size, options) {
         Ok(_) => Ok(None),
@@ -30,7 +30,7 @@ fn prediction(gpu: &Gpu, size: EngineSize, options: SchedulerOptions) -> Result<
     }
 }
 
-/// Draws a model, or an object of it alone.
+/// Draws a model, or some of its objects alone.
 pub struct Painter<'a> {
     gpu: Arc<Gpu>,
     model: ModelRef<'a>,
@@ -59,11 +59,11 @@ impl<'a> Painter<'a> {
         only.is_none_or(|labels| self.index.has_objects(labels))
     }
 
-    /// Draws a picture like [`render`](crate::render::render()). Main Gaussians have their places in the index.
+    /// Draws a picture like [`render`](crate::render::render()). Main Gaussians are indices into the index.
     pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         let size = EngineSize::new(1, (camera.width, camera.height));
         let mut open = Band::split(camera.height, size.band(&self.shape).unwrap_or(camera.height));
-        // The next band is the last one of the list.
+        // The next band is at the end of the list.
         open.reverse();
         let mut whole: Option<Render> = None;
         while let Some(band) = open.pop() {
@@ -98,7 +98,7 @@ impl<'a> Painter<'a> {
         }
         let model = self.model.rows(self.index.numbers(&seen), self.index.far)?;
         match self.draw(&model, camera, band, options) {
-            // Counted on the device, the tiles of the Gaussians are more than was assumed.
+            // The device counted more (splat, tile) pairs than assumed.
             Err(error @ Error::OutOfMemory { .. }) => {
                 self.engine = None;
                 Ok(part(error))
@@ -119,7 +119,7 @@ impl<'a> Painter<'a> {
         render_band(engine, &uniforms, options)
     }
 
-    /// Makes an engine of at least this size, unless there is one. Returns the error of one that does not fit.
+    /// Makes an engine of at least this size, unless there is one. Returns the error if it does not fit.
     fn make_engine(&mut self, size: EngineSize) -> Result<Option<Error>> {
         let mut wanted = size;
         if let Some(engine) = &self.engine {
@@ -136,20 +136,20 @@ impl<'a> Painter<'a> {
         if let Some(error) = prediction(&self.gpu, wanted, self.options)? {
             return Ok(Some(error));
         }
-        // The memory of the old one first.
+        // Free the memory of the old engine first.
         self.engine = None;
         self.engine = Some(Engine::new(Arc::clone(&self.gpu), wanted, self.options)?);
         Ok(None)
     }
 }
 
-/// A part of a picture, or why it is too large.
+/// A part of a picture, or the reason why it is too large.
 enum BandResult {
     Picture(Render),
     TooLarge(Error),
 }
 
-/// Says which part of a picture does not fit.
+/// Adds to the error which part of a picture does not fit.
 fn part_error(error: Error, (width, height): (u32, u32), count: usize) -> Error {
     match error {
         Error::OutOfMemory { what, needed, limit_name, limit, .. } => Error::OutOfMemory {
@@ -157,7 +157,7 @@ fn part_error(error: Error, (width, height): (u32, u32), count: usize) -> Error 
             needed,
             limit_name,
             limit,
-            cure: "give more memory, draw smaller pictures, or a part of the model".to_owned(),
+            cure: "allow more memory, draw smaller pictures, or draw a part of the model".to_owned(),
         },
         other => other,
     }

@@ -1,9 +1,9 @@
-//! A closed surface around an object of a model, from depths of its pictures.
+//! Extracts a closed surface mesh of an object from rendered depths.
 //!
-//! The model is drawn from where the cameras were. A grid collects how far each place is in front of the object's
-//! surface or behind it, as the mean over the pictures (Curless and Levoy, *A Volumetric Method for Building Complex
-//! Models from Range Images*, SIGGRAPH 1996). What no picture shows as free is inside, so that the surface is closed where the
-//! object stands on or behind something. Surface nets make triangles of the grid.
+//! The model is drawn from its cameras. A grid collects the signed distance of each cell to the object's surface, as
+//! the mean over the pictures (Curless and Levoy, *A Volumetric Method for Building Complex Models from Range Images*,
+//! SIGGRAPH 1996). Cells that no picture shows as free are inside, so that the surface is closed where the object
+//! touches something. Surface nets convert the grid to triangles.
 
 mod sights;
 mod volume;
@@ -21,32 +21,34 @@ use sights::{BoundingBall, DepthPicture};
 use std::sync::Arc;
 use volume::Volume;
 
-/// Cells along the longest side of an object.
+/// Default number of cells along the longest side of an object.
 pub const CELLS_DEFAULT: u32 = 128;
-/// Most cells along a side: numbers of all cells and pixels of all pictures take 2 GB.
+/// Most cells along a side: the values of all cells and pictures then take 2 GB.
 pub const CELLS_MAX: u32 = 512;
 /// Fewest cells along a side.
 pub const CELLS_MIN: u32 = 8;
 
 /// Most directions from which an object is drawn.
 const DIRECTIONS_MAX: usize = 64;
-/// Pictures that find the box of the object, and their size, px.
+/// Directions from which the bounding box of the object is found.
 const BOX_DIRECTIONS: usize = 16;
+/// Size of these pictures, px.
 const BOX_PICTURE_SIDE_PX: u32 = 128;
-/// What is read of a picture.
+/// Parts of a render that are read back.
 const MESH_PARTS: Parts = Parts { depth: true, main: true, labels: false };
-/// Pixels for each cell along a side, and most of them.
+/// Pixels per cell along a side.
 const PIXELS_PER_CELL: u32 = 2;
+/// Largest side of a picture, px.
 const SIDE_MAX_PX: u32 = 1024;
-/// Share of the surface's pixels at each end of an axis that may be specks.
+/// Share of the surface pixels at each end of an axis that is ignored as specks.
 const SPECK_SHARE: f64 = 0.001;
 
-/// Makes the surface of the Gaussians with a label, with `cells` cells along its longest side. `cameras` are the places in the
-/// world from which the model was seen; without one outside of the object, it is drawn alone, from all sides.
+/// Makes the mesh of the Gaussians with a label, with `cells` cells along its longest side. `cameras` are the world
+/// positions of the model's cameras. If none is outside of the object, the object is drawn alone, from all sides.
 ///
 /// # Errors
 ///
-/// A device that cannot draw the model, and an object without a surface: no pixel shows it.
+/// The device cannot draw the model, or the object has no surface because no pixel shows it.
 pub fn object_mesh(gpu: &Arc<Gpu>, model: &Gaussians, label: u32, cameras: &[DVec3], cells: u32) -> Result<Mesh> {
     let cells = cells.clamp(CELLS_MIN, CELLS_MAX);
     let side = (PIXELS_PER_CELL * cells).clamp(BOX_PICTURE_SIDE_PX, SIDE_MAX_PX);
@@ -75,7 +77,7 @@ pub fn object_mesh(gpu: &Arc<Gpu>, model: &Gaussians, label: u32, cameras: &[DVe
     let first = places(around);
     let first = draw(around, &first[..first.len().min(BOX_DIRECTIONS)], BOX_PICTURE_SIDE_PX)?;
     let Some((low, high)) = sights::bounds(&first, SPECK_SHARE) else {
-        let problem = "has no surface: no pixel shows it more opaque than clear, so it has no mesh";
+        let problem = "has no surface: its opacity is below one half in every pixel, so it has no mesh";
         return Err(Error::usage("the object", problem));
     };
     let volume = Volume::around(low, high, cells);

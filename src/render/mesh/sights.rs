@@ -1,4 +1,4 @@
-//! Pictures of an object from around it, with the depth and the slant of its surface.
+//! Pictures of an object from all around, with depth and slant of its surface.
 
 use crate::render::{NEAR_DEFAULT, Render};
 use crate::scene::gaussians::{ALPHA_MAX, axes_of};
@@ -7,17 +7,17 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Distance of cameras from a ball that they see whole, in radii.
+/// Distance of cameras from the bounding ball so that they see all of it, in radii.
 const CAMERA_DISTANCE_RADII: f64 = 3.0;
-/// Least distance of a camera of the model from the centre of a ball that it shows, in radii.
+/// Smallest distance of a model camera from the ball's centre for it to be used, in radii.
 const CAMERA_DISTANCE_MIN_RADII: f64 = 1.1;
-/// Part of the distance before which nothing is drawn, if the usual near plane is farther.
+/// Near plane as a share of the distance, if the usual near plane is farther.
 const NEAR_DISTANCE_SHARE: f64 = 0.05;
-/// Opacity from which on a Gaussian counts for the ball.
+/// Smallest opacity of Gaussians that count for the ball.
 const OPACITY_MIN: f64 = 0.1;
-/// Least radius, world units.
+/// Smallest radius, world units.
 const RADIUS_MIN: f64 = 1e-6;
-/// Least share of the fog of a Gaussian in front of its surface.
+/// Smallest share of a Gaussian's density in front of its surface.
 const FOG_SHARE_MIN: f64 = 0.02;
 
 /// A ball around an object.
@@ -28,7 +28,7 @@ pub(super) struct BoundingBall {
 }
 
 impl BoundingBall {
-    /// Around the box of the Gaussians that can be seen.
+    /// Makes the ball around the box of the visible Gaussians.
     pub(super) fn around(part: &Gaussians) -> Self {
         let seen = |row: &usize| part.opacity(*row) >= OPACITY_MIN;
         let reach =
@@ -44,12 +44,12 @@ impl BoundingBall {
         Self { centre: (low + high) / 2.0, radius: (high - low).length().max(RADIUS_MIN) / 2.0 }
     }
 
-    /// True for a place from which all of the ball is in front.
+    /// Returns true for a position outside of the ball, with all of the ball in front.
     pub(super) fn is_seen_from(self, place: DVec3) -> bool {
         place.distance(self.centre) > CAMERA_DISTANCE_MIN_RADII * self.radius
     }
 
-    /// Returns places around the ball, evenly to all sides: a spiral by the golden angle.
+    /// Returns positions evenly distributed around the ball, on a golden-angle spiral.
     pub(super) fn all_round(self, count: usize) -> Vec<DVec3> {
         let golden = PI * (3.0 - 5.0_f64.sqrt());
         let direction = |index: usize| {
@@ -60,11 +60,11 @@ impl BoundingBall {
         (0..count).map(|index| self.centre + CAMERA_DISTANCE_RADII * self.radius * direction(index)).collect()
     }
 
-    /// Returns a camera at a place that sees the ball in a square picture, and its near plane.
+    /// Returns a camera at a position that sees the whole ball in a square picture, and its near plane.
     pub(super) fn camera(self, place: DVec3, side: u32) -> (Camera, f32) {
         let distance = place.distance(self.centre);
         let forward = (self.centre - place).normalize_or(DVec3::Z);
-        // Any way up serves.
+        // Any up direction works.
         let right = forward.any_orthonormal_vector();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
         let half = f64::from(side) / 2.0;
@@ -79,7 +79,7 @@ impl BoundingBall {
     }
 }
 
-/// Returns up to `most` of some places around a centre, those in directions that are far apart first.
+/// Returns up to `most` positions around a centre, preferring directions that are far apart.
 pub(super) fn apart(places: &[DVec3], centre: DVec3, most: usize) -> Vec<DVec3> {
     let directions: Vec<DVec3> = places.iter().map(|place| (*place - centre).normalize_or(DVec3::Z)).collect();
     let mut apart = vec![f64::MAX; places.len()];
@@ -100,21 +100,21 @@ pub(super) struct DepthPicture {
     pixels: Vec<Pixel>,
 }
 
-/// What a pixel shows.
+/// Surface at a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pixel {
-    /// Depth of the surface, world units; not finite where there is none.
+    /// Depth of the surface, world units; not finite without a surface.
     pub(super) depth: f32,
-    /// Cosine between the ray and the normal of the surface; 0 where it is unknown or the surface is another one.
+    /// Cosine between ray and surface normal; 0 if unknown or at another object's surface.
     pub(super) cosine: f32,
-    /// True if the surface is that of the object.
+    /// True if the surface belongs to the object.
     pub(super) is_own: bool,
     pub(super) colour: [f32; 3],
 }
 
 impl DepthPicture {
-    /// The surface is where half of the light is lost within the main Gaussian of a pixel. The mean depth would be drawn
-    /// to what is behind the object, by the light that comes through.
+    /// Makes a picture. The surface is where half of the light is absorbed within a pixel's main Gaussian. The mean
+    /// depth would be biased towards the background by light that passes through.
     pub(super) fn new(camera: Camera, rendered: &Render, shown: &Gaussians, label: u32) -> Self {
         let main = |pixel: usize| usize::try_from(rendered.top_id[pixel]).ok();
         let depth = |pixel: usize| {
@@ -149,8 +149,8 @@ impl DepthPicture {
         Self { camera, pixels }
     }
 
-    /// Returns what is seen in the direction of a world point, and how far that point is behind the camera's near side of the
-    /// surface along the ray: negative in front of it, minus infinity where there is no surface.
+    /// Returns the pixel in the direction of a world point, and the point's distance behind the visible surface along
+    /// the ray: negative in front of it, minus infinity without a surface.
     pub(super) fn pixel_at(&self, world: DVec3) -> Option<(&Pixel, f64)> {
         let place = self.camera.to_camera(world);
         let DVec2 { x, y } = self.camera.project(place);
@@ -165,8 +165,8 @@ impl DepthPicture {
     }
 }
 
-/// Returns the depth along the ray of a place in the picture at which half of the light is lost, if that is in this Gaussian of
-/// this blending weight: one whose density along the ray takes the light as that of a fog does.
+/// Returns the depth along a ray at which half of the light is absorbed, if this happens within this Gaussian, given
+/// its blending weight. The Gaussian is treated as fog with a normal density along the ray.
 fn half_light(shown: &Gaussians, row: usize, weight: f64, camera: &Camera, pixel: DVec2) -> Option<f32> {
     let axes = axes_of(shown.quats[row]).transpose();
     let inverse = DVec3::from_array(shown.scales[row].map(|scale| (-f64::from(scale)).exp()));
@@ -175,16 +175,16 @@ fn half_light(shown: &Gaussians, row: usize, weight: f64, camera: &Camera, pixel
     let peak = ray.dot(to) / ray.length_squared();
     let off = (to.length_squared() - peak * ray.dot(to)).max(0.0);
     let alpha = (shown.opacity(row) * (-0.5 * off).exp()).max(weight).min(ALPHA_MAX);
-    // What is left of the light before it, and the share of its fog in which that falls to one half.
+    // Light before the Gaussian, and the share of its density after which half of the light is left.
     let before = (weight / alpha).min(1.0);
     let share = ((2.0 * before).ln() / -(-alpha).ln_1p()).clamp(FOG_SHARE_MIN, 0.5);
-    // The place of that share of a normal distribution, by the logistic one.
+    // Quantile of a normal distribution, approximated by the logistic distribution.
     let depth = peak + (share / (1.0 - share)).ln() / 1.702 / ray.length();
     (depth > 0.0 && depth.is_finite()).then_some(depth as f32)
 }
 
-/// Returns the box of the surface in some pictures without a share of its pixels at each end of an axis; `None` without a
-/// surface.
+/// Returns the bounding box of the surface in all pictures, ignoring a share of its pixels at each end of an axis;
+/// `None` without a surface.
 pub(super) fn bounds(sights: &[DepthPicture], share: f64) -> Option<(DVec3, DVec3)> {
     let places: Vec<DVec3> = sights
         .iter()

@@ -1,4 +1,4 @@
-//! The grid of distances to a surface, and its triangles.
+//! The grid of signed distances to a surface, and its triangles.
 
 use super::sights::{BoundingBall, DepthPicture};
 use crate::formats::Mesh;
@@ -7,34 +7,36 @@ use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Cells around the box of the object.
+/// Margin around the object's box, cells.
 const MARGIN_CELLS: f64 = 3.0;
-/// Farthest distance in front of a surface that counts, cells; what is farther is only free.
+/// Largest distance in front of a surface that is stored, cells; cells farther in front are only free.
 const FRONT_MAX_CELLS: f64 = 3.0;
-/// Farthest distance behind a surface that counts, cells: less, because the other side of a thin wall may be there.
+/// Largest distance behind a surface that is stored, cells: smaller, because the other side of a thin wall may be
+/// there.
 const BEHIND_MAX_CELLS: f64 = 1.5;
-/// How far a surface may be outside of the box of what was seen of it, cells.
+/// How far the surface may be outside of the box of its visible part, cells.
 const BOX_SLACK_CELLS: f64 = 0.5;
-/// Weights against 1 of a picture that shows the surface at a place from its front: of one in which the place is free, or
-/// at the surface of something else; of one in which it is behind the object, or behind something else; and of the guess
-/// that it is inside.
+/// Weight of a picture in which a cell is free, or at another object's surface, relative to a picture that shows the
+/// surface frontally.
 const FREE_WEIGHT: f64 = 0.006;
+/// The same for a picture in which the cell is behind the object, or behind something else.
 const HIDDEN_WEIGHT: f64 = 0.01;
+/// The same for the prior that a cell is inside.
 const INSIDE_WEIGHT: f64 = 1e-4;
-/// Least size of a part of the object, in its largest one.
+/// Smallest part of the object to keep, relative to its largest part.
 const PART_SIZE_SHARE_MIN: f64 = 0.01;
-/// Least cosine of the slant of a surface whose depth counts.
+/// Smallest cosine between ray and surface normal at which depth counts.
 const COSINE_MIN: f32 = 0.1;
 
 /// A grid around an object.
 #[derive(Debug)]
 pub(super) struct Volume {
-    /// The box of what was seen of the object.
+    /// Bounding box of the visible part of the object.
     seen: (DVec3, DVec3),
     low: DVec3,
-    /// Size of a cell, world units.
+    /// Cell size, world units.
     cell: f64,
-    /// Corners of cells along each axis.
+    /// Cell corners along each axis.
     size: [u32; 3],
 }
 
@@ -46,20 +48,20 @@ impl Volume {
         Self { seen: (low, high), low: low - MARGIN_CELLS * cell, cell, size: [0, 1, 2].map(count) }
     }
 
-    /// The ball around the grid.
+    /// Returns the bounding ball of the grid.
     pub(super) fn ball(&self) -> BoundingBall {
         let half = DVec3::from_array(self.size.map(|size| f64::from(size - 1))) * (self.cell / 2.0);
         BoundingBall { centre: self.low + half, radius: half.length() }
     }
 
-    /// Returns the surface that some pictures show, closed where they show nothing.
+    /// Returns the surface that the pictures show, closed where they show nothing.
     pub(super) fn mesh(&self, sights: &[DepthPicture]) -> Mesh {
         let shape = RuntimeShape::<u32, 3>::new(self.size);
         let distance = |index: u32| {
             let at = shape.delinearize(index);
             let is_end = (0..3).any(|axis| at[axis] == 0 || at[axis] + 1 == self.size[axis]);
             let place = self.low + self.cell * DVec3::from_array(at.map(f64::from));
-            // Nothing goes on outside of the box, so that what was not seen there closes.
+            // Cells outside of the box are free, so that unseen sides are closed there.
             let outside = (self.seen.0 - place).max(place - self.seen.1).max_element() / self.cell - BOX_SLACK_CELLS;
             if is_end { FRONT_MAX_CELLS as f32 } else { self.distance(place, sights).max(outside) as f32 }
         };
@@ -81,7 +83,7 @@ impl Volume {
         }
     }
 
-    /// Returns the distance of a place to the surface, cells: negative inside.
+    /// Returns the signed distance of a position to the surface, cells; negative inside.
     fn distance(&self, place: DVec3, sights: &[DepthPicture]) -> f64 {
         let (mut sum, mut weight) = (-INSIDE_WEIGHT * BEHIND_MAX_CELLS, INSIDE_WEIGHT);
         let mut add = |value: f64, share: f64| (sum, weight) = (sum + share * value, weight + share);
@@ -90,10 +92,10 @@ impl Volume {
             let cosine = f64::from(pixel.cosine);
             match pixel.is_own {
                 _ if along > FRONT_MAX_CELLS => add(FRONT_MAX_CELLS, FREE_WEIGHT),
-                // What is at the surface of something else is not of the object.
+                // At the surface of another object is outside of this one.
                 false if along > -BEHIND_MAX_CELLS => add(FRONT_MAX_CELLS, FREE_WEIGHT),
                 false => add(BEHIND_MAX_CELLS, HIDDEN_WEIGHT),
-                // Across the surface, not along the ray.
+                // Distance across the surface, not along the ray.
                 true if along > -BEHIND_MAX_CELLS && pixel.cosine > COSINE_MIN => add(along * cosine, cosine * cosine),
                 true if along > -BEHIND_MAX_CELLS => {}
                 true => add(-BEHIND_MAX_CELLS, HIDDEN_WEIGHT),
@@ -102,10 +104,10 @@ impl Volume {
         sum / weight
     }
 
-    /// Fills what is free inside of the object, which nobody can see into, and frees small parts that are apart from it.
+    /// Fills enclosed cavities, which no picture can see, and removes small separate parts.
     fn without_specks(&self, distances: &mut [f32]) {
         let free = self.regions(distances, |distance| distance >= 0.0);
-        // The first one begins at a corner of the grid.
+        // The first region begins at a corner of the grid.
         free.iter().skip(1).flatten().for_each(|&cell| distances[cell] = -BEHIND_MAX_CELLS as f32);
         let parts = self.regions(distances, |distance| distance < 0.0);
         let largest = parts.iter().map(Vec::len).max().unwrap_or(0) as f64;
@@ -113,7 +115,7 @@ impl Volume {
         specks.flatten().for_each(|&cell| distances[cell] = FRONT_MAX_CELLS as f32);
     }
 
-    /// Returns the cells of each region in which a distance is `wanted`, by their first cells.
+    /// Returns the cells of each connected region of `wanted` distances, ordered by first cell.
     fn regions(&self, distances: &[f32], wanted: impl Fn(f32) -> bool) -> Vec<Vec<usize>> {
         let [width, height, _] = self.size.map(|size| size as usize);
         let mut open: Vec<bool> = distances.iter().map(|&distance| wanted(distance)).collect();
@@ -125,7 +127,7 @@ impl Volume {
             let (mut region, mut next) = (vec![first], 0);
             while let Some(&cell) = region.get(next) {
                 next += 1;
-                // The sides of the grid are free and around all else, so a step over an end stays among them.
+                // The border of the grid is free, so steps across a row's end stay within border cells.
                 for step in [1, width, width * height] {
                     for near in [cell.checked_sub(step), cell.checked_add(step)].into_iter().flatten() {
                         if open.get_mut(near).is_some_and(std::mem::take) {
@@ -139,7 +141,7 @@ impl Volume {
         regions
     }
 
-    /// Returns the mean colour of each place in the pictures that show it; the mean of all where none does.
+    /// Returns the mean colour of each position in the pictures that show it, or else the mean of all colours.
     fn colours(&self, places: &[DVec3], sights: &[DepthPicture]) -> Vec<[f32; 3]> {
         let colour = |&place: &DVec3| {
             let (mut sum, mut weight) = (DVec3::ZERO, 0.0);

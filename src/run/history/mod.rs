@@ -1,8 +1,8 @@
 //! `history.jsonl`: the numbers of a run over its steps, a line of JSON each.
 //!
-//! A line is written and flushed when its numbers are known, about every ten steps. A run that goes on from a checkpoint
-//! first drops the lines after it; sums of unfinished lines are in the checkpoint. So an interrupted run has the history
-//! of an uninterrupted one, except for times.
+//! A line is written and flushed when its numbers are known, about every ten steps. A run that goes on from a
+//! checkpoint first drops the lines after it; sums of unfinished lines are in the checkpoint. So an interrupted run has
+//! the history of an uninterrupted one, except for times.
 
 mod entry;
 mod read;
@@ -40,7 +40,8 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Opens the history of a run in the folder `out` that goes on after `step`, of `last` steps. 0 begins a new history.
+    /// Opens the history of a run in the folder `out` that goes on after `step`, of `last` steps. 0 begins a new
+    /// history.
     pub(super) fn new(out: &Path, (step, last): (u32, u32), sums: Sums) -> Self {
         let path = out.join(HISTORY_FILE);
         let (bytes, before) = kept(&path, step, last);

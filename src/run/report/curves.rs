@@ -40,7 +40,8 @@ pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
     charts.push(Chart { scale: Scale::FromZero, ..chart("Time of a step", "ms", steps_of(runs, |steps| steps.ms)) });
     html! {
         p.quiet {
-            "Each point of a loss is the mean over ten steps. PSNR and IoU are those of one view during the training, and \
+            "Each point of a loss is the mean over ten steps. PSNR and IoU are those of one view during the \
+            training, and \
              of all held-out views at the end."
         }
         div.charts {

@@ -72,7 +72,8 @@ fn columns(runs: &[ReportedRun], rows: &[(String, Vec<Option<String>>)]) -> Mark
         div.scroll {
             table {
                 @if runs.len() > 1 {
-                    thead { tr { th {} @for (index, run) in runs.iter().enumerate() { th { (run_name(index, run)) } } } }
+                    thead { tr { th {} @for (index, run) in runs.iter().enumerate() { th { (run_name(index,
+                    run)) } } } }
                 }
                 tbody {
                     @for (name, cells) in rows {

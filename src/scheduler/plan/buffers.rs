@@ -163,12 +163,13 @@ impl Deref for Table {
 /// Declares a table of buffers: `pub static TABLE: &Table`, and a constant for each row.
 ///
 /// First comes the advice if not all fit. Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The
-/// constants are `Buf::NAME`; with `consts;` before the rows they are free, for tables of tests. `Buf`, `BufferDecl` and
-/// `Table` have to be in scope.
+/// constants are `Buf::NAME`; with `consts;` before the rows they are free, for tables of tests. `Buf`, `BufferDecl`
+/// and `Table` have to be in scope.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {
-    (@table $cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+    (@table $cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr,
+    $doc:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
         enum BufferIndex { $($ident),* }
         /// All buffers, in the order of their declaration.
@@ -179,11 +180,13 @@ macro_rules! buffers {
             cure: $cure,
         };
     };
-    ($cure:expr; consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+    ($cure:expr; consts; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr,
+    $doc:literal;)*) => {
         $crate::buffers!(@table $cure; $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
         $(#[doc = $doc] #[allow(dead_code)] pub const $ident: Buf = Buf(BufferIndex::$ident as u16);)*
     };
-    ($cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr, $doc:literal;)*) => {
+    ($cure:expr; $($ident:ident $name:literal : $bytes:expr, $domain:expr, $class:expr, $texel:expr,
+    $doc:literal;)*) => {
         $crate::buffers!(@table $cure; $($ident $name : $bytes, $domain, $class, $texel, $doc;)*);
         impl Buf {
             $(#[doc = $doc] pub const $ident: Self = Self(BufferIndex::$ident as u16);)*

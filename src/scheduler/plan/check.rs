@@ -35,7 +35,8 @@ fn check_copy(table: &'static Table, sizes: &[u64], from: Buf, to: Buf, bytes: u
     if from == to || bytes > most || !bytes.is_multiple_of(4) {
         let (from, to) = (name(table, from), name(table, to));
         return Err(Error::Bug(format!(
-            "copy of {bytes} bytes from {from} to {to}: expected two different buffers, a multiple of 4 bytes, at most {most}"
+            "copy of {bytes} bytes from {from} to {to}: expected two different buffers, a multiple of 4 bytes, at \
+            most {most}"
         )));
     }
     Ok(())

@@ -34,7 +34,8 @@ pub struct PassDecl {
     pub shader: &'static ShaderDesc,
     /// Buffers in the order of the shader's bindings.
     pub buffers: Vec<Buf>,
-    /// Words of the specialisation constants and the pushed words, in the order of `ShaderDesc::spec`; empty for the defaults.
+    /// Words of the specialisation constants and the pushed words, in the order of `ShaderDesc::spec`; empty for the
+    /// defaults.
     pub spec: Vec<u32>,
     /// Number of workgroups.
     pub grid: Grid,

@@ -1,7 +1,8 @@
 //! Buffers that share bindings, on a device that has too few storage bindings for one each.
 //!
-//! All buffers outside of scratch lie in a block for each kind of memory (several if they exceed the largest allocation). A
-//! pass binds windows: ranges of blocks and of scratch pages that hold its buffers. `gpu/packed.rs` has the kernels for that.
+//! All buffers outside of scratch lie in a block for each kind of memory (several if they exceed the largest
+//! allocation). A pass binds windows: ranges of blocks and of scratch pages that hold its buffers. `gpu/packed.rs` has
+//! the kernels for that.
 
 use super::buffers::{Class, Table};
 use super::pass::{PassDecl, PassList, Work};
@@ -68,8 +69,8 @@ pub(crate) struct Cover<K> {
     pub(crate) window_of: Vec<u8>,
 }
 
-/// Covers buffers with the fewest windows. Windows are in the order in which buffers name their blocks, whose names do not
-/// matter, so that passes with the same places have the same kernels.
+/// Covers buffers with the fewest windows. Windows are in the order in which buffers name their blocks, whose names do
+/// not matter, so that passes with the same places have the same kernels.
 pub(crate) fn cover<K: Copy + PartialEq>(buffers: &[Span<K>], limits: &Limits) -> Cover<K> {
     let mut blocks: Vec<K> = Vec::new();
     for buffer in buffers {

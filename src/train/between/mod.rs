@@ -1,6 +1,7 @@
 //! Work between two steps: when it is due, and what it does.
 //!
-//! A new job is a file that implements [`StepJob`], and its place in [`TrainingJobs`]. [`crate::run`] has jobs too: they write files.
+//! A new job is a file that implements [`StepJob`], and its place in [`TrainingJobs`]. [`crate::run`] has jobs too:
+//! they write files.
 
 mod growth;
 mod occluders;

@@ -1,7 +1,7 @@
 //! Space without Gaussians: before the training cameras, and before all cameras between two of them.
 //!
-//! Gaussians there stand for nothing that was photographed. Training cannot tell when they are before no training camera,
-//! but they fog views between those cameras.
+//! Gaussians there stand for nothing that was photographed. Training cannot tell when they are before no training
+//! camera, but they fog views between those cameras.
 
 use super::sampler::stream;
 use crate::scene::{Camera, Dataset, Gaussians};

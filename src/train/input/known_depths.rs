@@ -47,8 +47,8 @@ impl KnownDepths {
         self.0.len()
     }
 
-    /// Draws the band of a photo of `full` px at the size of a step: 1 / depth, 0 where it is not known. The nearest of a
-    /// pixel counts. Pixels of `photo`, the band at that size, that are left out of the loss have none.
+    /// Draws the band of a photo of `full` px at the size of a step: 1 / depth, 0 where it is not known. The nearest of
+    /// a pixel counts. Pixels of `photo`, the band at that size, that are left out of the loss have none.
     pub(in crate::train) fn drawn(&self, full: (u32, u32), band: Band, photo: &Photo) -> Vec<f32> {
         let (width, height) = (photo.width, photo.height);
         let mut drawn = vec![0.0_f32; width as usize * height as usize];

@@ -1,8 +1,8 @@
-//! Parts of the photos, one for a step: whole photos, or bands of rows where the device cannot walk the tiles of a whole
-//! one.
+//! Parts of the photos, one for a step: whole photos, or bands of rows where the device cannot walk the tiles of a
+//! whole one.
 //!
-//! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it, and
-//! votes and renders between steps are those of whole photos.
+//! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it,
+//! and votes and renders between steps are those of whole photos.
 
 use super::step_input::{self, ObjectLight};
 use crate::engine::Band;

@@ -1,7 +1,7 @@
 //! Pixels of the next steps, made on threads while the device works.
 //!
-//! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same bits
-//! whether its pixels were made ahead or are made when it begins.
+//! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same
+//! bits whether its pixels were made ahead or are made when it begins.
 
 use super::known_depths::KnownDepths;
 use super::part::{labels_of, photo_of};

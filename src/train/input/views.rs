@@ -141,8 +141,8 @@ impl Views {
         (side_at(full.0, share), side_at(full.1, share))
     }
 
-    /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it, made
-    /// meanwhile.
+    /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it,
+    /// made meanwhile.
     pub(in crate::train) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
         // Steps in flight still use their pixels and sizes.
         let oldest = step.saturating_sub(self.frames);

@@ -25,8 +25,8 @@ crate::options! {
             /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size
             /// [default: 0.4, for photos above 400 px less: 160 px].
             ///
-            /// The size grows up to `full_size_from`. Early steps are rough anyway, and cost in proportion to the pixels.
-            /// 3DGS trains at full size.
+            /// The size grows up to `full_size_from`. Early steps are rough anyway, and cost in proportion to the
+            /// pixels. 3DGS trains at full size.
             start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0), setting;
 
             /// First step at full size [default: 0.6 of the run, later where the run is short for such large photos].
@@ -41,23 +41,25 @@ crate::options! {
 
             /// Most Gaussians, such as 500k or 2M; 0 leaves the bound to the memory of the device.
             ///
-            /// 0. At the bound only the largest gradients grow. Points are thinned to half of it, else to 4 x the budget.
+            /// 0. At the bound only the largest gradients grow. Points are thinned to half of it, else to 4 x the
+            ///    budget.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
 
-            /// Weight of known depths in the loss [default: 0.3 where the reconstruction says which photo shows which point, else
-            /// 0].
+            /// Weight of known depths in the loss [default: 0.3 where the reconstruction says which photo shows which
+            /// point, else 0].
             ///
-            /// Where the photo shows a point, or --depths has a value, light from Gaussians at another depth costs by its
-            /// relative error, at most 1; a mean over these pixels. It falls linearly until the first step with labels, and
-            /// moves opacities only.
+            /// Where the photo shows a point, or --depths has a value, light from Gaussians at another depth costs by
+            /// its relative error, at most 1; a mean over these pixels. It falls linearly until the first step with
+            /// labels, and moves opacities only.
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed, setting;
 
             /// Trains a model without aliasing.
             ///
-            /// Smaller pictures of such a model do not shimmer, and views from nearby show no needles: blur takes opacity, and
-            /// no Gaussian is finer than the pixels of its nearest photo (Mip-Splatting). At the size of the photos it gains
-            /// nothing. Viewers that do not know the flag in the model show its fine parts too bold.
+            /// Smaller pictures of such a model do not shimmer, and views from nearby show no needles: blur takes
+            /// opacity, and no Gaussian is finer than the pixels of its nearest photo (Mip-Splatting). At the size of
+            /// the photos it gains nothing. Viewers that do not know the flag in the model show its fine parts too
+            /// bold.
             antialias <"SWITCH">: bool = false, fixed;
 
             /// Degree of the spherical harmonics, 0 to 3.
@@ -67,8 +69,9 @@ crate::options! {
 
             /// What the optimiser remembers of each parameter: two numbers of 32 bits, or two of 16.
             ///
-            /// With `half` a model takes 8 bytes a parameter on the device and in checkpoints, not 12, for as good a picture;
-            /// numbers are rounded at random, the same for the same seed. For scenes that do not fit otherwise.
+            /// With `half` a model takes 8 bytes a parameter on the device and in checkpoints, not 12, for as good a
+            /// picture; numbers are rounded at random, the same for the same seed. For scenes that do not fit
+            /// otherwise.
             moments <"KIND">: Moments = Moments::Full, fixed, setting;
 
             /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
@@ -86,8 +89,9 @@ crate::options! {
 
             /// Gives each step a colour of its own behind the scene.
             ///
-            /// What no Gaussian covers then never looks right, so that nothing is left to the background. Transparent photos
-            /// are compared over the same colour. Renders and scores have --background. Off (3DGS, which has the choice).
+            /// What no Gaussian covers then never looks right, so that nothing is left to the background. Transparent
+            /// photos are compared over the same colour. Renders and scores have --background. Off (3DGS, which has the
+            /// choice).
             random_background <"SWITCH">: bool = false, fixed;
 
             /// Trains the exposure and white balance of each photo.
@@ -114,14 +118,14 @@ crate::options! {
             /// Prunes Gaussians that fog the cameras.
             ///
             /// They are nearer than a quarter of all that a camera sees of the first Gaussians, or their deviation is
-            /// more than half their distance from a camera. Off in 3DGS, where such Gaussians stand for the sky and other
-            /// distant things.
+            /// more than half their distance from a camera. Off in 3DGS, where such Gaussians stand for the sky and
+            /// other distant things.
             free_space <"SWITCH">: bool = true, setting;
 
             /// Directions around the cameras in which far Gaussians are tried; 0 adds none.
             ///
-            /// The first Gaussians then stand also for the sky and other distant things without points. Only directions in
-            /// which most photos look past all points get one. 3DGS has none.
+            /// The first Gaussians then stand also for the sky and other distant things without points. Only directions
+            /// in which most photos look past all points get one. 3DGS has none.
             far_points <"N">: u32 = 800, setting;
 
             /// Box in which Gaussians grow, world units: the smaller corner first [default: everywhere].
@@ -144,8 +148,8 @@ crate::options! {
 
             /// Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
             ///
-            /// 0 chooses by the size of the photos and the length of the run: `detail` for each pixel of a photo, and at
-            /// most 30 for each step.
+            /// 0 chooses by the size of the photos and the length of the run: `detail` for each pixel of a photo, and
+            /// at most 30 for each step.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
 
@@ -157,7 +161,8 @@ crate::options! {
 
             /// Share of the Gaussians left by `prune_share` that split, given masks: those most across contours.
             ///
-            /// As many more are pruned. Outlines get sharper. With 0, or with `prune_share` 0, none split, as in LabelGS.
+            /// As many more are pruned. Outlines get sharper. With 0, or with `prune_share` 0, none split, as in
+            /// LabelGS.
             contour_share <"SHARE">: f64 = 0.05, up_to(0.5), setting;
 
             /// Gaussians for each pixel of the largest photo, for --budget 0.
@@ -233,8 +238,9 @@ crate::options! {
             /// Steps between two with object layers; 0 makes none [default: 8; 1 with the label rule main].
             ///
             /// Such a step renders each sampled object alone on black, and compares it with its pixels of the photo,
-            /// without occluders; its label loss counts this many times. 1 is LabelGS, which takes up to twice the time. The
-            /// other steps with labels reduce the weight of wrong labels in the scene's own picture, by opacity only.
+            /// without occluders; its label loss counts this many times. 1 is LabelGS, which takes up to twice the
+            /// time. The other steps with labels reduce the weight of wrong labels in the scene's own picture, by
+            /// opacity only.
             layer_every <"STEPS">: Option<u32> = None, fixed, setting;
 
             /// Objects per step.
@@ -257,9 +263,10 @@ crate::options! {
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// 1; LabelGS has none. The term compares the opacity of an object alone with its mask, where that is off by
-            /// more than a half, and not in pixels of other objects. Without it what hides behind other things turns black
-            /// rather than clear, and shows when the object is taken out. Higher weights lower the quality of the picture.
+            /// 1; LabelGS has none. The term compares the opacity of an object alone with its mask, where that is off
+            /// by more than a half, and not in pixels of other objects. Without it what hides behind other things turns
+            /// black rather than clear, and shows when the object is taken out. Higher weights lower the quality of the
+            /// picture.
             label_alpha <"WEIGHT">: f32 = 1.0, not_negative, setting;
 
             /// Source of the occluders.

@@ -18,8 +18,9 @@ const POINT_BUDGETS_MAX: u64 = 4;
 const MCMC_OPACITY: f32 = 0.5;
 const MCMC_SIZE_FACTOR: f32 = 0.3;
 
-/// Makes the initial Gaussians of a training: at the points of the scene or at random places, and far ones. Points beyond
-/// `max_gaussians`, or far beyond the budget without it, are thinned evenly; half of `max_gaussians` is left for growth.
+/// Makes the initial Gaussians of a training: at the points of the scene or at random places, and far ones. Points
+/// beyond `max_gaussians`, or far beyond the budget without it, are thinned evenly; half of `max_gaussians` is left for
+/// growth.
 pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
     let random = match config.strategy {
         StrategyKind::Adc => RANDOM_GAUSSIANS_MAX,
@@ -37,8 +38,8 @@ pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians>
     Ok(model)
 }
 
-/// Returns the points of the scene for the first Gaussians: all, or as many as their number may be. More would cost time and
-/// memory, and the photos have too few pixels to tell them apart.
+/// Returns the points of the scene for the first Gaussians: all, or as many as their number may be. More would cost
+/// time and memory, and the photos have too few pixels to tell them apart.
 fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Point]>> {
     let (all, far) = (dataset.points.len() as u64, u64::from(config.far_points));
     let (width, height) = engine_size(dataset, config, 0)?.image;
@@ -70,8 +71,8 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
     Ok(Cow::Owned(init::thinned(&dataset.points, most as usize)))
 }
 
-/// Fits a trained model and the settings to each other: the training goes on with all that the model has. The schedules of
-/// a new model, which begin with small pictures and one band of colour, would first spoil it.
+/// Fits a trained model and the settings to each other: the training goes on with all that the model has. The schedules
+/// of a new model, which begin with small pictures and one band of colour, would first spoil it.
 pub(crate) fn go_on_from(mut model: Gaussians, dataset: &Dataset, config: &TrainConfig) -> (Gaussians, TrainConfig) {
     if model.labels.is_some() && dataset.train.iter().all(|view| view.mask.is_none()) {
         tracing::warn!("the labels of the first model are lost, because the scene has no masks");

@@ -73,7 +73,8 @@ pub(in crate::train) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> R
     Ok(config.for_size(engine_size(dataset, config, 0)?.image))
 }
 
-/// Makes the initial sizes: for twice the number of Gaussians of the first model, or for that number if memory is short.
+/// Makes the initial sizes: for twice the number of Gaussians of the first model, or for that number if memory is
+/// short.
 pub(crate) fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
@@ -108,8 +109,8 @@ fn propose_half(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Opti
     }
 }
 
-/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each view, or
-/// none.
+/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each
+/// view, or none.
 pub(in crate::train) fn train_views(
     dataset: &Dataset,
     depths: Vec<KnownDepths>,

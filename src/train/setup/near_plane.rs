@@ -26,8 +26,8 @@ pub(in crate::train) fn seen_depths(camera: &Camera, places: &[DVec3]) -> Vec<f6
     places.iter().map(|&world| camera.to_camera(world)).filter(is_seen).map(|place| place.z).collect()
 }
 
-/// Returns [`NEAR_DEFAULT`], or [`NEAR_DEPTH_SHARE`] times the median depth of the first Gaussians in the training cameras if that is
-/// less.
+/// Returns [`NEAR_DEFAULT`], or [`NEAR_DEPTH_SHARE`] times the median depth of the first Gaussians in the training
+/// cameras if that is less.
 pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
     let (rows, every) = (sample(model, SAMPLE_GAUSSIANS_MAX), cameras.len().div_ceil(SAMPLE_CAMERAS_MAX).max(1));
     let mut depths: Vec<f64> = cameras.step_by(every).flat_map(|camera| seen_depths(camera, &rows)).collect();

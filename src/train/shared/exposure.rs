@@ -1,10 +1,10 @@
 //! Exposure and white balance of each photo: a matrix of colours, trained beside the Gaussians.
 //!
-//! A camera that chooses its exposure shows the same surface brighter in one photo than in another, and other light gives it
-//! other colours. Without a matrix, Gaussians near the cameras make up for it, which spoils other views. The colours of
-//! the picture of a step are multiplied by the matrix of its photo before the loss: gains of red, green and blue, after each
-//! has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that the model has the
-//! mean exposure.
+//! A camera that chooses its exposure shows the same surface brighter in one photo than in another, and other light
+//! gives it other colours. Without a matrix, Gaussians near the cameras make up for it, which spoils other views. The
+//! colours of the picture of a step are multiplied by the matrix of its photo before the loss: gains of red, green and
+//! blue, after each has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that
+//! the model has the mean exposure.
 
 use super::{RowOffsets, SharedLayout, SharedParameters};
 use crate::Setting;
@@ -17,8 +17,8 @@ use std::sync::Arc;
 
 /// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
 const LEARNING_RATE: f64 = 0.01;
-/// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have up to
-/// 0.04, by what shines and by noise.
+/// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have
+/// up to 0.04, by what shines and by noise.
 const SPREAD_MIN: f64 = 0.07;
 /// Share of the photos whose gains must be known for a decision.
 const KNOWN_SHARE_MIN: f64 = 0.5;

@@ -1,8 +1,9 @@
 //! Poses of the photos: a correction of each, trained beside the Gaussians.
 //!
-//! Poses of a reconstruction may be off by pixels, which blurs the model. The camera of a step is turned and moved by the
-//! correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a path of
-//! cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose of them.
+//! Poses of a reconstruction may be off by pixels, which blurs the model. The camera of a step is turned and moved by
+//! the correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a
+//! path of cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose
+//! of them.
 
 use super::preconditioner::{self, Matrix};
 use super::{RowOffsets, SharedLayout, SharedParameters};
@@ -17,13 +18,14 @@ use std::sync::Arc;
 pub(in crate::train) const POSES_NAME: &str = "poses";
 /// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
 pub(crate) const ROWS_PER_PHOTO: usize = 14;
-/// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some
-/// dozens a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`LEARNING_RATE_FALL`] of itself.
+/// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some dozens
+/// a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`LEARNING_RATE_FALL`] of itself.
 const LEARNING_RATE_START: f64 = 2e-3;
 const LEARNING_RATE_FALL: f64 = 0.02;
 /// Share of the run before the first update: Gaussians have no colours of their own yet.
 const FIRST_UPDATE_SHARE: f64 = 0.08;
-/// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any more.
+/// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any
+/// more.
 const COMPARISON_SHARES: [f64; 3] = [0.2, 0.35, 0.5];
 
 /// Corrections of the poses, 0 in the beginning.

@@ -1,8 +1,8 @@
 //! Preconditioner of a photo's pose (CamP, Park et al. 2023).
 //!
-//! A turn and a move look alike in a photo, and a move along the axis hardly shows. Adam takes steps of one length in each
-//! number that it trains. The pose is therefore the product of a matrix and six such numbers, each of which moves the
-//! points of the scene equally far in the photo, and none of them like another one.
+//! A turn and a move look alike in a photo, and a move along the axis hardly shows. Adam takes steps of one length in
+//! each number that it trains. The pose is therefore the product of a matrix and six such numbers, each of which moves
+//! the points of the scene equally far in the photo, and none of them like another one.
 
 use crate::scene::{Camera, Point};
 use glam::DVec3;
@@ -10,8 +10,8 @@ use glam::DVec3;
 /// A matrix of the six numbers of a pose: the turn, then the move.
 pub(in crate::train) type Matrix = [[f64; 6]; 6];
 
-/// Share of its diagonal that is added to the second moments: a number that hardly shows takes steps up to its inverse root
-/// longer.
+/// Share of its diagonal that is added to the second moments: a number that hardly shows takes steps up to its inverse
+/// root longer.
 const DAMPING_SHARE: f64 = 0.01;
 /// Fewest points that tell the moments.
 const POINTS_MIN: usize = 10;
@@ -28,8 +28,8 @@ const IDENTITY: Matrix = {
     one
 };
 
-/// Returns the preconditioner of a view: the inverse root of the second moments of the derivatives of points in the photo,
-/// focal lengths. Moves are in units of `unit`, world units. A view of few points has the identity.
+/// Returns the preconditioner of a view: the inverse root of the second moments of the derivatives of points in the
+/// photo, focal lengths. Moves are in units of `unit`, world units. A view of few points has the identity.
 pub(in crate::train) fn view_preconditioner(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
     let seen: Vec<DVec3> =
         points.iter().filter(|point| camera.sees(point.position).is_some()).map(|p| p.position).collect();
@@ -59,8 +59,8 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     a.map(|row| [0, 1, 2, 3, 4, 5].map(|column| (0..6).map(|k| row[k] * b[k][column]).sum()))
 }
 
-/// Returns the symmetric inverse root of a symmetric positive matrix, by the coupled iteration of Newton and Schulz; `None`
-/// if it has none.
+/// Returns the symmetric inverse root of a symmetric positive matrix, by the coupled iteration of Newton and Schulz;
+/// `None` if it has none.
 fn inverse_root(matrix: &Matrix) -> Option<Matrix> {
     let size = matrix.as_flattened().iter().map(|value| value * value).sum::<f64>().sqrt();
     let (mut root, mut inverse) = (matrix.map(|row| row.map(|value| value / size)), IDENTITY);
@@ -107,7 +107,8 @@ mod tests {
         assert!(inverse_root(&[[f64::NAN; 6]; 6]).is_none());
     }
 
-    /// Each number moves the points equally far in the photo, and all directions of the six are alike but for the damping.
+    /// Each number moves the points equally far in the photo, and all directions of the six are alike but for the
+    /// damping.
     #[test]
     fn numbers_move_the_points_equally_far() {
         let (camera, points) = (camera(), points());

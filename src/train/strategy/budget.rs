@@ -1,8 +1,9 @@
 //! Growth within a budget: the Gaussians with the largest gradients split along their longest axis (Improved-GS).
 //!
-//! The statistic adds absolute gradients of tiles, because those of a Gaussian's two sides cancel (AbsGS, by pixel). The
-//! budget rises linearly to its end. After it, densifications go on without growth, to prune; once, Gaussians that show little
-//! make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the cameras.
+//! The statistic adds absolute gradients of tiles, because those of a Gaussian's two sides cancel (AbsGS, by pixel).
+//! The budget rises linearly to its end. After it, densifications go on without growth, to prune; once, Gaussians that
+//! show little make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the
+//! cameras.
 
 use super::exchange::exchange;
 use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};

@@ -8,9 +8,9 @@ use crate::label::vote::ballot::{Ballot, Sweep, sweep};
 use crate::label::vote::decide::EVIDENCE_MIN_PX;
 use crate::train::TrainConfig;
 
-/// Prunes the [share](TrainConfig::prune_share) of the Gaussians with the least blending weight over all training views.
-/// Given masks, it splits up to a [share](TrainConfig::contour_share) of the others, and prunes as many more. Statistics
-/// start over.
+/// Prunes the [share](TrainConfig::prune_share) of the Gaussians with the least blending weight over all training
+/// views. Given masks, it splits up to a [share](TrainConfig::contour_share) of the others, and prunes as many more.
+/// Statistics start over.
 pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<DensifyCounts> {
     let ballot = ballot(population, config)?;
     let weights = match &ballot {
@@ -44,9 +44,9 @@ fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
     Ok(weights(population.engine(), cameras)?.into_iter().map(f64::from).collect())
 }
 
-/// Returns up to `most` of the first `count` Gaussians, sorted: those with the most weight on other labels than their main
-/// one, at least [`EVIDENCE_MIN_PX`], times its share of all their weight. Without the share, large Gaussians behind an object would come
-/// first, of which a little shows beside its contour.
+/// Returns up to `most` of the first `count` Gaussians, sorted: those with the most weight on other labels than their
+/// main one, at least [`EVIDENCE_MIN_PX`], times its share of all their weight. Without the share, large Gaussians
+/// behind an object would come first, of which a little shows beside its contour.
 fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
     let score = |row: usize| {
         let (all, astray) = ballot.spread(row);

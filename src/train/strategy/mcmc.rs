@@ -1,9 +1,9 @@
 //! A fixed number of Gaussians that explore the scene (3DGS-MCMC, Kheradmand et al. 2024): faint ones move at random;
 //! dead ones become copies of others, drawn by their opacity. The loss keeps opacities and sizes small.
 //!
-//! Three things differ from the paper. The number rises linearly to the budget, because a twentieth more at each event takes
-//! as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a line. The
-//! factor of the learning rates for short runs does not apply to the moves.
+//! Three things differ from the paper. The number rises linearly to the budget, because a twentieth more at each event
+//! takes as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a
+//! line. The factor of the learning rates for short runs does not apply to the moves.
 
 use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;

@@ -105,8 +105,8 @@ impl Population<'_> {
         self.densify(uniforms, u64::MAX)
     }
 
-    /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`, within
-    /// the limit. Each one drawn becomes a stack of copies that look like it. Statistics start over.
+    /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`,
+    /// within the limit. Each one drawn becomes a stack of copies that look like it. Statistics start over.
     pub fn relocate(&mut self, uniforms: StepUniforms, wanted: u64) -> Result<DensifyCounts> {
         let counted = self.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
         let (alive, weight) = (u64::from(self.count() - counted.pruned_count), counted.densified_count);
@@ -126,8 +126,8 @@ impl Population<'_> {
         Ok(done)
     }
 
-    /// Makes room for a number of Gaussians. If memory is short, the room of now becomes the limit, which it returns, unless
-    /// `most` is no more than that.
+    /// Makes room for a number of Gaussians. If memory is short, the room of now becomes the limit, which it returns,
+    /// unless `most` is no more than that.
     fn make_room(&mut self, count: u64, most: u64) -> Result<Option<u64>> {
         let room = self.engine.size().gaussians;
         match self.engine.make_room_for_gaussians(count) {

@@ -35,8 +35,8 @@ impl Trainer {
         self.copied_state()?.whole()
     }
 
-    /// Waits for the steps in flight and copies the state of the training: on a card in its memory, so that steps go on before
-    /// it is read.
+    /// Waits for the steps in flight and copies the state of the training: on a card in its memory, so that steps go on
+    /// before it is read.
     pub fn copied_state(&mut self) -> Result<PendingState> {
         self.drain()?;
         self.check_finite()?;
@@ -70,8 +70,8 @@ impl Trainer {
         Ok(PendingState { state, planes: self.context.engine.copy_state(self.context.strategy.planes())? })
     }
 
-    /// Looks for a NaN or infinity in the planes of the state: the checkpoint would be useless. No pass has checked the result
-    /// of the last step yet.
+    /// Looks for a NaN or infinity in the planes of the state: the checkpoint would be useless. No pass has checked the
+    /// result of the last step yet.
     fn check_finite(&mut self) -> Result<()> {
         let found = self.context.engine.nonfinite(self.context.strategy.planes())?;
         let Some((name, row, is_shared)) = found else { return Ok(()) };

@@ -158,8 +158,8 @@ impl Trainer {
         self.context.views.show_only(is_meant);
     }
 
-    /// Submits a step, with the work that is due before and after it. Returns the reports of finished steps; they lag behind,
-    /// because some steps are in flight.
+    /// Submits a step, with the work that is due before and after it. Returns the reports of finished steps; they lag
+    /// behind, because some steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
         let mut done = self.work(JobTime::Before, step)?;

@@ -21,8 +21,8 @@ impl Trainer {
         self.context.engine.download_model()
     }
 
-    /// Returns the model with its final labels. With [`LabelRule::Votes`](crate::train::LabelRule::Votes) it counts them
-    /// again and sets the confidence.
+    /// Returns the model with its final labels. With [`LabelRule::Votes`](crate::train::LabelRule::Votes) it counts
+    /// them again and sets the confidence.
     pub fn labelled_model(&mut self) -> Result<Gaussians> {
         self.drain()?;
         let decision = self.jobs.votes.count(&mut self.context)?;

@@ -54,9 +54,9 @@ pub fn step(fixture: &mut Fixture, leeway: f64) -> Result<Judge> {
     }))
 }
 
-/// Runs a step without the pass for the least sizes, and one with it. A third of the Gaussians has a limit below, a third
-/// one above that of the view; some of the Gaussians are outside of the view. Decisions too near to a threshold are left
-/// out.
+/// Runs a step without the pass for the least sizes, and one with it. A third of the Gaussians has a limit below, a
+/// third one above that of the view; some of the Gaussians are outside of the view. Decisions too near to a threshold
+/// are left out.
 pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
     let step = |passes: u32| -> Result<_> {
         let mut fixture = rig()?;

@@ -228,8 +228,8 @@ impl FinishedStep {
         Ok(exact(&second, &first))
     }
 
-    /// Checks the sums of blending weights by label of the mask. `alone`: with each Gaussian as if nothing were in front of
-    /// it.
+    /// Checks the sums of blending weights by label of the mask. `alone`: with each Gaussian as if nothing were in
+    /// front of it.
     pub(super) fn votes(&mut self, alone: bool) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
@@ -280,9 +280,9 @@ impl FinishedStep {
     }
 }
 
-/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). The first ones close all pixels except
-/// those around the tile's last, so that most lanes of a subgroup are done. The last ones cover the last pixel, where
-/// they are visible only if the walk goes on to its end for the lanes that are left.
+/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). The first ones close all pixels
+/// except those around the tile's last, so that most lanes of a subgroup are done. The last ones cover the last pixel,
+/// where they are visible only if the walk goes on to its end for the lanes that are left.
 pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     const SPLATS: usize = 70_000;
     let (width, height) = (kernels.tile_width, kernels.tile_height);

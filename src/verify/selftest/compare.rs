@@ -45,8 +45,8 @@ fn same_length<A, B>(actual: &[A], expected: &[B]) -> Result<(), String> {
     Err(format!("{} elements where {} are expected", actual.len(), expected.len()))
 }
 
-/// Returns the places with a margin above `least`; an error unless they are more than a share of all. Decisions at the other
-/// places may go either way.
+/// Returns the places with a margin above `least`; an error unless they are more than a share of all. Decisions at the
+/// other places may go either way.
 pub fn sure(margins: impl IntoIterator<Item = f64>, least: f64, share: f64) -> Result<Vec<usize>, String> {
     let is_sure: Vec<bool> = margins.into_iter().map(|margin| margin > least).collect();
     let sure: Vec<usize> = (0..is_sure.len()).filter(|&place| is_sure[place]).collect();

@@ -33,8 +33,8 @@ const PHOTO_ROWS: [[f32; 4]; 9] = [
 const ROWS_PER_PHOTO: usize = EXPOSURE_ROWS as usize;
 const STEP_ROWS: Range<usize> = ROWS_PER_PHOTO..2 * ROWS_PER_PHOTO;
 
-/// Runs a step on a photo with some saturated pixels. Compares the gradients of the picture and of the rows of the photo;
-/// the other photos have none.
+/// Runs a step on a photo with some saturated pixels. Compares the gradients of the picture and of the rows of the
+/// photo; the other photos have none.
 pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let mut scene = scene(91, &shape);

@@ -131,8 +131,8 @@ impl OwnView {
 }
 
 impl Fixture {
-    /// Uploads the scene to a device, with or without labels, with kernels of a given shape, but with a pass for each part of an
-    /// update, so that gradients can be read. Without [`readable`], only some buffers can be read back.
+    /// Uploads the scene to a device, with or without labels, with kernels of a given shape, but with a pass for each
+    /// part of an update, so that gradients can be read. Without [`readable`], only some buffers can be read back.
     pub fn new(
         gpu: Arc<Gpu>,
         scene: Scene,

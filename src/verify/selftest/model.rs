@@ -128,8 +128,8 @@ impl ChangedPopulation {
     }
 }
 
-/// Counts and applies a densification at a step; the fixture's model is the population. Splits go along the longest axis
-/// or to random places. Positions and scales of children may differ from the reference's by `tolerance`.
+/// Counts and applies a densification at a step; the fixture's model is the population. Splits go along the longest
+/// axis or to random places. Positions and scales of children may differ from the reference's by `tolerance`.
 pub fn densification(
     fixture: &mut Fixture,
     before: Population,
@@ -179,8 +179,8 @@ pub fn reset(fixture: &mut Fixture, before: Population, leeway: f64) -> Result<J
     }))
 }
 
-/// Runs a training step with the paper's lift of labels; the scene has the labels from before. Exactly the expected labels
-/// must change. If several Gaussians have nearly the same weight, any of them may win.
+/// Runs a training step with the paper's lift of labels; the scene has the labels from before. Exactly the expected
+/// labels must change. If several Gaussians have nearly the same weight, any of them may win.
 pub fn lift(fixture: &mut Fixture) -> Result<Judge> {
     let before = fixture.model().labels;
     fixture.train()?;
@@ -212,16 +212,16 @@ pub fn dominant(seed: u64) -> Scene {
     s
 }
 
-/// A scene in which some Gaussians are before the near plane of [`fog`], and some engulf the camera. Its step runs twice,
-/// because its pairs need more room.
+/// A scene in which some Gaussians are before the near plane of [`fog`], and some engulf the camera. Its step runs
+/// twice, because its pairs need more room.
 pub fn large(seed: u64) -> Scene {
     let mut scene = scene(seed, &Shape { gaussians: 3000, scales: (0.02, 5.0), ..Shape::default() });
     scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|value| 2.5 * value));
     scene
 }
 
-/// Runs a step with the pass that marks Gaussians that fog its camera, or one on the way to another camera. Decisions too
-/// near to a threshold are left out.
+/// Runs a step with the pass that marks Gaussians that fog its camera, or one on the way to another camera. Decisions
+/// too near to a threshold are left out.
 pub fn fog(fixture: &mut Fixture) -> Result<Judge> {
     /// Near plane; about half of the Gaussians of [`large`] are before it, world units.
     const NEAR: f32 = 4.0;

@@ -143,7 +143,8 @@ struct StepChange {
     states: [MomentState; 2],
 }
 
-/// Runs steps with packed moments. With `split`, which has gradients of the same model, Gaussians may be late: then all catch up.
+/// Runs steps with packed moments. With `split`, which has gradients of the same model, Gaussians may be late: then all
+/// catch up.
 pub fn packed(fixture: &mut Fixture, mut split: Option<&mut Fixture>) -> Result<Judge> {
     let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
     let all = fixture.scene.gaussians.len();

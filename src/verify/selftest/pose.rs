@@ -16,8 +16,8 @@ use crate::train::shared::{RowOffsets, SharedLayout, SharedParameters};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// The trained numbers of two photos; the step is on the second one, whose pose is settled by a quarter. The last is the unit
-/// of moves.
+/// The trained numbers of two photos; the step is on the second one, whose pose is settled by a quarter. The last is
+/// the unit of moves.
 const TRAINED_NUMBERS: [[[f32; 4]; 2]; 2] =
     [[[0.1, 0.2, 0.3, 0.0], [0.1, 0.0, 0.0, 2.0]], [[0.06, -0.11, 0.08, 0.25], [-0.02, 0.03, 0.05, 2.0]]];
 const STEP_PHOTO_ROW: usize = poses::ROWS_PER_PHOTO;

@@ -45,8 +45,8 @@ pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway:
     }))
 }
 
-/// Runs three steps of the strategy mcmc, each on a new fixture of `rig`: as any step, with regularisation, and with random
-/// moves too. Returns how the moves and the terms of the loss compare with the reference.
+/// Runs three steps of the strategy mcmc, each on a new fixture of `rig`: as any step, with regularisation, and with
+/// random moves too. Returns how the moves and the terms of the loss compare with the reference.
 pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Judge; 2]> {
     let (mut uniforms, mut start, mut visible) = (StepUniforms::default(), Vec::new(), Vec::new());
     // Gradients and parameters after each step.
