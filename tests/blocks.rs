@@ -273,7 +273,7 @@ fn a_block_is_trained_with_its_scene_only() {
         BlockFile { exposures, ..file.clone() }.write(&folder).expect("written");
     };
     with([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    assert!(stderr(&train_block(&place, "b001", &[])).contains("is not the matrix of a photo"));
+    assert!(stderr(&train_block(&place, "b001", &[])).contains("is not a valid exposure matrix"));
     let matrix = [[1.25, 0.0, 0.05], [0.1, 0.9, 0.0], [0.0, 0.0, 0.8]];
     with(matrix);
     succeeded(&train_block(&place, "b001", &[]));
@@ -288,5 +288,5 @@ fn a_block_is_trained_with_its_scene_only() {
     // After the number of images and an id: the first number of a rotation.
     bytes[12..20].copy_from_slice(&0.5_f64.to_le_bytes());
     std::fs::write(&poses, bytes).expect("written");
-    assert!(refused(&["--block", &block]).contains("other poses than the scene that was split"));
+    assert!(refused(&["--block", &block]).contains("other poses than when it was split"));
 }

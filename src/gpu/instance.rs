@@ -90,7 +90,7 @@ impl Instance {
             ))
         };
         if fault::at("loader").is_some() {
-            return Err(missing(&"injected fault"));
+            return Err(missing(&"a fault on purpose"));
         }
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as in every Vulkan program.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| missing(&error))?;

@@ -198,8 +198,8 @@ pub struct ObjectPixel {
     pub weight: f64,
 }
 
-/// |U_k (R_k - M_k I)|, plus the weighted excess of |U_k (alpha_k - M_k)| over a slack, over the valid pixels, times the
-/// label weight.
+/// |U_k (R_k - M_k I)|, plus the weighted excess of |U_k (alpha_k - M_k)| over a slack, over the valid pixels, times
+/// the label weight.
 /// `picture` is R_k over black and alpha_k.
 pub fn label_loss(
     rules: &Rules,

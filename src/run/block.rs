@@ -1,4 +1,4 @@
-//! A block of a larger scene, as the part that a run trains.
+//! Trains a block of a larger scene as a region.
 
 use super::Settings;
 use super::resume::ResumePoint;
@@ -12,7 +12,7 @@ use crate::train::shared::exposure;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The folder of a block with its file.
+/// The folder of a block, with its parsed file.
 #[derive(Debug)]
 pub(super) struct Block {
     folder: PathBuf,
@@ -30,12 +30,12 @@ impl Block {
         BlockFile::init(&self.folder)
     }
 
-    /// Limits what is read of the scene to its views.
+    /// Restricts scene reading to the block's views.
     pub(super) fn limit(&self, options: &mut LoadOptions) {
         options.only = Some(Arc::new(self.file.names()));
     }
 
-    /// Refuses a scene that is not the one that was split.
+    /// Refuses a scene other than the one that was split.
     pub(super) fn check_scene(&self, dataset: &Dataset) -> Result<()> {
         let path = self.folder.join(block_file::BLOCK_FILE);
         for (which, wanted, found) in
@@ -43,22 +43,22 @@ impl Block {
         {
             let missing = wanted.iter().find(|name| !found.iter().any(|view| view.name == **name));
             if let Some(name) = missing {
-                let problem = format!("lists {name}, which is not there in {}", dataset.root.display());
+                let problem = format!("lists view {name}, which is missing in {}", dataset.root.display());
                 return Err(Error::data(&path, which, format!("{problem}; split the scene again")));
             }
         }
         let all: Vec<&View> = dataset.train.iter().chain(&dataset.test).collect();
         if poses_crc(all.iter().map(|view| &view.camera)) != self.file.poses {
-            let problem = format!("{} has other poses than the scene that was split", dataset.root.display());
+            let problem = format!("{} has other poses than when it was split", dataset.root.display());
             return Err(Error::data(&path, "poses", format!("{problem}; split it again")));
         }
         Ok(())
     }
 
-    /// Returns the part of the scene.
+    /// Returns the region of the block.
     pub(super) fn region(&self) -> Result<Region> {
         let rows = |(name, matrix): (&String, &ColourMatrix)| {
-            let problem = || format!("{matrix:?} of {name} is not the matrix of a photo; split the scene again");
+            let problem = || format!("{matrix:?} of {name} is not a valid exposure matrix; split the scene again");
             let error = || Error::data(self.folder.join(block_file::BLOCK_FILE), "exposures", problem());
             Ok((name.clone(), exposure::rows_of(matrix).ok_or_else(error)?))
         };
@@ -85,20 +85,20 @@ impl Block {
     }
 }
 
-/// Decides on the block of a run in `out`, and leaves its file there.
+/// Decides which block a run in `out` trains, and copies its file there.
 ///
 /// # Errors
 ///
-/// A run that goes on with another block than before, or without one.
+/// The run resumes with another block than before, or without its block.
 pub(super) fn settle(block: Option<&Block>, resumed: Option<&ResumePoint>, out: &Path) -> Result<()> {
     let path = out.join(block_file::BLOCK_FILE);
     let before = if path.is_file() { Some(BlockFile::read(out)?) } else { None };
     if resumed.is_some() && before.as_ref() != block.map(|block| &block.file) {
         let name = |file: Option<&BlockFile>| file.map_or("no block".to_owned(), |file| format!("block {}", file.id));
         let (then, now) = (name(before.as_ref()), name(block.map(|block| &block.file)));
+        let problem = if then == now { format!("{then} was split again since") } else { format!("{now} is given now") };
         let problem =
-            if then == now { format!("{then} was split anew meanwhile") } else { format!("now {now} is given") };
-        let problem = format!("holds a training of {then}, and {problem}; go on as before, or name a new folder");
+            format!("contains a run of {then}, but {problem}; resume with the same block, or name a new folder");
         return Err(Error::data(out, "", problem));
     }
     match block {
@@ -109,11 +109,12 @@ pub(super) fn settle(block: Option<&Block>, resumed: Option<&ResumePoint>, out: 
 }
 
 impl Settings {
-    /// Sets what a block decides: seed, steps, number of Gaussians, near plane, learning rates, held-out views.
+    /// Applies the settings that a block decides: seed, steps, number of Gaussians, near plane, learning rates,
+    /// held-out views.
     ///
     /// # Errors
     ///
-    /// A folder that is not that of a block.
+    /// The folder is not a block folder.
     pub fn for_block(&mut self, folder: &Path) -> Result<()> {
         Block::read(folder)?.apply(self);
         Ok(())

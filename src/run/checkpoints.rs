@@ -1,4 +1,4 @@
-//! The checkpoints that a run writes: by a thread, while the training goes on.
+//! Writes a run's checkpoints on a thread while training continues.
 
 use super::history::{Recorder, Sums};
 use super::resume::RunState;
@@ -14,16 +14,16 @@ use std::path::{Path, PathBuf};
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
-/// Number of checkpoints that a run keeps while it goes on. The older one is the fallback if the newest is damaged.
+/// Checkpoints that a run keeps. The older one is the fallback if the newest is corrupt.
 const FILES_MAX: usize = 2;
 
 pub(super) struct Checkpoints {
     out: PathBuf,
     lock: Lock,
     record: RunState,
-    /// Files of this run, the newest last.
+    /// Checkpoint files of this run, the newest last.
     kept: Vec<PathBuf>,
-    /// Step of the last one that was begun, and when that was.
+    /// Step of the last started checkpoint, and its time.
     step: u32,
     since: Instant,
     writer: Option<Writer>,
@@ -33,16 +33,16 @@ pub(super) struct Checkpoints {
 struct Writer {
     step: u32,
     path: PathBuf,
-    /// Taken when it is joined.
+    /// `None` after joining.
     thread: Option<JoinHandle<Result<()>>>,
 }
 
 impl Writer {
-    /// Begins to write, by a thread.
+    /// Starts writing on a thread.
     fn begin(step: u32, path: PathBuf, pending: PendingState) -> Result<Self> {
         let to = path.clone();
         let write = move || {
-            // A fault can only be slow here.
+            // An injected fault can only cause a delay here.
             let pause = || fault::at("checkpoint");
             pause();
             let whole = pending.whole()?;
@@ -60,17 +60,18 @@ impl Writer {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    /// Waits for the file. Returns its step and its path.
+    /// Waits for the file. Returns its step and path.
     fn end(mut self) -> (u32, Result<PathBuf>) {
         let ended = self.thread.take().map_or(Ok(Ok(())), JoinHandle::join);
-        let written = ended.unwrap_or_else(|_| Err(Error::Bug(format!("{}: its thread ended", self.path.display()))));
+        let written =
+            ended.unwrap_or_else(|_| Err(Error::Bug(format!("{}: the writing thread panicked", self.path.display()))));
         (self.step, written.map(|()| self.path.clone()))
     }
 }
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        // What was begun is completed, also when the run has failed.
+        // Finish a started checkpoint even if the run has failed.
         if let Some(Ok(Err(error))) = self.thread.take().map(JoinHandle::join) {
             tracing::warn!("the checkpoint of step {} is missing: {error}", self.step);
         }
@@ -84,7 +85,7 @@ impl Checkpoints {
             && let Some(old) = checkpoint_folder::list(out)?.first()
         {
             tracing::warn!(
-                "{} is of an earlier run; this run deletes it at its first checkpoint. Go on with that run to keep it",
+                "{} is from an earlier run; this run deletes it at its first checkpoint. Resume that run to keep it",
                 old.path.display()
             );
         }
@@ -92,20 +93,20 @@ impl Checkpoints {
         Ok(Self { out: out.to_owned(), lock, record, kept, step, since: Instant::now(), writer: None })
     }
 
-    /// Checks that the folder still belongs to this run. Call it before each write: somebody may have deleted the
-    /// folder and started another run there.
+    /// Checks that the folder still belongs to this run. Call this before each write, because somebody may have deleted
+    /// the folder and started another run there.
     pub(super) fn hold_folder(&mut self) -> Result<()> {
         self.lock.hold()
     }
 
-    /// Returns true if the schedule has a checkpoint at `step`.
+    /// Returns true if a checkpoint is due at `step`.
     fn is_due(&self, step: u32, last: u32) -> bool {
         let every = self.record.run.checkpoint_every;
         every != Every::NEVER && (step == last || every.is_due(step, self.since))
     }
 
-    /// Puts the training back to its last whole checkpoint after the failure `reason`. Returns its step and the sums of
-    /// its history, none if there is no checkpoint.
+    /// Restores the training from its last intact checkpoint after the failure `reason`. Returns the step and the
+    /// history sums; `None` if there is no checkpoint.
     pub(super) fn restore(&mut self, trainer: &mut Trainer, reason: &Error) -> Result<Option<(u32, Sums)>> {
         if let Some((step, Err(error))) = self.settle() {
             tracing::warn!("the checkpoint of step {step} is missing: {error}");
@@ -113,20 +114,20 @@ impl Checkpoints {
         while let Some(path) = self.kept.last() {
             match TrainState::read(path).and_then(|state| Ok((RunState::from_state(&state)?, state))) {
                 Ok((record, state)) => {
-                    tracing::warn!("{reason}; training goes back to {}", path.display());
+                    tracing::warn!("{reason}; training restarts from {}", path.display());
                     trainer.restore(&state)?;
                     self.step = state.step;
                     return Ok(Some((state.step, record.history)));
                 }
-                Err(error) => tracing::warn!("{error}; the checkpoint before it is tried"),
+                Err(error) => tracing::warn!("{error}; trying the previous checkpoint"),
             }
             self.kept.pop();
         }
         Ok(None)
     }
 
-    /// Begins a checkpoint unless this step has one. Nothing may be in flight, so that the history has all steps, and
-    /// no other checkpoint is being written.
+    /// Starts a checkpoint unless this step already has one. Nothing may be in flight, so that the history is complete,
+    /// and no other checkpoint may be in progress.
     fn begin(&mut self, trainer: &mut Trainer, history: &mut Recorder) -> Result<()> {
         let step = trainer.steps_done();
         if step == self.step {
@@ -142,8 +143,7 @@ impl Checkpoints {
         Ok(())
     }
 
-    /// Waits for the checkpoint that is being written, and deletes old ones after it is complete. Returns its step and
-    /// its path, `None` if there is none.
+    /// Waits for the checkpoint in progress, then deletes old ones. Returns its step and path; `None` if there is none.
     fn settle(&mut self) -> Option<(u32, Result<PathBuf>)> {
         let (step, written) = self.writer.take()?.end();
         let written = written.and_then(|path| {
@@ -151,7 +151,7 @@ impl Checkpoints {
             self.keep(FILES_MAX).map(|()| path)
         });
         if written.is_err() {
-            // The step may be saved again.
+            // The step may then be saved again.
             self.step = 0;
         }
         Some((step, written))
@@ -168,7 +168,7 @@ impl Checkpoints {
     }
 }
 
-/// Begins a checkpoint.
+/// Starts a checkpoint.
 pub(super) struct CheckpointJob;
 
 impl StepJob<Run<'_>> for CheckpointJob {
@@ -188,11 +188,11 @@ impl Run<'_> {
         self.hold_folder()?;
         self.end_checkpoint()?;
         self.begin_checkpoint()?;
-        // If the observer answers Save again, the step has its checkpoint already: no endless loop.
+        // If the observer answers Save again, the step already has its checkpoint, so there is no endless loop.
         self.end_checkpoint()
     }
 
-    /// Writes the checkpoint of a stopped run. Returns whether there is one.
+    /// Writes the checkpoint of a stopped run. Returns true if there is one.
     pub(super) fn keep_if_stopped(&mut self) -> Result<bool> {
         if !self.stopped {
             return Ok(false);
@@ -202,16 +202,16 @@ impl Run<'_> {
         self.checkpoints.settle().map_or(Ok(true), |(_, written)| written.map(|_| true))
     }
 
-    /// Tells of a checkpoint that is complete by now.
+    /// Reports a checkpoint that has been completed.
     pub(super) fn tell_checkpoint(&mut self) -> Result<()> {
         if self.checkpoints.writer.as_ref().is_some_and(Writer::is_done) { self.end_checkpoint() } else { Ok(()) }
     }
 
-    /// Waits for the checkpoint that is being written, if there is one, and tells of it. A failed write or listing is
-    /// only a warning: the next one may succeed.
+    /// Waits for the checkpoint in progress, if any, and reports it. Failures are only warnings, because the next
+    /// checkpoint may succeed.
     pub(super) fn end_checkpoint(&mut self) -> Result<()> {
         let Some((step, written)) = self.checkpoints.settle() else { return Ok(()) };
-        // It takes long enough for another run to come between.
+        // Writing takes long enough for another run to take the folder.
         self.hold_folder()?;
         match self.or_warned(written)? {
             Some(path) => self.tell(Event::Checkpoint { step, path: &path }),
@@ -219,13 +219,13 @@ impl Run<'_> {
         }
     }
 
-    /// Begins a checkpoint, and writes what a report of the run until then needs.
+    /// Starts a checkpoint, and writes the files that a report needs.
     fn begin_checkpoint(&mut self) -> Result<()> {
         self.history.drain(&mut self.trainer)?;
         self.hold_folder()?;
         let begun = self.checkpoints.begin(&mut self.trainer, &mut self.history);
         self.or_warned(begun)?;
-        // The copy of the state takes a while.
+        // Copying the state takes a while.
         self.hold_folder()?;
         let written = self.write_info();
         self.tolerate(written).map(|_| ())
@@ -237,7 +237,7 @@ impl Run<'_> {
                 let last = self.checkpoints.kept.last().map_or("there is no checkpoint yet".to_owned(), |path| {
                     format!("the last checkpoint is {}", path.display())
                 });
-                tracing::warn!("{error}; training goes on, {last}");
+                tracing::warn!("{error}; training continues, {last}");
                 Ok(None)
             }
             other => other.map(Some),

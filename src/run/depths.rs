@@ -1,4 +1,4 @@
-//! Depths that photos are known to have, from files or from the reconstruction.
+//! Known depths of photos, from files or from the reconstruction.
 
 use crate::error::{Error, Result, Setting};
 use crate::scene::{Dataset, View};
@@ -8,11 +8,11 @@ use crate::train::TrainConfig;
 use crate::train::input::known_depths::KnownDepths;
 use std::path::Path;
 
-/// Weight of known depths if nothing else is set.
+/// Default weight of known depths.
 const DEPTH_WEIGHT_DEFAULT: f64 = 0.3;
 
-/// Returns the settings with the weight of known depths decided, and these depths of each training photo, none with a
-/// weight of 0. Only a new run decides. `folder` has depth maps in place of the points of the reconstruction.
+/// Decides the weight of known depths and returns them for each training photo; empty if the weight is 0. Only a new
+/// run decides the weight. `folder` has depth maps that replace the points of the reconstruction.
 pub(super) fn decided(
     (scene, lookup, dataset): (&Path, &Lookup, &Dataset),
     (config, is_new): (&TrainConfig, bool),
@@ -21,7 +21,7 @@ pub(super) fn decided(
     let weight = config.depth_weight.unwrap_or(if is_new { DEPTH_WEIGHT_DEFAULT } else { 0.0 });
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
-        let problem = || format!("is only read with a {} above 0", Setting("depth_weight"));
+        let problem = || format!("is read only if {} is above 0", Setting("depth_weight"));
         let unread = || Err(Error::usage(Setting("depths"), problem()));
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
@@ -35,17 +35,17 @@ pub(super) fn decided(
     };
     let all: usize = known.iter().map(KnownDepths::len).sum();
     if all > 0 {
-        tracing::info!("{} known depths in a photo, on average", all / known.len().max(1));
+        tracing::info!("{} known depths per photo on average", all / known.len().max(1));
         return Ok((with(weight), known));
     }
     if let Some(folder) = folder {
-        return Err(Error::data(folder, "", "has maps without a depth; expected positive numbers, in world units"));
+        return Err(Error::data(folder, "", "has maps without any depth; expected positive numbers in world units"));
     }
     if config.depth_weight.is_none() {
         return Ok((with(0.0), Vec::new()));
     }
     let problem = format!(
-        "has no points of which it is known what photo shows them; name a folder of depth maps in {}, or set {}",
+        "has no points with known photos; name a folder of depth maps in {}, or set {}",
         Setting("depths"),
         Setting("depth_weight").to(0)
     );

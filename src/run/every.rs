@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 /// How often something is due.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Every {
-    /// After so many steps; 0 for never.
+    /// Every this many steps; 0 for never.
     Steps(u32),
-    /// After so many minutes, at the end of a step. More than 0.
+    /// Every this many minutes (above 0), at the end of a step.
     Minutes(f64),
 }
 
@@ -18,7 +18,7 @@ impl Every {
     /// Never.
     pub const NEVER: Self = Self::Steps(0);
 
-    /// Returns true if it is due after `step`, the last time having been at `since`.
+    /// Returns true if it is due after `step`, given the step and time of the last occurrence.
     pub(super) fn is_due(self, step: u32, since: Instant) -> bool {
         match self {
             Self::Steps(every) => every > 0 && step.is_multiple_of(every),
@@ -31,8 +31,9 @@ impl FromStr for Every {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{text}` is no number of steps or minutes; expected for example 1000, 10min, or 0 for never");
+        let wrong = || {
+            format!("`{text}` is not a number of steps or minutes; expected for example 1000, 10min, or 0 for never")
+        };
         let Some(minutes) = text.trim().strip_suffix("min") else {
             return text.trim().parse().map(Self::Steps).map_err(|_| wrong());
         };

@@ -1,4 +1,4 @@
-//! The records of a run in its folder, and the scores at its end.
+//! Writes the records of a run, and scores it at the end.
 
 use super::history::{Entry, ViewScore};
 use super::info::RunEnd;
@@ -19,7 +19,7 @@ use crate::train::Occlusion;
 use std::path::PathBuf;
 
 impl Run<'_> {
-    /// Writes the settings, the names of the labels and the cameras.
+    /// Writes settings, label names and cameras.
     pub(super) fn write_records(&self) -> Result<()> {
         let out = &self.request.output;
         let text = self.settings.dump(&self.facts)?;
@@ -29,12 +29,12 @@ impl Run<'_> {
         models::save_cameras(out, &cameras)
     }
 
-    /// Checks that the folder still belongs to this run and that its records are in it.
+    /// Checks that the folder still belongs to this run, and restores its records if they are missing.
     pub(super) fn hold_records(&mut self) -> Result<()> {
         self.hold_folder()?;
         let out = &self.request.output;
         if !out.join(run_folder::CONFIG).exists() {
-            tracing::warn!("{} was deleted meanwhile; settings, labels and cameras are written again", out.display());
+            tracing::warn!("{} was deleted; settings, labels and cameras are written again", out.display());
             self.write_records()?;
         }
         Ok(())
@@ -47,7 +47,7 @@ impl Run<'_> {
         Ok((path, model))
     }
 
-    /// Returns the result of the training, without scores.
+    /// Returns the summary of the training, without scores.
     pub(super) fn summary(&self, model: PathBuf) -> Summary {
         let last = self.trainer.newest_report();
         Summary {
@@ -64,7 +64,7 @@ impl Run<'_> {
     }
 
     /// Writes the last preview, scores the saved model on the held-out views unless the run was stopped, and writes the
-    /// summary. `kept` is the result of writing the checkpoint of a stopped run.
+    /// summary. `kept` is the result of saving a stopped run's checkpoint.
     pub(super) fn finish(&mut self, summary: &mut Summary, model: &Gaussians, kept: Result<bool>) -> Result<()> {
         let step = summary.steps;
         self.save_occluders()?;
@@ -76,7 +76,7 @@ impl Run<'_> {
         self.tell(Event::Model { step, path: &summary.model })?;
         if !self.stopped {
             summary.scores = self.score(model)?;
-            // Scores take long enough for another run to come between.
+            // Scoring takes long enough for another run to take the folder.
             self.hold_folder()?;
         }
         summary.stopped = self.stopped;
@@ -85,7 +85,8 @@ impl Run<'_> {
         self.finish_records(summary, model)?;
         let is_kept = kept?;
         if self.stopped {
-            let further = if is_kept { "the run can go on from its checkpoint" } else { "only the scores are missing" };
+            let further =
+                if is_kept { "the run can be resumed from its checkpoint" } else { "only the scores are missing" };
             tracing::info!("stopped after step {step} of {}; {further}", self.settings.train.iterations);
         } else {
             self.checkpoints.finish()?;
@@ -96,7 +97,7 @@ impl Run<'_> {
         self.tell(Event::Done(summary))
     }
 
-    /// Ends the history and `run.json`, and writes the report.
+    /// Completes the history and `run.json`, and writes the report.
     fn finish_records(&mut self, summary: &Summary, model: &Gaussians) -> Result<()> {
         if let Some(scores) = &summary.scores {
             let MeanScores { psnr, ssim, objects, .. } = scores.mean;
@@ -116,7 +117,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Writes the occluders that the last step used.
+    /// Writes the occluders of the last step.
     fn save_occluders(&self) -> Result<()> {
         let views = self.trainer.occluders();
         if views.is_empty() {
@@ -130,7 +131,7 @@ impl Run<'_> {
         OcclusionTable::new(kind, views).write(&self.request.output.join(occlusion_table::OCCLUSION_FILE))
     }
 
-    /// Writes the matrices of the photos' colours, if they were trained.
+    /// Writes the photos' exposure matrices, if they were trained.
     fn save_exposures(&mut self) -> Result<()> {
         let matrices = self.trainer.exposures()?;
         if matrices.is_empty() {
@@ -140,8 +141,8 @@ impl Run<'_> {
         atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
     }
 
-    /// Writes the refined poses, if there are any: as a reconstruction, and in the cameras of the run. Held-out views
-    /// keep theirs.
+    /// Writes the refined poses, if there are any, as a reconstruction and in the run's cameras. Held-out views keep
+    /// their poses.
     fn save_poses(&mut self) -> Result<()> {
         let refined = self.trainer.poses()?;
         if refined.is_empty() {
@@ -155,7 +156,7 @@ impl Run<'_> {
         let moved = changed().map(|(a, b)| a.centre().distance(b.centre())).sum::<f64>() / count;
         let turned = changed().map(|(a, b)| a.axis().angle_between(b.axis())).sum::<f64>().to_degrees() / count;
         tracing::info!(
-            "poses: axes turned by {turned:.3} degrees and cameras moved by {:.2} % of their radius on average",
+            "poses: on average, axes turned by {turned:.3} degrees and cameras moved by {:.2} % of their radius",
             100.0 * moved / self.dataset.extent()
         );
         colmap::write::model(&out.join(run_folder::REFINED), &cameras, &self.dataset.points)?;

@@ -1,4 +1,4 @@
-//! `run.json`: what was run, on what, and what it said. The report is made from it.
+//! `run.json`: command, device, inputs and warnings of a run. The report uses it.
 
 use super::history::Entry;
 use super::passes::Pass;
@@ -19,12 +19,12 @@ use std::time::SystemTime;
 
 /// Name of the file.
 pub(crate) const RUN_FILE: &str = "run.json";
-/// Most warnings that are kept of a part.
+/// Most warnings stored per start of the run.
 const WARNINGS_MAX: usize = 200;
-/// Buffers that are listed, the largest.
+/// Most buffers listed, largest first.
 const LISTED_BUFFERS_MAX: usize = 12;
 
-/// What was run.
+/// The record of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Info {
@@ -33,46 +33,46 @@ pub(crate) struct Info {
     pub masks: Option<String>,
     pub train_views: u64,
     pub test_views: u64,
-    /// Whenever the run was started or went on, in turn.
+    /// Every start or resumption of the run, in order.
     pub parts: Vec<ProgramStart>,
     pub memory: Memory,
-    /// Seconds of the last part by phase, until its last step.
+    /// Seconds by phase of the last start, until its last step.
     pub phases: BTreeMap<String, f64>,
-    /// The end; none while the run goes on, and after a kill.
+    /// The end; `None` while the run is in progress or after it was killed.
     pub ended: Option<RunEnd>,
-    /// Views with pictures, the worst first.
+    /// Views with pictures, worst first.
     pub pictures: Vec<PicturedView>,
     /// Times by pass at the end of the run.
     pub passes: Vec<Pass>,
 }
 
-/// A start of the program for the run.
+/// One start or resumption of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ProgramStart {
-    /// What was typed.
+    /// The command line.
     pub command: Option<String>,
     /// Version, commit and features of labelgs.
     pub labelgs: String,
     pub device: String,
-    /// Steps of the checkpoint it went on from; 0 for a new run.
+    /// Step of the checkpoint it resumed from; 0 for a new run.
     pub after: u32,
-    /// Begin, seconds since 1970.
+    /// Start time, seconds since 1970.
     pub began: u64,
     pub warnings: Vec<String>,
 }
 
-/// Bytes, planned and measured.
+/// Planned and measured memory, bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Memory {
-    /// Plan of the device's memory for the first model.
+    /// Planned device memory for the first model.
     pub planned_start: Option<u64>,
-    /// Plan for the last model.
+    /// Planned device memory for the last model.
     pub planned_end: Option<u64>,
-    /// The most that buffers had on the device.
+    /// Peak size of all device buffers.
     pub device_peak: Option<u64>,
-    /// The most that the process had in the host's memory.
+    /// Peak host memory of the process.
     pub host_peak: Option<u64>,
     /// The largest buffers of the last plan.
     pub buffers: Vec<(String, u64)>,
@@ -81,9 +81,9 @@ pub(crate) struct Memory {
 /// The end of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RunEnd {
-    /// The observer stopped it.
+    /// True if the observer stopped the run.
     pub stopped: bool,
-    /// Time of the training in all parts, s.
+    /// Total training time, s.
     pub seconds: f64,
 }
 
@@ -95,16 +95,16 @@ pub(crate) struct PicturedView {
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
     pub iou: Option<f64>,
-    /// The pictures of the view are `NUMBER-KIND` in the folder of pictures.
+    /// The view's pictures are `NUMBER-KIND` in the pictures folder.
     pub number: u32,
 }
 
 impl Info {
-    /// Begins a run, or goes on with that in the folder.
+    /// Starts the record of a run, or continues the one in the folder.
     pub(super) fn new(request: &Request, after: u32, masks: Option<&Path>, dataset: &Dataset, gpu: &Gpu) -> Self {
         let before = if after > 0 { Self::read(&request.output.join(RUN_FILE)) } else { Ok(None) };
         let before = before.unwrap_or_else(|error| {
-            tracing::warn!("{error}; the report will not know what was before step {after}");
+            tracing::warn!("{error}; the report will miss everything before step {after}");
             None
         });
         let mut info = before.unwrap_or_default();
@@ -130,19 +130,19 @@ impl Info {
         }
     }
 
-    /// Notes the plan of the first model's memory. A run that goes on keeps that of its begin.
+    /// Records the planned memory of the first model. A resumed run keeps its original value.
     pub(super) fn plan(&mut self, trainer: &mut Trainer) {
         let engine = trainer.engine_mut();
         let plan = Engine::predict(engine.gpu(), engine.size(), SchedulerOptions::default());
         self.memory.planned_start = self.memory.planned_start.or(plan.ok().map(|plan| plan.total));
     }
 
-    /// Notes where the time went.
+    /// Records the time by phase.
     pub(super) fn note_phases(&mut self) {
         self.phases = phases::take().into_iter().map(|(name, seconds)| (name.to_owned(), seconds)).collect();
     }
 
-    /// Reads the file; none if there is none.
+    /// Reads the file; `None` if it does not exist.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>> {
         super::report::json(path)
     }
@@ -152,13 +152,13 @@ impl Info {
         atomic::write_json(&out.join(RUN_FILE), self)
     }
 
-    /// Adds a warning, once.
+    /// Adds a warning unless it is already stored.
     fn warned(&mut self, text: &str) {
         let is_known = self.parts.iter().any(|part| part.warnings.iter().any(|known| known == text));
         if let Some(part) = self.parts.last_mut().filter(|_| !is_known) {
             match part.warnings.len() {
                 0..WARNINGS_MAX => part.warnings.push(text.to_owned()),
-                WARNINGS_MAX => part.warnings.push("there were more warnings than are kept here".to_owned()),
+                WARNINGS_MAX => part.warnings.push("more warnings were given than are stored here".to_owned()),
                 _ => {}
             }
         }
@@ -166,13 +166,13 @@ impl Info {
 }
 
 impl Run<'_> {
-    /// Notes a warning that the run itself gives.
+    /// Records a warning of the run itself.
     pub(super) fn note_warning(&mut self, text: &str) {
         self.history.put(&Entry::Warning { step: self.trainer.steps_done(), text: text.to_owned() });
         self.info.warned(text);
     }
 
-    /// Writes `run.json` with the warnings until now.
+    /// Writes `run.json` with the warnings so far.
     pub(super) fn write_info(&mut self) -> Result<()> {
         if let Some(log) = self.request.warnings {
             log().iter().for_each(|text| self.info.warned(text));
@@ -180,7 +180,7 @@ impl Run<'_> {
         self.info.write(&self.request.output)
     }
 
-    /// Notes what memory was planned and used.
+    /// Records planned and used memory.
     pub(super) fn note_memory(&mut self) {
         let engine = self.trainer.engine_mut();
         let (gpu, size): (Arc<Gpu>, _) = (Arc::clone(engine.gpu()), *engine.size());
@@ -197,7 +197,7 @@ impl Run<'_> {
     }
 }
 
-/// Returns the most memory that this process had, where Linux tells.
+/// Returns the peak memory of this process; `None` if the system does not report it.
 #[expect(clippy::disallowed_methods, reason = "a file of the system, and no input")]
 fn host_peak() -> Option<u64> {
     let text = std::fs::read_to_string(PathBuf::from("/proc/self/status")).ok()?;

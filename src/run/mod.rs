@@ -1,8 +1,8 @@
 //! Trains a model: from a folder of photos to the folder of a run.
 //!
 //! [`train`] is the command `labelgs train` without the terminal. Its input is a [`Request`]: scene, output folder,
-//! [`Settings`] and whether to resume ([`Start`]). An [`Observer`] follows the run and may pause, save or stop it. The
-//! result is a [`Summary`]; [`guide::outputs`](crate::guide::outputs) lists the files of the folder.
+//! [`Settings`] and whether to resume ([`Start`]). An [`Observer`] receives events and may pause, save or stop the run.
+//! The result is a [`Summary`]; [`guide::outputs`](crate::guide::outputs) lists the files of the run folder.
 
 mod block;
 mod checkpoints;
@@ -52,7 +52,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Makes the settings of a resumed run from those of its checkpoint. The argument is `None` if there is no checkpoint.
+/// Makes the settings of a resumed run from the checkpoint's settings, which are `None` if there is no checkpoint.
 pub type ResumeSettings<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a;
 
 /// The first step of a run.
@@ -60,20 +60,20 @@ pub type ResumeSettings<'a> = dyn Fn(Option<&Settings>) -> Result<Settings> + 'a
 pub enum Start<'a> {
     /// Step 1. The first checkpoint of this run replaces those of an earlier run in the folder.
     New(Settings),
-    /// The newest whole checkpoint in the folder, or step 1 if there is none.
+    /// The newest intact checkpoint in the folder, or step 1 if there is none.
     Newest(&'a ResumeSettings<'a>),
 }
 
-/// The inputs of a run besides its settings. Checkpoints store them too.
+/// The inputs of a run besides its settings. Checkpoints also store them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Inputs {
-    /// Folder of id masks, one per view by name. Without it the model has no labels.
+    /// Folder of id masks, one per view by name. Without masks, the model has no labels.
     pub masks: Option<PathBuf>,
-    /// Folder of pictures, named as masks, whose pixels above 0 leave the photo out. See
+    /// Folder of pictures, named like masks; photo pixels are ignored where they are above 0. See
     /// [`crate::scenes::LoadOptions::ignore`].
     #[serde(default)]
     pub ignore: Option<PathBuf>,
-    /// Folder of depth maps in world units, in place of the points of the reconstruction, for
+    /// Folder of depth maps in world units, which replace the points of the reconstruction for
     /// [`TrainConfig::depth_weight`].
     #[serde(default)]
     pub known_depths: Option<PathBuf>,
@@ -81,16 +81,16 @@ pub struct Inputs {
     pub memory_limit: Option<u64>,
     /// Largest share of damaged photos that is accepted, 0 to 1.
     pub max_bad_photos: Option<f32>,
-    /// Accepts photos and points outside of the scene's folder.
+    /// Allows photos and points outside of the scene folder.
     pub allow_outside: bool,
-    /// Folder of the photos, where they are not where the scene lists them. See [`crate::scenes::Lookup::images`].
+    /// Folder of the photos, if they are not where the scene lists them. See [`crate::scenes::Lookup::images`].
     #[serde(default)]
     pub images: Option<PathBuf>,
 }
 
-/// The description of a run.
+/// A request for a run.
 pub struct Request<'a> {
-    /// Folder or file of the scene, see [`crate::scenes::open`].
+    /// Scene folder or file, see [`crate::scenes::open`].
     pub scene: PathBuf,
     /// Folder of the run.
     pub output: PathBuf,
@@ -98,21 +98,20 @@ pub struct Request<'a> {
     pub start: Start<'a>,
     /// Masks and limits. In a resumed run, empty fields take the values of the checkpoint.
     pub inputs: Inputs,
-    /// Model to start from in place of the scene's points: a file of any format, of any trainer, or the folder of a
-    /// run.
+    /// Model to start from instead of the scene's points: a file of any format, from any trainer, or a run folder.
     pub init: Option<PathBuf>,
-    /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, from the first model of the
-    /// block. The settings are those of [`Settings::for_block`].
+    /// Folder of a block of the scene ([`crate::blocks`]): only this part is trained, starting from the block's first
+    /// model. The settings are those of [`Settings::for_block`].
     pub block: Option<PathBuf>,
     /// File of occluder lists, for [`Occlusion::File`].
     pub occluders: Option<PathBuf>,
-    /// Opens a lost device again and continues from the newest checkpoint, as long as each loss has a new one. The
-    /// error names the pass that lost the device, at some cost in time.
+    /// Reopens a lost device and continues from the newest checkpoint, as long as there was a new checkpoint since the
+    /// last loss. Errors then name the pass that lost the device, at some cost in time.
     pub restart: bool,
-    /// The command as it was typed, for the report.
+    /// The command line, for the report.
     pub command: Option<String>,
-    /// The warnings of the log since the run began, for the report. Without it, the report has only those of the run
-    /// itself.
+    /// The warnings of the log since the run began, for the report. Without it, the report has only the run's own
+    /// warnings.
     pub warnings: Option<&'a Warnings<'a>>,
 }
 
@@ -140,12 +139,12 @@ impl<'a> Request<'a> {
 /// Opens the device, at the start and after each loss of the device.
 pub type OpenGpu<'a> = dyn Fn() -> Result<Arc<Gpu>> + 'a;
 
-/// Trains a model. It saves the model also if the observer stops the run or memory runs out.
+/// Trains a model. Saves the model even if the observer stops the run or memory runs out.
 ///
 /// # Errors
 ///
 /// Invalid settings and inputs, before anything is written; too little memory or a lost device; parameters that become
-/// NaN, also in a second try with half the learning rates; outputs that cannot be written.
+/// NaN even with half the learning rates; outputs that cannot be written.
 pub fn train(request: &Request, open: &OpenGpu, observer: &mut dyn Observer) -> Result<Summary> {
     recovery::over_losses(request, &mut |is_again| train_once(request, is_again, open, observer))
 }
@@ -163,7 +162,7 @@ fn train_once(request: &Request, is_again: bool, open: &OpenGpu, observer: &mut 
     run.info.note_phases();
     done.map_err(|error| run.keep_model(error))?;
     run.hold_records()?;
-    // Save the model in either case.
+    // Save the model in both cases.
     let kept = run.keep_if_stopped();
     let (path, model) = run.save_labelled()?;
     let mut summary = run.summary(path);
@@ -174,7 +173,7 @@ fn train_once(request: &Request, is_again: bool, open: &OpenGpu, observer: &mut 
 struct Run<'a> {
     request: &'a Request<'a>,
     settings: Settings,
-    /// Source of the given occluders.
+    /// Source of the occluders, if given.
     occlusion: Option<String>,
     /// Comments for `config.toml`: name and value.
     facts: Vec<(&'static str, String)>,
@@ -182,7 +181,7 @@ struct Run<'a> {
     dataset: Dataset,
     /// View of the preview pictures.
     preview: Option<View>,
-    /// When the last preview was written.
+    /// Time of the last preview.
     previewed: Instant,
     trainer: Trainer,
     checkpoints: Checkpoints,
@@ -203,7 +202,7 @@ impl Run<'_> {
                 Flow::Continue => return Ok(()),
                 Flow::Save => {
                     self.save_checkpoint()?;
-                    // A pause outlasts a save: no step may slip through.
+                    // A save does not end a pause.
                     if !is_paused {
                         return Ok(());
                     }
@@ -224,7 +223,7 @@ impl Run<'_> {
         self.observer.observe(event, &mut live)
     }
 
-    /// Logs a warning and passes it to the observer.
+    /// Logs a warning, and passes it to the observer.
     fn warn(&mut self, text: &str) -> Result<()> {
         tracing::warn!("{text}");
         self.note_warning(text);

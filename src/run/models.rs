@@ -1,4 +1,4 @@
-//! Files of a run: models, cameras and previews. Each write is atomic.
+//! Reads and writes the models, cameras and previews of a run. Each write is atomic.
 
 use super::{Event, Run};
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ use std::sync::{Mutex, PoisonError};
 /// Folder for the models of earlier runs.
 const EARLIER_FOLDER: &str = "earlier";
 
-/// Returns the path of the model of a step, where viewers of 3DGS look for it.
+/// Returns the path of a step's model, in the layout that 3DGS viewers expect.
 pub(crate) fn model_path(out: &Path, step: u32) -> PathBuf {
     out.join("point_cloud").join(format!("iteration_{step}")).join("point_cloud.ply")
 }
@@ -36,12 +36,12 @@ pub fn latest_model(out: &Path) -> Result<PathBuf> {
         Error::data(
             out,
             "",
-            "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY or the folder of a run",
+            "is a folder without point_cloud/iteration_N/point_cloud.ply; name a PLY file or a run folder",
         )
     })
 }
 
-/// Reads a model, or the latest one in the folder of a run, with the names in the file. Logs the notes of the reader.
+/// Reads a model file, or the latest model in a run folder, with the label names in the file. Logs the reader's notes.
 pub(crate) fn open(path: &Path) -> Result<ReadModel> {
     let path = &model_file(path)?;
     let read = read_model(path)?;
@@ -49,7 +49,7 @@ pub(crate) fn open(path: &Path) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// Opens a model as `open` does, without reading it if it can stay in its file.
+/// Opens a model like `open`, without reading it if it can stay in its file.
 pub fn open_lazily(path: &Path) -> Result<LazyModel> {
     let path = &model_file(path)?;
     let model = LazyModel::open(path)?;
@@ -59,14 +59,14 @@ pub fn open_lazily(path: &Path) -> Result<LazyModel> {
     Ok(model)
 }
 
-/// Returns where to see a model from at first: what its file says, else where the first camera of its run was.
+/// Returns the initial view of a model: from its file, or else from the first camera of its run.
 ///
 /// # Errors
 ///
-/// A model, or a list of cameras, that cannot be read.
+/// The model or the camera list cannot be read.
 pub fn first_view(path: &Path) -> Result<Option<FirstView>> {
     let file = model_file(path)?;
-    // A pipe is read once.
+    // A pipe can be read only once.
     let own = if file.is_file() { LazyModel::open(&file)?.first_view() } else { None };
     if own.is_some() {
         return Ok(own);
@@ -76,13 +76,13 @@ pub fn first_view(path: &Path) -> Result<Option<FirstView>> {
     Ok(all.zip(views.first()).map(|(all, view)| FirstView { up: all.up, eye: view.camera.centre() }))
 }
 
-/// Looks at each row of a model that was opened from `path`, and logs the notes of the reader.
+/// Visits each row of a model that was opened from `path`, and logs the reader's notes.
 pub fn scan(path: &Path, model: ModelRef, see: impl FnMut(u64, &Row)) -> Result<()> {
     log_notes(&model_file(path)?, &model.scan(see)?);
     Ok(())
 }
 
-/// Logs notes of a reader, each once: some commands read a model twice.
+/// Logs a reader's notes, each only once, because some commands read a model twice.
 pub(crate) fn log_notes(path: &Path, notes: &[String]) {
     static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     for note in notes {
@@ -93,12 +93,12 @@ pub(crate) fn log_notes(path: &Path, notes: &[String]) {
     }
 }
 
-/// Returns the file of a model, or of the latest one in the folder of a run.
+/// Returns a model file, or the latest model file in a run folder.
 pub fn model_file(path: &Path) -> Result<PathBuf> {
     if path.is_dir() { latest_model(path) } else { Ok(path.to_owned()) }
 }
 
-/// The models that a run writes. Other commands take the model of the latest step. So the first model of this run moves
+/// The models that a run writes. Other commands take the model of the latest step, so this run's first model moves
 /// later models of an earlier run to the folder `earlier`.
 pub(crate) struct Models {
     out: PathBuf,
@@ -112,14 +112,14 @@ impl Models {
         if let Some(step) = earlier.iter().max() {
             let path = model_path(out, *step);
             tracing::warn!(
-                "{} is of an earlier run and moves to {EARLIER_FOLDER} at the first model of this run",
+                "{} is from an earlier run; it moves to {EARLIER_FOLDER} when this run writes its first model",
                 path.display()
             );
         }
         Ok(Self { out: out.to_owned(), earlier })
     }
 
-    /// Writes the model of a step.
+    /// Writes a step's model.
     pub(crate) fn save(&mut self, step: u32, model: &Gaussians) -> Result<PathBuf> {
         let path = model_path(&self.out, step);
         let left_out = write_model(&path, model)?;
@@ -130,7 +130,7 @@ impl Models {
         Ok(path)
     }
 
-    /// Moves the models of an earlier run, after that of a step was written.
+    /// Moves the models of an earlier run, after a step's model was written.
     pub(crate) fn note_saved(&mut self, step: u32) {
         for old in self.earlier.drain(..).filter(|&old| old != step) {
             let (from, to) = (model_path(&self.out, old), model_path(&self.out.join(EARLIER_FOLDER), old));
@@ -138,13 +138,13 @@ impl Models {
             if let Err(error) = moved {
                 tracing::warn!("{}: cannot be moved: {error}", from.display());
             }
-            // This fails, as it should, if the folder holds other files.
+            // This fails, as it should, if the folder contains other files.
             let _ = from.parent().map(std::fs::remove_dir);
         }
     }
 }
 
-/// Writes the model in the middle of a run.
+/// Writes a model during a run.
 pub(super) struct ModelJob;
 
 impl StepJob<Run<'_>> for ModelJob {

@@ -29,7 +29,7 @@ pub struct ObjectSummary {
     pub worst_iou: Option<f64>,
 }
 
-/// Returns the objects of a model, and of the masks that it was scored with.
+/// Summarises the objects of a model, and of the masks that it was scored with.
 pub(super) fn summaries(model: &Gaussians, names: Option<&LabelTable>, scores: Option<&Scores>) -> Vec<ObjectSummary> {
     if model.labels.is_none() {
         return Vec::new();

@@ -1,5 +1,5 @@
-//! Events of a run, and the observers that receive them: a terminal, a web page, a test. An observer may look at the
-//! scene between two steps, and may pause, save and stop the run.
+//! Events of a run, and observers that receive them: a terminal, a web page, a test. Between steps, an observer may
+//! render the scene, and pause, save or stop the run.
 
 use super::Summary;
 use super::history::Recorder;
@@ -15,7 +15,7 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Event<'a> {
-    /// The scene is read and the model is on the device. The first step is next.
+    /// The scene was read, the model is on the device, and the first step is next.
     Started {
         /// Last step of the checkpoint that the run continues from; 0 for a new run.
         after: u32,
@@ -26,9 +26,9 @@ pub enum Event<'a> {
     Step {
         /// Step, from 1.
         step: u32,
-        /// Report of the newest finished step. It lags behind, because two steps are in flight.
+        /// Report of the newest finished step. It lags behind, because several steps are in flight.
         report: Option<&'a StepReport>,
-        /// This is the last step.
+        /// True for the last step.
         is_last: bool,
     },
     /// Gaussians were cloned, split and pruned after a step.
@@ -63,9 +63,9 @@ pub enum Event<'a> {
     },
     /// The held-out views were scored.
     Evaluated(&'a Scores),
-    /// A warning for the user; the run goes on. The log has it too.
+    /// A warning for the user; the run continues. It is also logged.
     Warning(&'a str),
-    /// The observer paused the run. The event repeats until the observer answers otherwise.
+    /// The observer paused the run. The event repeats until the observer answers something else.
     Paused {
         /// Steps done.
         step: u32,
@@ -80,12 +80,11 @@ pub enum Flow {
     /// Continue.
     #[default]
     Continue,
-    /// Pause: [`Event::Paused`] repeats until the answer changes. The observer sets the time between two of them by
-    /// waiting.
+    /// Pause: [`Event::Paused`] repeats until the answer changes. The observer should wait between repetitions.
     Pause,
     /// Write a checkpoint now and continue.
     Save,
-    /// Write the model and a checkpoint, and end. [`Summary::stopped`] is then true.
+    /// Write the model and a checkpoint, and end the run. [`Summary::stopped`] is then true.
     Stop,
 }
 
@@ -102,7 +101,7 @@ impl Observer for () {
     }
 }
 
-/// The scene in training, between two steps. Queries do not change the training, bit for bit.
+/// The scene during training, between two steps. Queries do not affect the training, bit for bit.
 pub struct LiveScene<'a> {
     trainer: &'a mut Trainer,
     history: &'a mut Recorder,
@@ -125,12 +124,12 @@ impl<'a> LiveScene<'a> {
         self.dataset
     }
 
-    /// Returns the names of the labels, if the masks have some.
+    /// Returns the label names, if the masks came with names.
     pub fn names(&self) -> Option<&'a LabelTable> {
         self.names
     }
 
-    /// Returns the size of the largest picture that needs no more memory, px: that of the largest photo.
+    /// Returns the largest picture size that needs no additional memory, px: that of the largest photo.
     pub fn image(&mut self) -> (u32, u32) {
         self.trainer.engine_mut().size().image
     }
@@ -140,7 +139,7 @@ impl<'a> LiveScene<'a> {
         self.trainer.engine_mut().memory()
     }
 
-    /// Returns the label of each Gaussian, of the last count of votes; none in a scene without masks.
+    /// Returns the label of each Gaussian from the last vote count; empty in a scene without masks.
     pub fn labels(&mut self) -> Result<Option<Vec<u32>>> {
         if !self.trainer.has_labels() {
             return Ok(None);
@@ -149,7 +148,7 @@ impl<'a> LiveScene<'a> {
         self.trainer.engine_mut().labels().map(Some)
     }
 
-    /// Returns true if the device is a processor.
+    /// Returns true if the device is a CPU.
     pub fn is_cpu(&mut self) -> bool {
         self.trainer.engine_mut().gpu().is_cpu()
     }
@@ -164,7 +163,7 @@ impl<'a> LiveScene<'a> {
         self.trainer.gaussian_count()
     }
 
-    /// Waits for the steps in flight, as every query does first: their time is that of the training.
+    /// Waits for the steps in flight. Every query does this first, so that the wait counts as training time.
     pub fn wait(&mut self) -> Result<()> {
         self.history.drain(self.trainer)
     }
@@ -178,7 +177,7 @@ impl<'a> LiveScene<'a> {
         render(engine, camera, &options)
     }
 
-    /// Returns the current model, with the labels of the last count of votes.
+    /// Returns the current model, with labels from the last vote count.
     pub fn model(&mut self) -> Result<Gaussians> {
         self.wait()?;
         self.trainer.model()

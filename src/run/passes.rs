@@ -1,13 +1,13 @@
-//! Times by pass of the last steps, for the report.
+//! Times the passes of the last steps, for the report.
 
 use super::Run;
 use crate::scene::Gaussians;
 use crate::train::StepTimes;
 use serde::{Deserialize, Serialize};
 
-/// Most steps that run again for it.
+/// Most steps to repeat for timing.
 const TIMED_STEPS_MAX: u32 = 16;
-/// Least steps of the run for each of them: the report costs no more than half a percent of a training.
+/// Steps of the run per timed step, so that timing takes at most half a percent of the training time.
 const RUN_STEPS_PER_TIMED_STEP: u32 = 200;
 
 /// Mean time of a pass in a step.
@@ -16,7 +16,7 @@ const RUN_STEPS_PER_TIMED_STEP: u32 = 200;
 pub(crate) struct Pass {
     pub stage: String,
     pub name: String,
-    /// Time of all its items in a step, ms; `labelgs profile --json` writes a median.
+    /// Time of all items of the pass in a step, ms; `labelgs profile --json` writes a median.
     #[serde(alias = "median_ms")]
     pub ms: f64,
     /// Share of the step, 0 to 1.
@@ -24,8 +24,7 @@ pub(crate) struct Pass {
 }
 
 impl Run<'_> {
-    /// Times the passes of the last steps, once more. Nothing is noted of a short run, or where the device has no
-    /// clock.
+    /// Repeats the last steps to time their passes. Returns nothing for short runs, or if the device has no timestamps.
     pub(super) fn time_passes(&mut self, model: &Gaussians) {
         let has_clock = self.trainer.engine_mut().gpu().limits().timestamp_bits > 0;
         let count = (self.trainer.steps_done() / RUN_STEPS_PER_TIMED_STEP).min(TIMED_STEPS_MAX);
@@ -34,13 +33,13 @@ impl Run<'_> {
         }
         match self.trainer.times_of_last(count, model) {
             Ok(times) => self.info.passes = means(&times),
-            // The model is saved and scored.
-            Err(error) => tracing::warn!("{error}; the report has no times by pass"),
+            // The model is already saved and scored.
+            Err(error) => tracing::warn!("{error}; the report will not have times by pass"),
         }
     }
 }
 
-/// Returns the means over the steps, in the order of a step.
+/// Returns the means over the steps, in step order.
 fn means(times: &[StepTimes]) -> Vec<Pass> {
     let mut passes: Vec<Pass> = Vec::new();
     for (stage, name, ns) in times.iter().flat_map(|times| &times.items) {

@@ -12,17 +12,17 @@ use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
 use std::path::{Path, PathBuf};
 
-/// Folder of the copies.
+/// Folder of the pictures.
 pub(super) const PICTURES_FOLDER: &str = "report";
-/// Views that are kept.
+/// Most views with pictures.
 const VIEWS_MAX: usize = 6;
-/// Most bytes of all copies.
+/// Most bytes of all pictures.
 const BYTES_MAX: usize = 6 << 20;
 
-/// File of the map of errors.
+/// File of the error map.
 pub(crate) const HEAT_MAP_FILE: &str = "error.jpg";
 
-/// The pictures of a view: name in the page, name of the file.
+/// The picture kinds of a view: name in the page, file name.
 pub(crate) const PICTURE_KINDS: [(&str, &str); 5] = [
     ("photo", "photo.jpg"),
     ("render", "render.jpg"),
@@ -36,7 +36,7 @@ pub(crate) fn path(out: &Path, number: u32, file: &str) -> PathBuf {
     out.join(PICTURES_FOLDER).join(format!("{number}-{file}"))
 }
 
-/// The worst views that were seen, and the objects of all.
+/// The worst views so far, and the objects of all views.
 #[derive(Default)]
 pub(super) struct WorstViews {
     views: Vec<(PicturedView, Vec<Option<Vec<u8>>>)>,
@@ -72,8 +72,7 @@ impl PictureObserver for WorstViews {
 }
 
 impl WorstViews {
-    /// Writes the pictures into the folder of the run, as many as the limit allows. Returns their views, the worst
-    /// first.
+    /// Writes as many pictures to the run folder as the limit allows. Returns their views, worst first.
     pub(super) fn write(self, out: &Path) -> Result<Vec<PicturedView>> {
         remove_old(out)?;
         thumbnails::remove_old(out)?;
@@ -96,7 +95,7 @@ impl WorstViews {
     }
 }
 
-/// Deletes the pictures of an earlier end of the run.
+/// Deletes pictures that an earlier end of the run wrote.
 fn remove_old(out: &Path) -> Result<()> {
     for number in 1..=VIEWS_MAX as u32 {
         for (_, file) in PICTURE_KINDS {

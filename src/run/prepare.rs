@@ -27,7 +27,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The state of a run before it opens a device.
+/// The inputs of a run, before it opens a device.
 pub(super) struct RunSetup {
     lock: Lock,
     settings: Settings,
@@ -42,10 +42,10 @@ pub(super) struct RunSetup {
     block: Option<Block>,
 }
 
-/// Locks the folder, decides the settings and reads the scene. `is_again` continues from the newest checkpoint.
+/// Locks the folder, decides the settings and reads the scene. If `is_again`, continues from the newest checkpoint.
 pub(super) fn prepare(request: &Request, is_again: bool) -> Result<RunSetup> {
-    // Check the settings first, so that bad ones leave no folder behind. List checkpoints only after the lock: another
-    // run may be writing its last one.
+    // Check the settings first, so that invalid settings leave no folder behind. List checkpoints only after locking:
+    // another run may be writing its last one.
     if let Start::New(settings) = &request.start {
         check_new(settings, request)?;
     }
@@ -70,7 +70,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<RunSetup> {
     if request.restart && settings.run.checkpoint_every == Every::NEVER {
         return Err(Error::usage(
             Setting("restart"),
-            format!("goes on from checkpoints, and {} is 0", Setting("checkpoint_every")),
+            format!("needs checkpoints, but {} is 0", Setting("checkpoint_every")),
         ));
     }
     let block = request.block.as_deref().map(Block::read).transpose()?;
@@ -88,7 +88,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<RunSetup> {
     Ok(RunSetup { lock, settings, resumed, inputs, models, names, dataset, table, first, block })
 }
 
-/// Says that the objects should be trained alone, if there are masks and the surroundings do not follow the poses.
+/// Warns if there are masks and the surroundings do not follow the poses: the objects should then be trained alone.
 fn warn_of_surroundings(settings: &Settings, dataset: &Dataset) -> Result<()> {
     let has_masks = dataset.train.iter().any(|view| view.mask.is_some());
     if !has_masks || settings.read.masked_only {
@@ -96,7 +96,7 @@ fn warn_of_surroundings(settings: &Settings, dataset: &Dataset) -> Result<()> {
     }
     if let Some(share) = capture::still_share(dataset)? {
         let cure = Setting("masked_only");
-        tracing::warn!("{}: train the objects of the masks alone with {cure}", capture::surroundings_text(share));
+        tracing::warn!("{}: train only the masked objects with {cure}", capture::surroundings_text(share));
     }
     Ok(())
 }
@@ -106,7 +106,7 @@ fn check_new(settings: &Settings, request: &Request) -> Result<()> {
     occluders::check(&settings.train, request.occluders.as_deref())
 }
 
-/// Deletes temporary files of killed runs. Refuses an unusable folder before any work is done.
+/// Deletes temporary files of killed runs, and refuses an unusable folder before any work is done.
 fn clear(out: &Path, settings: &Settings) -> Result<()> {
     let checkpoints = out.join(checkpoint_folder::CHECKPOINTS_FOLDER);
     if settings.run.checkpoint_every != Every::NEVER {
@@ -121,7 +121,7 @@ fn clear(out: &Path, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Returns where the files of the scene are and how its poses are meant.
+/// Returns where the scene's files are, and how to interpret its poses.
 fn lookup(settings: &Settings, inputs: &Inputs) -> Lookup {
     Lookup { allow_outside: inputs.allow_outside, images: inputs.images.clone(), poses: settings.read.poses }
 }
@@ -138,13 +138,13 @@ fn read_scene(request: &Request, settings: &Settings, inputs: &Inputs, block: Op
     let dataset = scenes::open_logged(&request.scene, &options)?;
     block.map_or(Ok(()), |block| block.check_scene(&dataset))?;
     if dataset.train.is_empty() {
-        let problem = format!("no view is left to train on; set {} to 0 or to a larger number", Setting("test_every"));
+        let problem = format!("no training views are left; set {} to 0 or to a larger number", Setting("test_every"));
         return Err(Error::data(&request.scene, "", problem));
     }
     Ok(dataset)
 }
 
-/// Puts the model on the device: that of the checkpoint, or the initial one.
+/// Uploads the checkpoint's model or the initial model to the device.
 pub(super) fn begin<'a>(
     prepared: RunSetup,
     request: &'a Request,
@@ -166,7 +166,7 @@ pub(super) fn begin<'a>(
     let (train, depths) = depths::decided((&request.scene, &lookup, &dataset), (&settings.train, is_new), files)?;
     let options = TrainerOptions { region: block.map(|block| block.region()).transpose()?, depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
-    facts.extend(resumed.as_ref().map(|resumed| ("goes on after step", resumed.state.step.to_string())));
+    facts.extend(resumed.as_ref().map(|resumed| ("resumed after step", resumed.state.step.to_string())));
     let before = resumed.as_ref().and_then(|resumed| resumed.record.occlusion.clone());
     let occlusion = before.or(table.as_ref().map(|table| table.kind.clone()));
     let record = RunState {
@@ -207,7 +207,7 @@ pub(super) fn begin<'a>(
     })
 }
 
-/// Makes a trainer with the initial model of the scene, or with a model that was trained before.
+/// Makes a trainer with the scene's initial model, or with a previously trained model.
 fn start(
     gpu: Arc<Gpu>,
     (config, first): (&TrainConfig, Option<Gaussians>),
@@ -222,7 +222,7 @@ fn start(
     let size = train::start_size(&gpu, dataset, &config, (&model, options.region.as_ref()), options.scheduler)?;
     let memory = Engine::predict(&gpu, &size, options.scheduler)?;
     tracing::info!(
-        "memory to start with: {:.1} MiB on the device for {} Gaussians and {} x {} px; it grows with the model",
+        "initial device memory: {:.1} MiB for {} Gaussians and {} x {} px; it grows with the model",
         memory.total as f64 / f64::from(1 << 20),
         size.gaussians,
         size.image.0,
@@ -241,21 +241,21 @@ fn start(
         if let Some(first) = without.first() {
             let count = without.len();
             tracing::warn!(
-                "{count} training views have no list of occluders, such as {first}; their objects count as not hidden"
+                "{count} training views (such as {first}) have no occluder list; their objects are assumed not to be hidden"
             );
         }
     }
     Ok(trainer)
 }
 
-/// Reads the model that a new run starts from, if the request names one.
+/// Reads the model that a new run starts from, if requested.
 fn read_first(request: &Request, block: Option<&Block>, is_resumed: bool) -> Result<Option<Gaussians>> {
     if request.init.is_some() && block.is_some() {
-        return Err(Error::usage(Setting("init"), "cannot be given with a block, which has a first model of its own"));
+        return Err(Error::usage(Setting("init"), "cannot be combined with a block, which has its own first model"));
     }
     let Some(path) = &request.init.clone().or(block.map(Block::init)) else { return Ok(None) };
     if is_resumed {
-        tracing::info!("the model comes from the checkpoint; {} is not read again", path.display());
+        tracing::info!("the checkpoint has the model; {} is not read again", path.display());
         return Ok(None);
     }
     let model = open(path)?.gaussians;

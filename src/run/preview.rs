@@ -28,7 +28,7 @@ impl StepJob<Run<'_>> for PreviewJob {
     }
 }
 
-/// Writes a preview of the current scene. Returns none without a photo.
+/// Writes a preview of the current scene. Returns `None` without a photo.
 pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let Some(view) = &run.preview else { return Ok(None) };
     if view.photo.is_none() {
@@ -41,7 +41,7 @@ pub(super) fn write(run: &mut Run) -> Result<Option<PathBuf>> {
     let name = format!("{:06}_{}.png", run.trainer.steps_done(), view.stem());
     let path = run.request.output.join("preview").join(name);
     models::save_preview(&path, &target.photo, &rendered)?;
-    // The preview of a stopped run is not on the schedule, which a run that goes on keeps.
+    // A stopped run's preview is not part of the schedule, which a resumed run continues.
     if !run.stopped {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         let has_labels = !rendered.labels.is_empty() && run.trainer.config().labels_at(run.trainer.steps_done());

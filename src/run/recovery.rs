@@ -7,12 +7,11 @@ use crate::records::checkpoint_folder;
 use crate::run::Summary;
 use std::time::Duration;
 
-/// Waits between attempts to open a lost device, s.
+/// Waiting times between attempts to reopen a lost device, s.
 const REOPEN_WAITS_S: [u64; 3] = [1, 4, 16];
 
-/// Runs a training. With [`Request::restart`] it starts again after a lost device, unless no checkpoint was written
-/// since the last loss: the same work would lose it again. `run` receives true if it continues from the newest
-/// checkpoint.
+/// Runs a training. With [`Request::restart`], restarts after a lost device, unless no checkpoint was written since the
+/// last loss: the same work would fail again. `run` receives true if it continues from the newest checkpoint.
 pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result<Summary>) -> Result<Summary> {
     if !request.restart {
         return run(false);
@@ -23,10 +22,10 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
     loop {
         let error = match run(was_lost) {
             Err(error @ Error::DeviceLost { .. }) => error,
-            // A driver may need time to offer a device again.
+            // A driver may need time to make a device available again.
             Err(error) if was_lost && error.is_without_device() => {
                 let Some(&seconds) = waits.next() else { return Err(error) };
-                tracing::warn!("{error}; tried again in {seconds} s");
+                tracing::warn!("{error}; trying again in {seconds} s");
                 std::thread::sleep(Duration::from_secs(seconds));
                 continue;
             }
@@ -37,12 +36,12 @@ pub(super) fn over_losses(request: &Request, run: &mut dyn FnMut(bool) -> Result
         if number <= before {
             return Err(error);
         }
-        tracing::warn!("{error}; it is opened again, and training continues from the newest checkpoint");
+        tracing::warn!("{error}; reopening it, and training continues from the newest checkpoint");
         (before, was_lost) = (number, true);
     }
 }
 
-/// Runs the steps. The first failure may be a fault of the device: the repeated steps give the same bits. A second
+/// Runs the steps. A first failure may be a device fault, so the steps are repeated with the same bits. A second
 /// failure comes from the scene or the settings, and lower learning rates may avoid it.
 pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
     let mut last = steps(run);
@@ -53,7 +52,7 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
                 run.history.go_back(step, run.settings.train.iterations, sums);
                 if is_slower {
                     run.trainer.halve_rates();
-                    run.warn("training failed again: from here on all learning rates are half of what they were")?;
+                    run.warn("training failed again; all learning rates are halved from here")?;
                 }
                 steps(run)
             }
@@ -64,7 +63,7 @@ pub(super) fn over_numeric_failures(run: &mut Run) -> Result<()> {
 }
 
 impl Run<'_> {
-    /// Saves the model if memory ended the run. Steps that did not fit have not changed it.
+    /// Saves the model if the run ran out of memory. Steps that did not fit have not changed the model.
     pub(super) fn keep_model(&mut self, error: Error) -> Error {
         if !error.is_out_of_memory() {
             return error;

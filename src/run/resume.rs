@@ -1,4 +1,4 @@
-//! The checkpoint and the settings that a resumed run continues from.
+//! Finds the checkpoint and the settings that a run resumes from.
 
 use super::history::Sums;
 use super::{Inputs, Request, ResumeSettings, Settings};
@@ -10,7 +10,7 @@ use crate::train::TrainState;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The part of a checkpoint about the run. The state of the training is separate.
+/// The run's part of a checkpoint, besides the training state.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct RunState {
     pub inputs: Inputs,
@@ -18,34 +18,34 @@ pub(super) struct RunState {
     pub occlusion: Option<String>,
     pub read: ReadOptions,
     pub run: RunOptions,
-    /// Sums of the line of the history that was not finished.
+    /// Sums of the unfinished history line.
     #[serde(default)]
     pub history: Sums,
 }
 
 impl RunState {
-    /// Reads the part of a checkpoint.
+    /// Reads the run's part of a checkpoint.
     pub(super) fn from_state(state: &TrainState) -> Result<Self> {
         serde_json::from_value(state.run.clone())
             .map_err(|error| Error::data(&state.path, "contents", format!("of the run: {error}")))
     }
 }
 
-/// A checkpoint to continue from.
+/// A checkpoint to resume from.
 pub(super) struct ResumePoint {
     pub state: TrainState,
     pub settings: Settings,
     pub record: RunState,
 }
 
-/// Returns the newest whole checkpoint of the folder, with the settings for the resumed run. Returns none without
-/// checkpoints, and an error if all are damaged.
+/// Returns the newest intact checkpoint in the folder, with the settings for the resumed run. Returns `None` if there
+/// are no checkpoints, and an error if all are corrupt.
 pub(super) fn find(request: &Request, changed: &ResumeSettings) -> Result<Option<ResumePoint>> {
     let mut first = None;
     for found in checkpoint_folder::list(&request.output)? {
         match read(&found.path) {
             Ok(resumed) => {
-                tracing::info!("{}: goes on after step {}", found.path.display(), resumed.state.step);
+                tracing::info!("{}: resuming after step {}", found.path.display(), resumed.state.step);
                 return decide(request, changed, resumed).map(Some);
             }
             Err(error) => {
@@ -57,7 +57,7 @@ pub(super) fn find(request: &Request, changed: &ResumeSettings) -> Result<Option
     match first {
         Some(error) => Err(error),
         None => {
-            tracing::warn!("{} holds no checkpoint: training starts at step 1", request.output.display());
+            tracing::warn!("{} contains no checkpoint; training starts at step 1", request.output.display());
             Ok(None)
         }
     }
@@ -76,7 +76,7 @@ fn decide(request: &Request, changed: &ResumeSettings, mut resumed: ResumePoint)
     let then = &resumed.settings;
     let mut wanted = changed(Some(then))?.settled();
     wanted.check()?;
-    // Automatic values were decided when the run began.
+    // Automatic values were decided when the run started.
     wanted.train.keep_decided(&then.train);
     compare(then, &wanted)?;
     if wanted.train.iterations < resumed.state.step {
@@ -88,12 +88,12 @@ fn decide(request: &Request, changed: &ResumeSettings, mut resumed: ResumePoint)
     resumed.settings = wanted;
     merge(&mut resumed.record.inputs, &request.inputs);
     if request.occluders.is_some() {
-        tracing::info!("occluders come from the checkpoint; their files are not read again");
+        tracing::info!("the checkpoint has the occluders; their files are not read again");
     }
     Ok(resumed)
 }
 
-/// Logs changed settings, and refuses changes of settings that are fixed within a run.
+/// Logs changed settings, and refuses changes to settings that are fixed within a run.
 fn compare(then: &Settings, now: &Settings) -> Result<()> {
     let (then, now) = (then.texts(), now.texts());
     for key in Settings::keys() {
@@ -104,7 +104,7 @@ fn compare(then: &Settings, now: &Settings) -> Result<()> {
         let text = |value: Option<&String>| value.map_or("not set", String::as_str).to_owned();
         let change = format!("{} in the checkpoint, now {}", text(then), text(now));
         if key.is_fixed {
-            let problem = format!("{change}; it cannot change within a run: keep the old value, or start a new run");
+            let problem = format!("{change}; it cannot change within a run; keep the old value, or start a new run");
             return Err(Error::usage(Setting(key.name), problem));
         }
         tracing::warn!("{}: {change}", Setting(key.name));
@@ -112,7 +112,7 @@ fn compare(then: &Settings, now: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Replaces the inputs of the checkpoint by those given now.
+/// Replaces the checkpoint's inputs by those given now.
 fn merge(then: &mut Inputs, now: &Inputs) {
     if let Some(bytes) = now.memory_limit
         && then.memory_limit != Some(bytes)
@@ -131,16 +131,16 @@ fn merge(then: &mut Inputs, now: &Inputs) {
 }
 
 impl Inputs {
-    /// Returns them as a checkpoint stores them: with absolute paths, independent of the working directory.
+    /// Returns the inputs as a checkpoint stores them: with absolute paths, independent of the working directory.
     pub(super) fn recorded(&self) -> Self {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        // A path that is not Unicode must be given again.
+        // Paths that are not Unicode must be given again.
         let folder = |path: &Option<PathBuf>| path.as_deref().filter(|path| path.to_str().is_some()).map(absolute);
         Self {
             masks: folder(&self.masks),
             ignore: folder(&self.ignore),
             known_depths: folder(&self.known_depths),
-            // A folder of the scene keeps its name.
+            // A folder name inside the scene stays relative.
             images: self.images.as_deref().map(|path| if path.is_dir() { absolute(path) } else { path.to_owned() }),
             ..self.clone()
         }

@@ -1,4 +1,4 @@
-//! All settings of a run, and the file that stores them.
+//! All settings of a run, and their file.
 
 use super::every::Every;
 use crate::error::{Error, Result, Setting};
@@ -17,29 +17,29 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 crate::options! {
-    /// What a run writes before its end, and the memory that it takes: nothing of it changes a result.
+    /// Settings for intermediate outputs and photo memory. They do not affect results.
     pub struct RunOptions {
         "Output" {
-            /// Steps after which the model is saved too, separated by commas.
+            /// Additional steps after which to save the model, separated by commas.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new(), setting;
 
-            /// Time between two preview pictures, such as 10min, or a number of steps; 0 makes none.
+            /// Time between two preview pictures, such as 10min, or a number of steps; 0 for none.
             ///
-            /// They show the first held-out view.
+            /// Previews show the first held-out view.
             preview_every <"TIME">: Every = Every::Minutes(10.0), setting;
 
-            /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only when the run is
+            /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only if the run is
             /// interrupted.
             ///
-            /// The last step has one too. --resume continues from the newest checkpoint.
+            /// The last step is also saved. --resume continues from the newest checkpoint.
             checkpoint_every <"TIME">: Every = Every::Minutes(10.0);
         }
         "Scene" {
             /// Memory for photos and masks, such as 800M or 4G.
             ///
-            /// In a larger scene some of them wait in a temporary file in OUT, decoded and of the size for training; it
-            /// is gone with the process. The model has the same bits.
+            /// Photos beyond this limit are kept in a temporary file in OUT, decoded at training size, until the
+            /// process ends. The limit does not affect the model.
             #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
             #[serde(with = "as_bytes")]
             photo_memory <"SIZE">: u64 = scenes::PHOTO_MEMORY;
@@ -50,11 +50,11 @@ crate::options! {
 /// The settings of a run, in three parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// How the scene is read.
+    /// How to read the scene.
     pub read: ReadOptions,
-    /// How the training works.
+    /// How to train.
     pub train: TrainConfig,
-    /// What the run writes before its end.
+    /// What the run writes before it ends.
     pub run: RunOptions,
 }
 
@@ -64,7 +64,7 @@ impl Settings {
         Self { train: TrainConfig::preset(preset), ..Self::default() }
     }
 
-    /// Returns every option, in the order of the file.
+    /// Returns every option, in file order.
     pub fn keys() -> impl Iterator<Item = &'static Key> {
         ReadOptions::KEYS.iter().chain(TrainConfig::KEYS).chain(RunOptions::KEYS)
     }
@@ -74,7 +74,7 @@ impl Settings {
         self.read.texts().into_iter().chain(self.train.texts()).chain(self.run.texts()).collect()
     }
 
-    /// Sets what follows from others: objects alone have nothing behind them, and no sky.
+    /// Sets dependent settings: objects alone have no background and no sky.
     pub(super) fn settled(mut self) -> Self {
         if self.read.masked_only {
             self.train.random_background = true;
@@ -87,20 +87,21 @@ impl Settings {
     pub fn check(&self) -> Result<()> {
         self.read.check()?;
         if self.read.masked_only && self.train.exposure == ExposureMode::On {
-            let problem = format!("is on, which needs {}: no photo exposed it", Setting("exposure").to("off"));
+            let problem =
+                format!("is on, which needs {}: a random background has no exposure", Setting("exposure").to("off"));
             return Err(Error::usage(Setting("masked_only"), problem));
         }
         self.train.check()?;
         self.run.check_ranges()
     }
 
-    /// Reads a file of [`Self::dump`]. Missing keys keep their defaults.
+    /// Reads a file that [`Self::dump`] wrote. Missing keys keep their defaults.
     pub fn read(path: &Path) -> Result<Self> {
         let text = files::read::text(path)?;
         let named: BTreeMap<toml::Spanned<String>, IgnoredAny> = parse(path, &text)?;
         if let Some(key) = named.keys().find(|key| !Self::keys().any(|known| known.name == key.get_ref())) {
             let cure = did_you_mean(key.get_ref(), Self::keys().map(|known| known.name));
-            let cure = cure.unwrap_or_else(|| "config.toml of any run lists all".to_owned());
+            let cure = cure.unwrap_or_else(|| "config.toml of any run lists all settings".to_owned());
             let problem = format!("there is no setting {}; {cure}", key.get_ref());
             return Err(Error::data(path, line(&text, key.span().start), problem));
         }
@@ -112,20 +113,20 @@ impl Settings {
         Ok(Self { read: parse(path, text)?, train: parse(path, text)?, run: parse(path, text)? })
     }
 
-    /// Reads the settings of the run that a model belongs to. Returns none if the model is not in the folder of a run.
+    /// Reads the settings of the run that a model belongs to. Returns `None` if the model is not in a run folder.
     pub fn for_model(model: &Path) -> Result<Option<Self>> {
         let file = run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
         let Some(file) = file else { return Ok(None) };
-        // Accept keys of other versions of labelgs: they must not make a model unreadable.
+        // Accept keys of other labelgs versions: they must not make a model unreadable.
         let text = files::read::text(&file)?;
         let mut settings = Self::parse(&file, &text)?;
         let near = &mut settings.train.near;
-        // 0 means automatic, which needs a scene.
+        // 0 means automatic, which needs the scene.
         if *near == 0.0 {
             *near = NEAR_DEFAULT;
         }
         if !near.is_finite() || *near < 0.0 {
-            let problem = format!("is {near}, needs more than 0; correct it or set {}", Setting("near"));
+            let problem = format!("is {near}, but must be above 0; fix it, or set {}", Setting("near"));
             return Err(Error::data(&file, "near", problem));
         }
         Ok(Some(settings))

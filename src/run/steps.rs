@@ -1,4 +1,4 @@
-//! The loop over steps, and the files written between steps.
+//! The training loop, and the files written between steps.
 
 use super::checkpoints::CheckpointJob;
 use super::models::ModelJob;
@@ -49,17 +49,17 @@ fn work_after(run: &mut Run, step: u32) -> Result<()> {
 }
 
 impl Run<'_> {
-    /// Turns a failed write into a warning: there may be space again at the end of the training.
+    /// Turns a failed write into a warning: there may be free space again at the end of the run.
     pub(super) fn tolerate<T>(&mut self, written: Result<T>) -> Result<Option<T>> {
         match written {
             Err(error @ Error::Write { .. }) => {
-                self.warn(&format!("{error}; training goes on without it")).map(|()| None)
+                self.warn(&format!("{error}; training continues without it")).map(|()| None)
             }
             other => other.map(Some),
         }
     }
 
-    /// Checks that the folder still belongs to this run. Call it before each write.
+    /// Checks that the folder still belongs to this run. Call this before each write.
     pub(super) fn hold_folder(&mut self) -> Result<()> {
         self.checkpoints.hold_folder()
     }

@@ -1,4 +1,4 @@
-//! The result of a run: for the caller, and in `metrics.json`.
+//! The result of a run, for the caller and in `metrics.json`.
 
 use super::ObjectSummary;
 use crate::error::Result;
@@ -15,19 +15,19 @@ pub(crate) const METRICS_FILE: &str = "metrics.json";
 pub struct Summary {
     /// Number of finished steps.
     pub steps: u32,
-    /// Time of the training without reading and scoring, with earlier parts of an interrupted run, s.
+    /// Training time without reading and scoring, including earlier parts of an interrupted run, s.
     pub seconds: f64,
     /// Number of Gaussians in the model.
     pub gaussians: u32,
-    /// Photo loss of the last step; none if the run had no step.
+    /// Photo loss of the last step; `None` if the run had no steps.
     pub loss: Option<f64>,
     /// Weighted label loss of the last step.
     pub label_loss: Option<f64>,
     /// Path of the model.
     pub model: PathBuf,
-    /// Scores of the held-out views; none without such views and in a stopped run.
+    /// Scores of the held-out views; `None` without such views and in a stopped run.
     pub scores: Option<Scores>,
-    /// The objects of the model, by id; none without masks.
+    /// The objects of the model, by id; empty without masks.
     pub objects: Vec<ObjectSummary>,
     /// True if the observer stopped the run. The model is written, and a checkpoint if steps remain.
     pub stopped: bool,
@@ -50,7 +50,7 @@ impl Summary {
         })
     }
 
-    /// Writes `metrics.json` into the folder of the run.
+    /// Writes `metrics.json` into the run folder.
     pub(super) fn write(&self, out: &Path) -> Result<()> {
         atomic::write_json(&out.join(METRICS_FILE), &self.to_json())
     }

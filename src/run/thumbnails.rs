@@ -13,21 +13,21 @@ use std::path::{Path, PathBuf};
 const SIDE_MAX_PX: u32 = 128;
 /// Most objects with a picture.
 const OBJECTS_MAX: usize = 300;
-/// Share of an object's pixels that may lie outside of its picture at each side: specks.
+/// Share of an object's pixels that may lie outside of its picture on each side, as specks.
 const SPECK_SHARE_MAX: f64 = 0.01;
-/// Room around the object, of its longer side.
+/// Margin around the object, as a share of its longer side.
 const MARGIN_SHARE: f64 = 0.08;
-/// What is left of colours beside the object.
+/// Brightness factor of colours outside of the object.
 const SURROUNDINGS_BRIGHTNESS: f32 = 0.3;
 /// Id of pixels without an object.
 const NO_OBJECT: u16 = 0;
-/// Names of files begin so.
+/// Prefix of file names.
 const FILE_PREFIX: &str = "object-";
 
 /// Pictures by object.
 #[derive(Default)]
 pub(super) struct Thumbnails {
-    /// Pixels of the object in its view, and the file.
+    /// For each object: its pixels in the view, and the encoded picture.
     by_id: BTreeMap<u16, (usize, Vec<u8>)>,
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn path(out: &Path, id: u32) -> PathBuf {
     out.join(PICTURES_FOLDER).join(format!("{FILE_PREFIX}{id}.jpg"))
 }
 
-/// Columns and rows of the pixels of an object.
+/// Columns and rows of an object's pixels.
 #[derive(Default)]
 struct PixelBounds {
     columns: Vec<u32>,
@@ -44,7 +44,7 @@ struct PixelBounds {
 }
 
 impl Thumbnails {
-    /// Looks at a scored view.
+    /// Collects thumbnails from a scored view.
     pub(super) fn observe(&mut self, picture: &ScoredPicture) -> Result<()> {
         let Some(map) = picture.labels else { return Ok(()) };
         let mut places: BTreeMap<u16, PixelBounds> = BTreeMap::new();
@@ -66,7 +66,7 @@ impl Thumbnails {
         Ok(())
     }
 
-    /// Writes the pictures into the folder of the run.
+    /// Writes the pictures into the run folder.
     pub(super) fn write(&self, out: &Path) -> Result<()> {
         for (&id, (_, file)) in &self.by_id {
             atomic::write(path(out, id.into()), |out| out.write_all(file))?;
@@ -75,7 +75,7 @@ impl Thumbnails {
     }
 }
 
-/// Cuts the render of an object out of its view; what is beside it is dark.
+/// Crops an object from its view's render, with dark surroundings.
 fn cut(
     of: &ScoredPicture,
     size: (u32, u32),
@@ -145,7 +145,7 @@ mod tests {
         assert!(!path(folder.path(), 9).exists());
         let bytes = crate::files::read::bytes(&path(folder.path(), 7)).expect("a picture");
         let found = image::load_from_memory(&bytes).expect("a JPEG").into_rgb8();
-        // Of the widest, with room for 8 % of 16 px at each side.
+        // From the widest view, with a margin of 8 % of 16 px on each side.
         assert_eq!(found.dimensions(), (17 + 4, 6 + 4));
         let [inside, beside] = [(10, 5), (0, 0)].map(|(x, y)| found.get_pixel(x, y).0[0]);
         assert!(inside > 115 && beside < 60, "{inside} {beside}");

@@ -1,4 +1,4 @@
-//! Guards: a known pattern behind each buffer, which no pass may overwrite. For tests.
+//! Guards for tests: a known pattern after each buffer, which no pass may overwrite.
 
 use super::Scheduler;
 use super::recorder::Recorder;
@@ -14,12 +14,12 @@ pub(super) fn write(recorder: &Recorder<'_>, buffer: &Buffer, offset: u64) -> Re
 }
 
 impl Scheduler {
-    /// Fails if a pass wrote behind the end of a buffer; the error names the buffer and the first wrong word.
+    /// Fails if a pass wrote past the end of a buffer; the error names the buffer and the first wrong word.
     ///
     /// Checks all buffers outside of scratch, and the scratch of the list that was prepared or submitted last.
     pub fn check_guards(&mut self) -> Result<()> {
         if !self.options.plan.guards {
-            return Err(Error::Bug("the scheduler was made without guards; set PlanOptions::guards".to_owned()));
+            return Err(Error::Bug("the scheduler has no guards; set PlanOptions::guards".to_owned()));
         }
         self.wait_all()?;
         for index in 0..self.table.len() {
@@ -38,7 +38,7 @@ impl Scheduler {
                 if let Some(position) = words.iter().position(|&word| word != GUARD_PATTERN) {
                     let (name, value) = (decl.name, words[position]);
                     return Err(Error::Bug(format!(
-                        "a pass wrote {value:#010x} at byte {} behind the end of buffer {name} ({end} bytes)",
+                        "a pass wrote {value:#010x} at byte {} past the end of buffer {name} ({end} bytes)",
                         position * 4
                     )));
                 }

@@ -1,8 +1,8 @@
-//! The data of steps on their way to device memory, on devices that have memory of their own.
+//! Uploads step data to device-local memory, on devices that have such memory.
 //!
-//! The host writes to staging of the step's frame, and copies in front of the list take the data to the frame's
-//! buffers. Data that come again, such as the photo of a view, are kept on the device while there is room, and come
-//! from there.
+//! The host writes to the staging memory of the step's frame, and copies before the list transfer the data to the
+//! frame's buffers. Reused data, such as a view's photo, stay on the device while there is room, and are copied from
+//! there.
 
 use super::Scheduler;
 use super::recorder::Recorder;
@@ -15,12 +15,12 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Names data that come again: equal keys of a buffer have equal data.
+/// Key of reusable data: equal keys of a buffer mean equal data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DataKey {
-    /// Data of another round are not needed any more: they make room.
+    /// Data of other rounds are no longer needed and may be freed.
     pub round: u32,
-    /// Item of the round.
+    /// Item within the round.
     pub item: u32,
 }
 
@@ -33,7 +33,7 @@ pub struct Traffic {
     pub down: u64,
 }
 
-/// The data of the steps in flight, and those that are kept.
+/// Data of the steps in flight, and resident data.
 pub(super) struct Loads {
     frames: Vec<Frame>,
     timeline: Timeline,
@@ -43,13 +43,13 @@ pub(super) struct Loads {
 
 struct Frame {
     command: CommandBuffer,
-    /// Copies in front of the next list.
+    /// Copies before the next list.
     next: Vec<Load>,
-    /// Those of the last list: they hold what it reads.
+    /// Copies of the last list, which keep its data alive.
     last: Vec<Load>,
 }
 
-/// Copies of data of a buffer.
+/// Copies of a buffer's data.
 struct Load {
     buf: Buf,
     start: u64,
@@ -59,14 +59,14 @@ struct Load {
 
 enum Source {
     Staging,
-    /// From staging, and to a place where they are kept.
+    /// From staging, also into resident memory.
     Kept(Arc<Buffer>),
-    /// From that place.
+    /// From resident memory.
     Again(Arc<Buffer>),
 }
 
 impl Loads {
-    /// Makes one if data go through staging on this device.
+    /// Returns `Some` if data go through staging on this device.
     pub(super) fn new(gpu: &Arc<Gpu>, frames: usize) -> Result<Self> {
         let command = || CommandBuffer::new(gpu, Lane::Transfer);
         let frame = || Ok(Frame { command: command()?, next: Vec::new(), last: Vec::new() });
@@ -74,13 +74,13 @@ impl Loads {
         Ok(Self { frames, timeline: Timeline::new(gpu)?, submitted: 0, kept: HashMap::new() })
     }
 
-    /// Bytes of the data that are kept.
+    /// Returns the bytes of resident data.
     pub(super) fn kept_bytes(&self) -> u64 {
         self.kept.values().map(|kept| kept.bytes()).sum()
     }
 
-    /// Submits the copies that the next list of a frame needs, by the queue for copies if the device has one. Returns
-    /// what the list has to wait for, `None` if it needs nothing. No list of the frame runs.
+    /// Submits the copies that a frame's next list needs, on the transfer queue if there is one. Returns what the list
+    /// has to wait for, if anything. No list of the frame may be running.
     pub(super) fn submit(&mut self, gpu: &Gpu, storage: &Storage, frame: usize) -> Result<Option<(&Timeline, u64)>> {
         let count = self.frames.len();
         let of = &mut self.frames[frame];
@@ -112,13 +112,13 @@ impl Loads {
         self.timeline.wait(self.submitted)
     }
 
-    /// Adds a load in front of the next list, in the place of an earlier one of a list that was not submitted.
+    /// Adds a load before the next list. It replaces an earlier load of a list that was not submitted.
     fn push(&mut self, frame: usize, load: Load) {
         self.cancel(frame, |other| (other.buf, other.start) == (load.buf, load.start));
         self.frames[frame].next.push(load);
     }
 
-    /// Forgets loads that were not recorded; what they should have filled is not kept.
+    /// Drops loads that were not recorded, with the resident memory that they should have filled.
     fn cancel(&mut self, frame: usize, is_meant: impl Fn(&Load) -> bool) {
         for load in self.frames[frame].next.extract_if(.., |load| is_meant(load)) {
             if let Source::Kept(place) = &load.source {
@@ -127,7 +127,7 @@ impl Loads {
         }
     }
 
-    /// Frees what is kept, after all submits. Returns whether there was something.
+    /// Frees resident data after all submits. Returns true if there were any.
     fn free(&mut self) -> bool {
         self.frames.iter_mut().for_each(|frame| frame.last.clear());
         let was_kept = !self.kept.is_empty();
@@ -137,11 +137,10 @@ impl Loads {
 }
 
 impl Scheduler {
-    /// Writes the first elements of a PerFrame buffer, which have a key if they come again; then `data` makes them
-    /// once.
+    /// Writes the first elements of a PerFrame buffer. Reusable data have a key, and `data` makes them only once.
     ///
-    /// Waits for the last list of the frame. On a device with memory of its own, data with a key come from the host
-    /// once, as long as half of the memory that is left has room for them.
+    /// Waits for the last list of the frame. On a device with local memory, data with a key are uploaded once, as long
+    /// as they fit in half of the remaining memory.
     pub fn load<'a, T: Pod>(
         &mut self,
         buf: Buf,
@@ -178,14 +177,14 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Forgets the data of lists that were not submitted: their staging goes.
+    /// Drops the data of lists that were not submitted, because their staging memory is freed.
     pub(super) fn cancel_loads(&mut self) {
         if let Some(loads) = &mut self.loads {
             (0..loads.frames.len()).for_each(|frame| loads.cancel(frame, |_| true));
         }
     }
 
-    /// Returns a place where data are kept from now on; `None` without room.
+    /// Reserves resident memory for data; `None` if there is no room.
     fn place_for(&mut self, buf: Buf, key: DataKey, bytes: u64) -> Option<Arc<Buffer>> {
         let most = self.limits.kept_max(self.memory_total() - self.kept_bytes());
         let loads = self.loads.as_mut()?;
@@ -195,30 +194,30 @@ impl Scheduler {
         if loads.kept_bytes() + bytes > most {
             return None;
         }
-        // Without memory for it, the data come from the host again.
+        // Without memory, the data are uploaded again every time.
         let place = Arc::new(Buffer::new(&self.gpu, "kept data", bytes, MemoryKind::Device).ok()?);
         loads.kept.insert((buf, key), Arc::clone(&place));
         Some(place)
     }
 
-    /// Bytes of the data that are kept on the device.
+    /// Returns the bytes of resident data on the device.
     pub fn kept_bytes(&self) -> u64 {
         self.loads.as_ref().map_or(0, Loads::kept_bytes)
     }
 
-    /// Frees the data that are kept, to make room. Returns whether there were some.
+    /// Frees resident data to make room. Returns true if there were any.
     fn free_kept(&mut self) -> Result<bool> {
         self.wait_all()?;
         Ok(self.loads.as_mut().is_some_and(Loads::free))
     }
 
-    /// Frees the data that are kept, and waits for the memory of snapshots. Returns whether there was something.
+    /// Frees resident data, and waits for the memory of snapshots. Returns true if there were any.
     pub(super) fn free_more(&mut self) -> Result<bool> {
         let was_kept = self.free_kept()?;
         Ok(self.wait_for_snapshots() || was_kept)
     }
 
-    /// Frees the data that are kept unless `bytes` fit beside them.
+    /// Frees resident data unless `bytes` fit beside them.
     pub(super) fn make_room(&mut self, bytes: u64) -> Result<()> {
         if bytes.saturating_add(self.kept_bytes()) > self.limits.max_memory {
             self.free_kept()?;

@@ -1,7 +1,7 @@
 //! The scheduler: plans pass lists ([`plan`], pure), owns the memory of all buffers, and replays recordings.
 //!
-//! Two or four steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full
-//! barrier, so lists run in the order of their submits. Inside a list, the plan's barriers order the items.
+//! Several steps are in flight, one per frame, on one queue with one timeline. Every recording begins with a full
+//! barrier, so lists run in submission order. Inside a list, the plan's barriers order the items.
 
 mod guard;
 mod loads;
@@ -33,22 +33,22 @@ use transfer::Staging;
 /// Options of a scheduler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SchedulerOptions {
-    /// Options of the plans. With `barrier_everywhere`, each time belongs to one pass.
+    /// Options of the plans. With `barrier_everywhere`, each measured time belongs to one pass.
     pub plan: PlanOptions,
     /// Writes a timestamp after each item, see [`Scheduler::timings`].
     pub timestamps: bool,
     /// Fills scratch memory with 0xFFFFFFFF (NaN) whenever a list is prepared.
     pub poison_step: bool,
-    /// Each item leaves a mark for the host; when the device is lost, the error names the last item.
+    /// Each item writes a crash marker; when the device is lost, the error names the last item.
     pub crash_markers: bool,
     /// Upper limit on the device memory in use, bytes.
     pub memory_limit: Option<u64>,
-    /// Steps in flight and their data as on a card, on any device.
+    /// Treats any device like a GPU for steps in flight and their data.
     pub as_card: bool,
 }
 
 impl SchedulerOptions {
-    /// Returns the limits of a device for plans.
+    /// Returns the device limits for plans.
     pub fn limits(&self, gpu: &Gpu) -> Limits {
         let limits = gpu.limits().plan;
         let limits = Limits { max_memory: self.memory_limit.unwrap_or(u64::MAX).min(limits.max_memory), ..limits };
@@ -60,7 +60,7 @@ impl SchedulerOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ListId {
     index: usize,
-    /// A change of counts discards all lists; ids of earlier generations are refused.
+    /// Changing counts discards all lists; ids of earlier generations are refused.
     generation: u64,
 }
 
@@ -86,15 +86,15 @@ pub struct Scheduler {
     submitted: u64,
     /// Timeline value of the last submit of each frame.
     frame_busy: Vec<u64>,
-    /// On a device whose data go through staging.
+    /// Set on devices whose data go through staging.
     loads: Option<Loads>,
     traffic: Traffic,
-    /// Those whose memory is not free yet.
+    /// Snapshots whose memory is not free yet.
     snapshots: Vec<Weak<()>>,
     /// The list that was prepared or submitted last; `upload` and `download` access its scratch buffers.
     current: Option<usize>,
     generation: u64,
-    /// Numbers of elements, where domains look them up.
+    /// Numbers of elements, which domains refer to.
     counts: Vec<u64>,
     options: SchedulerOptions,
     limits: Limits,
@@ -161,7 +161,7 @@ impl Scheduler {
         if self.options.poison_step {
             self.poison()?;
         }
-        // On first use, which may take long on a new driver.
+        // Kernels compile on first use, which may take long with a new driver.
         let _stage = Stage::new("compiling kernels", 0);
         let passes = plans.iter().flat_map(|plan| plan.list.passes().map(move |pass| (plan, pass)));
         let kernels = passes.map(|(plan, pass)| Ok((pass.shader, &pass.spec[..], self.windows(plan, pass)?)));
@@ -178,8 +178,8 @@ impl Scheduler {
 
     /// Submits a prepared list with the host-visible buffers of a frame.
     ///
-    /// Allocates nothing. Blocks only if the same list still runs in the same frame; where data go through staging, if
-    /// any does.
+    /// Allocates nothing. Blocks only if the same list is still running in the same frame or, with staging, if any list
+    /// is.
     pub fn submit(&mut self, id: ListId, frame: usize) -> Result<Ticket> {
         let index = self.index(id)?;
         self.check_frame(frame)?;
@@ -215,7 +215,7 @@ impl Scheduler {
             return Ok(());
         }
         self.timeline.wait(ticket.0).map_err(|error| {
-            // The caller may free memory in use after this error, so wait. A lost device returns at once.
+            // After this error the caller may free memory that is in use, so wait. A lost device returns immediately.
             let _ = self.gpu.wait_idle();
             self.name_pass(error)
         })
@@ -237,8 +237,8 @@ impl Scheduler {
         self.wait(Ticket(self.frame_busy[frame]))
     }
 
-    /// Changes the counts. Model buffers keep their contents (the common prefix; new elements are 0), all others start
-    /// over, and all lists are discarded. If memory does not suffice, the old counts stay in force.
+    /// Changes the counts. Model buffers keep their contents (the common prefix; new elements are 0), all other buffers
+    /// are reset, and all lists are discarded. If memory does not suffice, the old counts remain in effect.
     pub fn set_counts(&mut self, counts: Vec<u64>) -> Result<()> {
         self.wait_all()?;
         phases::timed(Phase::Grow, || self.replace_counts(counts))
@@ -258,14 +258,14 @@ impl Scheduler {
         }
     }
 
-    /// Sets whether lists from now on write the times of their items, and whether each item has a barrier before it.
-    /// Discards the lists that there are.
+    /// Sets whether future lists measure the time of each item, and whether a barrier precedes each item. Discards all
+    /// existing lists.
     pub fn time_items(&mut self, timestamps: bool, barriers: bool) -> Result<()> {
         (self.options.timestamps, self.options.plan.barrier_everywhere) = (timestamps, barriers);
         self.set_counts(self.counts.clone())
     }
 
-    /// Present counts.
+    /// Returns the current counts.
     pub fn counts(&self) -> &[u64] {
         &self.counts
     }
@@ -298,20 +298,20 @@ impl Scheduler {
         rows
     }
 
-    /// Total of allocated bytes.
+    /// Returns the total of allocated bytes.
     pub fn memory_total(&self) -> u64 {
         self.memory().iter().map(|(_, bytes)| bytes).sum()
     }
 
-    /// The plan of a list, for reports.
+    /// Returns the plan of a list, for reports.
     pub fn plan(&self, id: ListId) -> Result<&Plan> {
         Ok(&self.lists[self.index(id)?].plan)
     }
 
-    /// Nanoseconds of each item of a list, from its last submit with a frame. Waits for that submit.
+    /// Returns the nanoseconds of each item of a list, from its last submit with a frame. Waits for that submit.
     ///
-    /// Without `barrier_everywhere`, items overlap, and an entry is the time that the item added. The result is empty
-    /// if timestamps were off when the list was prepared, if the device has none, or before the first submit.
+    /// Without `barrier_everywhere`, items overlap, and an entry is the additional time of the item. The result is
+    /// empty if timestamps were off when the list was prepared, if the device has none, or before the first submit.
     pub fn timings(&self, id: ListId, frame: usize) -> Result<Vec<(String, u64)>> {
         let list = &self.lists[self.index(id)?];
         self.check_frame(frame)?;
@@ -360,7 +360,7 @@ impl Scheduler {
         self.wait(Ticket(value))
     }
 
-    /// Adds the name of the last pass that is known to have begun to the error of a lost device.
+    /// Adds the last pass that is known to have started to the error of a lost device.
     fn name_pass(&self, error: Error) -> Error {
         if !matches!(error, Error::DeviceLost { .. }) {
             return error;

@@ -1,4 +1,4 @@
-//! Memory and bindings where all buffers share few storage bindings, see [`windows`].
+//! Memory and bindings for devices on which all buffers share few storage bindings, see [`windows`].
 
 use super::Scheduler;
 use super::storage::Storage;
@@ -13,13 +13,13 @@ use std::sync::Arc;
 /// Windows of a pass.
 pub(super) struct PassWindows<'a> {
     pub(super) cover: Cover<u64>,
-    /// A buffer in each window: it has the handle.
+    /// One buffer per window, for its handle.
     pub(super) buffers: Vec<&'a Buffer>,
-    /// Place of each buffer in its window, in elements.
+    /// Offset of each buffer in its window, in elements.
     pub(super) places: Vec<u32>,
 }
 
-/// Covers the storage buffers of a pass with windows.
+/// Assigns windows to the storage buffers of a pass.
 pub(super) fn bound<'a>(
     gpu: &Gpu,
     storage: &'a Storage,
@@ -45,7 +45,7 @@ pub(super) fn bound<'a>(
 }
 
 impl Scheduler {
-    /// Allocates every buffer outside of scratch, as parts of a few blocks.
+    /// Allocates every buffer outside of scratch as a sub-range of a few blocks.
     pub(super) fn packed(&self, counts: &[u64]) -> Result<Vec<Vec<Buffer>>> {
         let layout = Layout::new(self.table, counts, self.options.plan, &self.limits)?;
         let block = |&(kind, bytes)| Buffer::new(&self.gpu, "buffers that share bindings", bytes, kind).map(Arc::new);
@@ -61,8 +61,8 @@ impl Scheduler {
             .collect()
     }
 
-    /// Moves all buffers outside of scratch to new blocks. Model buffers keep the common prefix. Needs room for old and
-    /// new blocks; without it, all stays as it was.
+    /// Moves all buffers outside of scratch to new blocks. Model buffers keep the common prefix. Needs memory for old
+    /// and new blocks; without it, nothing changes.
     pub(super) fn resize_packed(&mut self, counts: &[u64]) -> Result<()> {
         if (0..self.table.len()).all(|index| matches!(self.grows(index, counts), Ok(None))) {
             return Ok(());
@@ -90,8 +90,8 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Windows of a pass with the buffers of the first frame, for compiling; none where each buffer has its own
-    /// binding.
+    /// Returns the windows of a pass with the buffers of the first frame, for compiling; empty if buffers have their
+    /// own bindings.
     pub(super) fn windows(&self, plan: &Plan, pass: &PassDecl) -> Result<Vec<u8>> {
         if !self.limits.is_packed() {
             return Ok(Vec::new());

@@ -1,8 +1,8 @@
-//! Times of passes over many steps, as values.
+//! Collects pass times over many steps.
 
 use std::collections::HashMap;
 
-/// On some drivers, the first steps of a list include the compilation of its pipelines.
+/// Steps to ignore at the start: on some drivers, they include pipeline compilation.
 const WARM_UP_STEPS: usize = 2;
 
 /// Times of one pass label.
@@ -16,7 +16,7 @@ pub struct PassTime {
     pub median: u64,
     /// 90th percentile over the steps, ns.
     pub p90: u64,
-    /// Share in the sum of all medians, 0 to 1.
+    /// Share of the sum of all medians, 0 to 1.
     pub share: f64,
 }
 
@@ -25,7 +25,7 @@ pub struct PassTime {
 pub struct Profiler {
     seen: usize,
     warm_up: usize,
-    /// Labels in the order of the list.
+    /// Labels in list order.
     order: Vec<String>,
     items: HashMap<String, usize>,
     samples: HashMap<String, Vec<u64>>,
@@ -68,13 +68,13 @@ impl Profiler {
         }
     }
 
-    /// Number of steps that count.
+    /// Returns the number of steps that count.
     #[cfg(test)]
     fn steps(&self) -> usize {
         self.seen.saturating_sub(self.warm_up)
     }
 
-    /// Returns one row per label, in the order of the list.
+    /// Returns one row per label, in list order.
     pub fn rows(&self) -> Vec<PassTime> {
         let mut rows = Vec::new();
         for label in &self.order {

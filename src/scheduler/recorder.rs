@@ -1,6 +1,6 @@
 //! Records commands. No other code dispatches or places barriers.
 //!
-//! This module checks the planner's results again against the limits of the device, because a wrong command buffer is
+//! This module checks the planner's results against the device limits again, because an invalid command buffer is
 //! undefined behaviour for the whole process.
 // Vulkan commands are foreign functions: every call is unsafe.
 #![allow(unsafe_code)]
@@ -104,7 +104,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Runs a shader with the words that it reads.
+    /// Dispatches a shader with its push constants.
     pub(super) fn dispatch(
         &self,
         pipeline: &Pipeline,
@@ -165,7 +165,9 @@ fn check_range(buffer: &Buffer, offset: u64, bytes: u64) -> Result<()> {
     if inside && bytes > 0 && offset.is_multiple_of(4) && bytes.is_multiple_of(4) {
         return Ok(());
     }
-    Err(Error::Bug(format!("{bytes} bytes at offset {offset} of {buffer:?}: no range of words inside the buffer")))
+    Err(Error::Bug(format!(
+        "{bytes} bytes at offset {offset} of {buffer:?} are not a range of words inside the buffer"
+    )))
 }
 
 /// Stages and accesses of kinds of use. On the source side, reads need no access mask: they leave nothing to flush.

@@ -37,7 +37,7 @@ struct Writer<'a> {
     frame: usize,
     recorder: Recorder<'a>,
     descriptors: &'a DescriptorPool,
-    /// Where buffers share bindings: their places, a slot for each item.
+    /// With shared bindings: the buffer offsets, one slot per item.
     places: Option<&'a Buffer>,
     views: &'a HashMap<Buf, BufferView>,
 }
@@ -149,20 +149,23 @@ impl Writer<'_> {
         self.recorder.dispatch(&pipeline, set, pushed, &groups)
     }
 
-    /// The windows that hold the storage buffers of a pass, with the places of these, and the window of each.
+    /// Returns the windows of a pass's storage buffers, with the buffer offsets, and the window of each buffer.
     fn windows<'b>(&'b self, pass: &PassDecl, places: &'b Buffer, slot: u64) -> Result<(Vec<Binding<'b>>, Vec<u8>)> {
         let bound = packed::bound(self.gpu, self.storage, self.plan, pass, self.frame)?;
         let limits = self.gpu.limits().plan;
         let (most, found) = (limits.windows as usize, bound.cover.windows.len());
         if found > most {
-            return Err(Error::Bug(format!("pass {} has {found} windows; the device binds {most}", pass.label)));
+            return Err(Error::Bug(format!(
+                "pass {} has {found} windows; the device binds at most {most}",
+                pass.label
+            )));
         }
         if found == 0 {
             return Ok((Vec::new(), Vec::new()));
         }
         places.write(slot, bytemuck::cast_slice(&bound.places))?;
         let window = |(span, buffer): (&Span<u64>, &&'b Buffer)| {
-            // Windows count from the handle.
+            // Window offsets are relative to the handle.
             Binding::Storage {
                 buffer: buffer.whole(),
                 offset: span.start,

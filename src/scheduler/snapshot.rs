@@ -1,4 +1,4 @@
-//! Copies of buffers as they are between two lists, read by another thread while lists go on.
+//! Copies buffers between two lists, for another thread to read while lists continue.
 
 use super::Scheduler;
 use super::recorder::Recorder;
@@ -11,20 +11,20 @@ use std::time::Duration;
 
 /// Copies of buffers in device memory.
 pub struct Snapshot {
-    /// Allocated with the copies: whoever reads needs no further memory of the device. First, since its drop waits for
-    /// the reads.
+    /// Allocated with the copies, so that reading needs no further device memory. The first field, because dropping it
+    /// waits for the reads.
     halves: StagingHalves,
-    /// Copies, in the order in which they were asked for; none for a buffer without words.
+    /// Copies in the requested order; `None` for empty buffers.
     copies: Vec<Option<Buffer>>,
-    /// The submit that makes them.
+    /// The submit that makes the copies.
     made: (Arc<Timeline>, u64),
-    /// The scheduler waits for its end where memory is short.
+    /// The scheduler waits until this is dropped if memory is short.
     _alive: Arc<()>,
 }
 
 impl Scheduler {
     /// Copies the first words of buffers outside of scratch, after all lists so far. Fails if memory does not suffice.
-    /// Another thread has to read or drop the copies: growth may wait for their memory.
+    /// Another thread must read or drop the copies, because growth may wait for their memory.
     pub fn snapshot(&mut self, buffers: &[(Buf, u64)]) -> Result<Snapshot> {
         let bytes = buffers.iter().map(|(_, words)| words * 4).sum::<u64>();
         memory::check_total(self.table, "snapshot", self.memory_total().saturating_add(bytes), &self.limits)?;
@@ -50,8 +50,8 @@ impl Scheduler {
         Ok(Snapshot { copies, made, halves, _alive: alive })
     }
 
-    /// Waits until other threads have read all snapshots, so that what fits in memory does not depend on when they do.
-    /// Returns whether there were some.
+    /// Waits until other threads have read all snapshots, so that their timing does not affect what fits in memory.
+    /// Returns true if there were any.
     pub(super) fn wait_for_snapshots(&mut self) -> bool {
         let was_there = self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0);
         while self.snapshots.iter().any(|snapshot| snapshot.strong_count() > 0) {
@@ -63,7 +63,7 @@ impl Scheduler {
 }
 
 impl Snapshot {
-    /// Reads the words of all copies, by the queue for copies if the device has one. For any thread.
+    /// Reads the words of all copies, on the transfer queue if there is one. Any thread may call this.
     pub fn read(mut self) -> Result<Vec<Vec<u32>>> {
         let mut all = Vec::new();
         for copy in &self.copies {
@@ -99,7 +99,7 @@ impl StagingHalves {
         })
     }
 
-    /// Reads all of a buffer after the value of a timeline.
+    /// Reads a whole buffer after a timeline has reached a value.
     fn read(&mut self, from: &Buffer, to: &mut [u8], after: (&Timeline, u64)) -> Result<()> {
         let half = self.staging[0].bytes() as usize;
         let mut waiting: Option<(u64, &mut [u8])> = None;

@@ -1,5 +1,5 @@
-//! Memory of a plan: a VkBuffer for each buffer outside of scratch, or a part of one (`packed`), and the pages of the
-//! Step arena.
+//! Memory of a plan: a VkBuffer or sub-range (`packed`) for each buffer outside of scratch, and the pages of the Step
+//! arena.
 
 use super::{Scheduler, guard};
 use crate::error::{Error, Result};
@@ -84,10 +84,10 @@ impl Scheduler {
         self.write_own_guards()
     }
 
-    /// Reallocates every buffer whose size changes. Model buffers keep the common prefix, all others start over.
+    /// Reallocates every buffer whose size changes. Model buffers keep the common prefix, all others are reset.
     ///
-    /// Growing buffers go first. If one does not fit, those that grew before are only larger than the old counts
-    /// need, and nothing is lost.
+    /// Buffers grow first. If one does not fit, those that have grown are merely larger than the old counts need, and
+    /// nothing is lost.
     pub(super) fn resize_own(&mut self, counts: Vec<u64>) -> Result<()> {
         self.cancel_loads();
         let is_packed = self.limits.is_packed();
@@ -98,10 +98,11 @@ impl Scheduler {
         if resized.is_ok() {
             self.counts = counts;
         } else if !is_packed {
-            // Shrink again what has grown, since others need that memory; a buffer that fails to shrink stays large.
+            // Shrink the grown buffers again, because others need that memory; a buffer that fails to shrink stays
+            // large.
             let old = self.counts.clone();
             if let Err(error) = self.resize_those(&old, false) {
-                tracing::debug!("some buffers keep their larger size: {error}");
+                tracing::debug!("some buffers stay large: {error}");
             }
         }
         for index in 0..self.table.len() {
@@ -113,8 +114,8 @@ impl Scheduler {
         resized
     }
 
-    /// Allocates the buffers that a failed [`Self::resize_own`] has lost: they have no contents to keep, their old
-    /// memory was freed for the new one, and could not be allocated again.
+    /// Allocates the buffers that a failed [`Self::resize_own`] lost: their old memory was freed for the new one, and
+    /// could not be allocated again. They have no contents to keep.
     pub(super) fn replace_lost(&mut self) -> Result<()> {
         for index in 0..self.table.len() {
             if self.grows(index, &self.counts)? == Some(true) {
@@ -200,8 +201,8 @@ impl Scheduler {
         self.wait_all()?;
         let current = self.current.take();
         let plans = std::mem::take(&mut self.lists).into_iter().map(|list| list.plan).collect::<Vec<_>>();
-        // Scratch has no contents to keep, so the old memory is freed before the new is allocated. If the new does not
-        // fit, no list is left that could use the missing memory, and ids of lists are refused.
+        // Scratch has no contents to keep, so the old memory is freed before the new is allocated. If allocation fails,
+        // all lists are discarded, so that none can use the missing memory.
         self.storage.step.clear();
         let generation = self.generation;
         self.generation += 1;
@@ -230,7 +231,7 @@ impl Scheduler {
         })
     }
 
-    /// Writes the guards behind the buffers outside of scratch.
+    /// Writes the guards after the buffers outside of scratch.
     fn write_own_guards(&mut self) -> Result<()> {
         if !self.options.plan.guards {
             return Ok(());
@@ -246,7 +247,7 @@ impl Scheduler {
     }
 }
 
-/// Index of a buffer's copy for a frame.
+/// Returns the index of a buffer's copy for a frame.
 pub(super) fn copy_of(class: Class, frame: usize) -> usize {
     if class.is_shared() { frame } else { 0 }
 }

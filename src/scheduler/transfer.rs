@@ -31,8 +31,8 @@ impl Staging {
 impl Scheduler {
     /// Writes elements to a buffer, starting at element `first`; `T` may be any plain type.
     ///
-    /// Waits for all uses of the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer is that
-    /// of the list that was prepared or submitted last; its plan must not alias.
+    /// Waits for all uses of the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer belongs
+    /// to the list that was prepared or submitted last, whose plan must not alias.
     pub fn upload<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, data: &[T]) -> Result<()> {
         let data: &[u8] = bytemuck::cast_slice(data);
         let start = self.range(buf, frame, first, data.len() as u64)?;
@@ -69,8 +69,9 @@ impl Scheduler {
 
     /// Reads `count` values from a buffer, starting at element `first`; `T` may be any plain type.
     ///
-    /// Waits for all writes to the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer is
-    /// that of the list that was prepared or submitted last; fails if later passes of the list have reused its bytes.
+    /// Waits for all writes to the buffer. `frame` matters for PerFrame and Report buffers only. A scratch buffer
+    /// belongs to the list that was prepared or submitted last; fails if later passes of that list have reused its
+    /// bytes.
     pub fn download<T: Pod>(&mut self, buf: Buf, frame: usize, first: u64, count: usize) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
@@ -98,7 +99,7 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Bytes of all elements of a buffer.
+    /// Returns the bytes of all elements of a buffer.
     pub fn bytes(&self, buf: Buf) -> Result<u64> {
         memory::bytes_of(self.decl(buf)?, &self.counts)
     }
@@ -117,7 +118,7 @@ impl Scheduler {
         self.lists[list].recordings.iter().any(|recording| recording.busy > 0)
     }
 
-    /// Reads a range of words that may lie behind the end of a buffer.
+    /// Reads a range of words that may lie past the end of a buffer.
     pub(super) fn read_words(&mut self, buf: Buf, frame: usize, start: u64, bytes: u64) -> Result<Vec<u32>> {
         let mut words = vec![0_u32; bytes as usize / 4];
         self.read_bytes(buf, frame, start, bytemuck::cast_slice_mut(&mut words))?;
@@ -157,12 +158,12 @@ impl Scheduler {
         start.ok_or_else(|| {
             let name = decl.name;
             Error::Bug(format!(
-                "{bytes} bytes from element {first} of {name} ({all} bytes): no range of words inside the buffer"
+                "{bytes} bytes from element {first} of {name} ({all} bytes) are not a range of words inside the buffer"
             ))
         })
     }
 
-    /// Returns the present place of a buffer.
+    /// Returns the current location of a buffer.
     fn locate(&self, buf: Buf, frame: usize) -> Result<BufferLocation> {
         let decl = self.decl(buf)?;
         if decl.class != Class::Step {
@@ -193,7 +194,7 @@ impl Scheduler {
     }
 }
 
-/// A buffer's place, without a borrow of the scheduler while commands are recorded.
+/// A buffer's location, which does not borrow the scheduler while commands are recorded.
 #[derive(Clone, Copy)]
 enum BufferLocation {
     Own(Buf, usize),

@@ -1,3 +1,3 @@
-//! The engine compared with the method in double precision, on the user's own device.
+//! Compares the engine with a double-precision reference, on the user's device.
 
 pub mod selftest;

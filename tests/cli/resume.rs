@@ -172,7 +172,7 @@ fn a_resumed_run_says_what_changed_and_what_cannot() {
     let Some(_turn) = device() else { return };
     let place = Place::new();
     let nothing = place.trained("out", &["--resume", "--iterations", "6", "--checkpoint-every", "2"]);
-    assert!(succeeded(&nothing).contains("no checkpoint: training starts at step 1"), "{}", stderr(&nothing));
+    assert!(succeeded(&nothing).contains("no checkpoint; training starts at step 1"), "{}", stderr(&nothing));
     let first = place.model("out", 6);
     let refused = |flags: &[&str], status: i32, parts: &[&str]| {
         let output = place.trained("out", &[&["--resume"], flags].concat());
@@ -242,7 +242,10 @@ fn a_damaged_checkpoint_gives_way_to_the_one_before() {
     std::fs::write(&found[0].path, &whole[..whole.len() / 2]).expect("cut");
     let text = succeeded(&place.trained("out", &["--resume"]));
     let name = found[0].path.file_name().expect("a name").to_string_lossy().into_owned();
-    assert!(text.contains(&name) && text.contains("cut short") && text.contains("before it is tried"), "{text}");
+    assert!(
+        text.contains(&name) && text.contains("cut short") && text.contains("trying the previous checkpoint"),
+        "{text}"
+    );
     assert!(place.model("out", 9) == place.model("straight", 9));
     // Without an intact checkpoint, training refuses to overwrite files that a user may still rescue.
     for found in place.checkpoints("out") {
@@ -267,7 +270,7 @@ fn masks_without_objects_are_resumed_like_others() {
     succeeded(&place.trained("straight", &[&flags[..], &["--iterations", "8"]].concat()));
     succeeded(&place.trained("out", &[&flags[..], &["--iterations", "4"]].concat()));
     let text = succeeded(&place.trained("out", &["--resume", "--iterations", "8"]));
-    assert!(text.contains("goes on after step 4"), "{text}");
+    assert!(text.contains("resuming after step 4"), "{text}");
     assert!(place.model("out", 8) == place.model("straight", 8));
 }
 
@@ -294,13 +297,13 @@ fn unwritable_folders_are_refused_and_lost_previews_warned_of() {
     let output = place.labelgs(&["train", &place.text("scene"), "-o", "/sys/labelgs", "--masks", &masks]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
     assert!(stderr(&output).contains("/sys/labelgs: cannot be written"), "{}", stderr(&output));
-    assert!(!stderr(&output).contains("memory to start with"), "nothing was trained: {}", stderr(&output));
+    assert!(!stderr(&output).contains("initial device memory"), "nothing was trained: {}", stderr(&output));
     // A file in the place of the folder of previews.
     std::fs::create_dir_all(place.path("out")).expect("a folder");
     std::fs::write(place.path("out/preview"), b"").expect("a file");
     let output = place.trained("out", &["--iterations", "6", "--set", "preview_every=2", "--checkpoint-every", "2"]);
     let said = stderr(&output);
-    assert!(said.matches("training goes on without it").count() == 2, "{said}");
+    assert!(said.matches("training continues without it").count() == 2, "{said}");
     assert_eq!(output.status.code(), Some(7), "that of the end is missing: {said}");
     assert!(!place.model("out", 6).is_empty() && place.checkpoints("out")[0].step == 6);
 }
@@ -323,7 +326,7 @@ fn without_space_the_run_ends_and_the_last_checkpoint_stays() {
     shell.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", "off").args(["-c", &script, "sh"]).args(args);
     let output = shell.output().expect("a shell");
     let text = succeeded(&output);
-    assert!(text.contains("cannot be written") && text.contains("training goes on"), "{text}");
+    assert!(text.contains("cannot be written") && text.contains("training continues"), "{text}");
     assert_eq!(place.checkpoints("out"), old, "the last one is there");
     TrainState::read(&old[0].path).expect("and whole");
     assert!(!place.model("out", 8).is_empty());
@@ -349,7 +352,7 @@ fn an_output_that_was_deleted_meanwhile_is_made_anew() {
     // A checkpoint may be written at the same time.
     while std::fs::remove_dir_all(place.path("out")).is_err() {}
     let text = succeeded(&child.wait_with_output().expect("a child"));
-    assert!(text.contains("was deleted meanwhile"), "{text}");
+    assert!(text.contains("was deleted; settings"), "{text}");
     assert!(!place.model("out", 30).is_empty() && place.path("out/config.toml").exists());
     assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [30]);
     all_whole(&place.path("out"));
@@ -393,7 +396,7 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
     succeeded(&place.trained("out", &["--iterations", "9", "--checkpoint-every", "9"]));
     let old = place.checkpoints("out");
     let text = succeeded(&place.trained("out", &["--iterations", "3", "--checkpoint-every", "0"]));
-    assert!(text.contains("of an earlier run") && text.contains("Go on with that run"), "{text}");
+    assert!(text.contains("from an earlier run") && text.contains("Resume that run"), "{text}");
     assert_eq!(place.checkpoints("out"), old);
     let models = || {
         let found = files(&place.path("out/point_cloud")).into_iter();
@@ -401,12 +404,12 @@ fn checkpoints_of_an_earlier_run_stay_until_there_are_new_ones() {
             .map(|path| path.parent().and_then(|step| step.file_name()?.to_str().map(str::to_owned)))
             .collect::<Vec<_>>()
     };
-    assert!(text.contains("iteration_9/point_cloud.ply is of an earlier run"), "{text}");
+    assert!(text.contains("iteration_9/point_cloud.ply is from an earlier run"), "{text}");
     assert_eq!(models(), [Some("iteration_3".to_owned())], "what other commands take is of the last run");
     assert!(place.path("out/earlier/point_cloud/iteration_9/point_cloud.ply").exists(), "and nothing is lost");
     succeeded(&place.trained("out", &["--iterations", "5", "--checkpoint-every", "2", "--set", "save_at=2"]));
     assert_eq!(models().len(), 2, "{:?}", models());
     let steps: Vec<u32> = place.checkpoints("out").iter().map(|found| found.step).collect();
     assert_eq!(steps, [5], "no checkpoint of the run of 9 steps remains");
-    assert!(succeeded(&place.trained("out", &["--resume"])).contains("goes on after step 5"));
+    assert!(succeeded(&place.trained("out", &["--resume"])).contains("resuming after step 5"));
 }

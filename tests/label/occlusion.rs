@@ -299,7 +299,7 @@ fn a_table_is_read_back_and_an_invalid_one_refused() {
     let lists = |text: &str| format!(r#"{{"schema_version": 1, "kind": "depth", "views": {{"0.png": {text}}}}}"#);
     for (text, problem) in [
         (lists(r#"{"1": [1]}"#), "hides itself"),
-        (lists(r#"{"0": [1]}"#), "0 is no object"),
+        (lists(r#"{"0": [1]}"#), "0 is not an object"),
         (lists(r#"{"x": [1]}"#), "expected"),
         (lists(r#"{"1": [70000]}"#), "expected"),
         ("{}".to_owned(), "expected"),

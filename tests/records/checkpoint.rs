@@ -63,7 +63,7 @@ fn a_damaged_checkpoint_is_refused_with_the_reason() {
         flipped[at] ^= 1 << (at % 8);
         let text = refused(&scene, &flipped);
         let reason = match at {
-            0..8 => "no checkpoint",
+            0..8 => "not a labelgs checkpoint",
             8..12 => "version",
             16..24 => "were written",
             _ => "checksum",
@@ -75,7 +75,7 @@ fn a_damaged_checkpoint_is_refused_with_the_reason() {
     let text = refused(&scene, &newer);
     let named = [format!("version {}", VERSION + 1), format!("version {VERSION}"), env!("CARGO_PKG_VERSION").into()];
     assert!(named.iter().all(|part| text.contains(part)), "{text}");
-    assert!(refused(&scene, b"ply\nformat binary_little_endian 1.0\n").contains("no checkpoint"));
+    assert!(refused(&scene, b"ply\nformat binary_little_endian 1.0\n").contains("not a labelgs checkpoint"));
 }
 
 /// Invalid contents with a correct checksum cause no large allocation and no panic.

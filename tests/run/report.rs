@@ -40,7 +40,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     assert!(page.contains("&lt;img src=x onerror=alert(1)&gt;&quot;'&amp;"), "the name of the object");
     assert!(page.contains("<h1>scene</h1>") && page.contains("20 of 20 steps"), "{}", &page[..2000]);
     assert!(page.contains("&lt;b&gt;bold out"), "the folder");
-    for part in ["PSNR", "Photo loss", "IoU of labels", "Time of a step", "growth ends", "labels begin"] {
+    for part in ["PSNR", "Photo loss", "IoU of labels", "Step time", "growth ends", "labels begin"] {
         assert!(page.contains(part), "{part}");
     }
     for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned for the last model"] {
@@ -67,7 +67,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     is_harmless(&both);
     assert!(both.contains("<h1>scene: 2 runs</h1>") && both.contains("other") && both.contains("&lt;b&gt;bold out"));
     // Each run has a curve in each chart, and a render of the view.
-    for chart in ["Photo loss", "L1", "Gaussians", "Time of a step"] {
+    for chart in ["Photo loss", "L1", "Gaussians", "Step time"] {
         let at = both.find(&format!("<strong>{chart}</strong>")).unwrap_or_else(|| panic!("{chart}"));
         let end = at + both[at..].find("</figure>").expect("an end");
         assert_eq!(both[at..end].matches("<polyline").count(), 2, "{chart}");
@@ -96,9 +96,9 @@ fn damaged(place: &Place, out: &str) {
     let mut lines: Vec<&str> = whole.lines().collect();
     lines.reverse();
     std::fs::write(&history, lines.join("\n") + "\n").expect("damaged");
-    report(3, "steps never fall");
+    report(3, "expected ascending steps");
     std::fs::remove_file(&history).expect("removed");
-    report(0, "There is no history.jsonl");
+    report(0, "No history.jsonl");
     for file in ["run.json", "metrics.json"] {
         let path = folder.join(file);
         let text = read(&path);
@@ -107,9 +107,9 @@ fn damaged(place: &Place, out: &str) {
         std::fs::write(&path, text).expect("as before");
     }
     std::fs::remove_file(folder.join("run.json")).expect("removed");
-    report(0, "There are no scores");
+    report(0, "No scores");
     std::fs::remove_file(folder.join("config.toml")).expect("removed");
-    report(3, "has no config.toml; name the folder that a training wrote");
+    report(3, "has no config.toml; name the output folder of a run");
     let output = place.labelgs(&["report", &place.text("nowhere")]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     assert!(stderr(&output).contains("nowhere: is not a folder"), "{}", stderr(&output));

@@ -146,9 +146,9 @@ fn wrong_use_is_an_error_that_says_so() {
         (scheduler.upload(MODEL, 0, 99, &[1_u32, 2]), "model"),
         (scheduler.upload(A, 0, 0, &[1_u32]), "without aliasing"),
         (scheduler.download::<u32>(C, 0, 0, 1).map(|_| ()), "does not touch buffer c"),
-        (scheduler.download::<u16>(A, 0, 0, 1).map(|_| ()), "no range of words"),
+        (scheduler.download::<u16>(A, 0, 0, 1).map(|_| ()), "not a range of words"),
         (scheduler.upload(Buf(99), 0, 0, &[1_u32]), "no buffer 99"),
-        (scheduler.check_guards(), "without guards"),
+        (scheduler.check_guards(), "has no guards"),
     ];
     for (result, expected) in failures {
         let message = result.expect_err(expected).to_string();

@@ -68,12 +68,12 @@ fn depths_that_are_not_there_are_an_error() {
     refused(&with(&["--depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
     refused(&with(&["--depths", &masks]), &["masks", "depth needs 16-bit grey"]);
     let holes = written(&place, "holes", [0.0; 2]);
-    refused(&["--iterations", "60", "--depths", &holes], &["holes", "maps without a depth"]);
-    refused(&with(&["--depths", &holes]), &["holes", "maps without a depth"]);
+    refused(&["--iterations", "60", "--depths", &holes], &["holes", "maps without any depth"]);
+    refused(&with(&["--depths", &holes]), &["holes", "maps without any depth"]);
     fs::remove_file(place.path("scene/depth/001.exr")).expect("a map");
     refused(&with(&["--depths", &maps]), &["depth", "have none", "001"]);
     refused(&["--set", "depth_weight=-1"], &["depth"]);
     // A reconstruction without points.
     fs::write(place.path("scene/sparse/0/points3D.bin"), 0_u64.to_le_bytes()).expect("written");
-    refused(&FLAGS, &["what photo shows them", "--depths"]);
+    refused(&FLAGS, &["no points with known photos", "--depths"]);
 }

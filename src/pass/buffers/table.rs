@@ -15,7 +15,8 @@ crate::buffers! { cures::whole;
     TARGET "target": 4, Domain::PIXELS, Class::PerFrame, WORD_TEXEL,
         "Photo, `[P]`, RGBA8; pixels with alpha 0 are ignored.";
     VIEW_LABELS "view_labels": 4, Domain::LABELLED_PIXELS, Class::PerFrame, WORD_TEXEL,
-        "Visible object of each pixel, `[P]`, with LABEL_BORDER near a contour; in a vote sweep, the column of each pixel.";
+        "Visible object of each pixel, `[P]`, with LABEL_BORDER near a contour; in a vote sweep, the column of \
+         each pixel.";
     DEPTHS "depths": 4, Domain::KNOWN_DEPTHS, Class::PerFrame, None,
         "1 / known depth of each pixel, `[P]`, 1 / world units; 0 if unknown.";
     LAYER_FROM_LABEL "layer_from_label": 4, Domain::LABELS, Class::PerFrame, WORD_TEXEL,
@@ -49,7 +50,8 @@ crate::buffers! { cures::whole;
         "15 floats of degree 2, and the first float of degree 3, `[N, 4 vec4]`.";
     SH3 "sh3": 80, Domain::GAUSSIANS, Class::Model, VEC4_TEXEL, "The other 20 floats of degree 3, `[N, 5 vec4]`.";
     M_MEANS "m_means": 16, Domain::TRAINED, Class::Model, VEC4_TEXEL,
-        "First moments of means; packed, both moments of each parameter (glsl/include/moments_store.glsl); the same below.";
+        "First moments of means; packed, both moments of each parameter (glsl/include/moments_store.glsl); \
+         the same below.";
     M_SCALES "m_scales": 16, Domain::TRAINED, Class::Model, VEC4_TEXEL, "First moments of scales.";
     M_QUATS "m_quats": 16, Domain::TRAINED, Class::Model, VEC4_TEXEL, "First moments of quats.";
     M_SH0 "m_sh0": 16, Domain::TRAINED, Class::Model, VEC4_TEXEL, "First moments of sh0.";
@@ -72,7 +74,8 @@ crate::buffers! { cures::whole;
     W_SHARED "w_shared": 8, Domain::SHARED_ROWS, Class::Model, None,
         "Bias correction of both moments of each row, `[S]`: 1 - beta^t after its t-th update.";
     DENSIFY_STATS "densify_stats": 8, Domain::TRAINED, Class::Model, None,
-        "Sum of screen gradients and number of views since the last densification, or the blending weights before pruning by weight, `[N]`.";
+        "Sum of screen gradients and number of views since the last densification, or the blending weights before \
+         pruning by weight, `[N]`.";
     TOUCHED_AT "touched_at": 4, Domain::LATE_GAUSSIANS, Class::Model, WORD_TEXEL,
         "Number of the last update of each Gaussian, `[N]`.";
     LABEL_KEYS "label_keys": 4, Domain::LABELLED, Class::Persistent, None,

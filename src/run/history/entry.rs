@@ -1,17 +1,17 @@
-//! The lines of a history.
+//! The entries of a history.
 
 use crate::train::StepReport;
 use serde::{Deserialize, Serialize};
 
-/// A line.
+/// An entry: one line of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub(crate) enum Entry {
-    /// Numbers of some steps.
+    /// Means over some steps.
     Steps(Steps),
     /// A densification.
     Densified {
-        /// Step after which it was.
+        /// Step after which it happened.
         step: u32,
         /// Gaussians cloned.
         cloned: u32,
@@ -28,12 +28,12 @@ pub(crate) enum Entry {
     Warning {
         /// Steps done.
         step: u32,
-        /// Its text.
+        /// Text of the warning.
         text: String,
     },
 }
 
-/// Means over the steps after the line before, up to this one.
+/// Means over the steps since the previous entry.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Steps {
     /// Last step.
@@ -52,7 +52,7 @@ pub(crate) struct Steps {
     pub gaussians: u32,
     /// Time of a step, ms.
     pub ms: f64,
-    /// Time of the training until then, s.
+    /// Training time until then, s.
     pub seconds: f64,
 }
 
@@ -62,7 +62,7 @@ pub(crate) struct Steps {
 pub(crate) struct ViewScore {
     /// Steps done.
     pub step: u32,
-    /// The view, if it is one.
+    /// Name of the view, for a single view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub view: Option<String>,
     /// PSNR, dB.
@@ -83,7 +83,7 @@ impl Entry {
         }
     }
 
-    /// Returns true for lines that the end of a run writes.
+    /// Returns true for entries that are written at the end of a run.
     pub(super) fn is_of_end(&self) -> bool {
         matches!(self, Self::Preview(_) | Self::Scores(_))
     }
@@ -98,13 +98,13 @@ impl Entry {
         if let Self::Scores(scored) = self { Some(scored) } else { None }
     }
 
-    /// Returns the numbers of a line about steps.
+    /// Returns the means of an entry about steps.
     pub(crate) fn steps(&self) -> Option<&Steps> {
         if let Self::Steps(steps) = self { Some(steps) } else { None }
     }
 }
 
-/// Sums over the steps of a line that is not finished.
+/// Sums over the steps of an unfinished entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Sums {
@@ -126,7 +126,7 @@ impl Sums {
         self.label_loss += report.label_loss;
     }
 
-    /// Puts the means into a line that has the rest.
+    /// Fills the means into an entry.
     pub(super) fn into_line(self, rest: Steps) -> Steps {
         let [loss, l1, ssim, label_loss] =
             [self.loss, self.l1, self.ssim, self.label_loss].map(|sum| sum / f64::from(self.steps.max(1)));

@@ -1,8 +1,8 @@
-//! `history.jsonl`: the numbers of a run over its steps, a line of JSON each.
+//! `history.jsonl`: the metrics of a run over its steps, as lines of JSON.
 //!
-//! A line is written and flushed when its numbers are known, about every ten steps. A run that goes on from a
-//! checkpoint first drops the lines after it; sums of unfinished lines are in the checkpoint. So an interrupted run has
-//! the history of an uninterrupted one, except for times.
+//! A line is written and flushed when its values are known, about every ten steps. A resumed run first drops the lines
+//! after its checkpoint, which stores the sums of the unfinished line. An interrupted run thus has the same history as
+//! an uninterrupted one, except for times.
 
 mod entry;
 mod read;
@@ -20,18 +20,18 @@ use std::time::{Duration, Instant};
 /// Name of the file.
 pub(crate) const HISTORY_FILE: &str = "history.jsonl";
 
-/// Steps of a line.
+/// Steps per line.
 pub(crate) const STEPS_PER_LINE: u32 = 10;
 
 /// Writes the history of a run.
 pub(super) struct Recorder {
     path: PathBuf,
-    /// None if the file could not be opened.
+    /// `None` if the file could not be opened.
     lines: Option<Lines>,
     sums: Sums,
-    /// Lines whose reports are not known yet.
+    /// Lines whose step reports are still missing.
     due: VecDeque<Steps>,
-    /// Time in steps since the last line, and their number.
+    /// Time spent in steps since the last line, and their number.
     spent: (Duration, u32),
     /// Seconds of the run before `start`.
     before: f64,
@@ -40,7 +40,7 @@ pub(super) struct Recorder {
 }
 
 impl Recorder {
-    /// Opens the history of a run in the folder `out` that goes on after `step`, of `last` steps. 0 begins a new
+    /// Opens the history of a run of `last` steps in the folder `out` that resumes after `step`; 0 starts a new
     /// history.
     pub(super) fn new(out: &Path, (step, last): (u32, u32), sums: Sums) -> Self {
         let path = out.join(HISTORY_FILE);
@@ -67,7 +67,7 @@ impl Recorder {
         self.start = Instant::now();
     }
 
-    /// Goes back to `step` after a failure.
+    /// Rewinds to `step` after a failure.
     pub(super) fn go_back(&mut self, step: u32, last: u32, sums: Sums) {
         let (bytes, _) = kept(&self.path, step, last);
         self.due.clear();
@@ -75,7 +75,7 @@ impl Recorder {
         self.write(|lines| lines.cut(bytes));
     }
 
-    /// Notes that a step was submitted, which took some time.
+    /// Records a submitted step and its time.
     pub(super) fn submitted(&mut self, step: u32, is_last: bool, gaussians: u32, time: Duration) {
         self.spent = (self.spent.0 + time, self.spent.1 + 1);
         if step.is_multiple_of(STEPS_PER_LINE) || is_last {
@@ -106,7 +106,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Returns the sums of the line that is not finished, for a checkpoint. Nothing may be in flight.
+    /// Returns the sums of the unfinished line, for a checkpoint. Nothing may be in flight.
     pub(super) fn unfinished(&self) -> Sums {
         self.sums
     }
@@ -125,12 +125,12 @@ impl Recorder {
         }
     }
 
-    /// Waits until all lines are on the disk; before a checkpoint, which is of no later step than they.
+    /// Waits until all lines are on disk; call it before a checkpoint, which must not be ahead of the history.
     pub(super) fn sync(&mut self) {
         self.write(Lines::sync);
     }
 
-    /// Returns the time of the training until now, with earlier parts of an interrupted run, s.
+    /// Returns the training time so far, including earlier parts of an interrupted run, s.
     pub(super) fn seconds(&self) -> f64 {
         self.before + self.start.elapsed().as_secs_f64()
     }
@@ -142,16 +142,16 @@ impl Recorder {
         }
     }
 
-    /// A training is worth more than its history.
+    /// The run is worth more than its history.
     fn warn(&mut self, error: &Error) {
         if !std::mem::replace(&mut self.has_warned, true) {
-            tracing::warn!("{error}; training goes on, its report will have gaps");
+            tracing::warn!("{error}; training continues, but its report will have gaps");
         }
     }
 }
 
-/// Returns the length of the history up to `step`, and the seconds until then. A run that ended at `step` is scored
-/// again, so its last scores go.
+/// Returns the length of the history up to `step` in bytes, and the seconds until then. A run that ended at `step` is
+/// scored again, so its final scores are dropped.
 fn kept(path: &Path, step: u32, last: u32) -> (u64, f64) {
     if step == 0 || !path.is_file() {
         return (0, 0.0);
@@ -159,7 +159,7 @@ fn kept(path: &Path, step: u32, last: u32) -> (u64, f64) {
     let history = match read(path) {
         Ok(history) => history,
         Err(error) => {
-            tracing::warn!("{error}; the history begins anew after step {step}");
+            tracing::warn!("{error}; the history restarts after step {step}");
             return (0, 0.0);
         }
     };

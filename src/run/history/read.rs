@@ -8,13 +8,13 @@ use std::path::Path;
 /// A history.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct History {
-    /// Its lines, by rising step.
+    /// Entries by ascending step.
     pub entries: Vec<Entry>,
-    /// The byte after each line.
+    /// End of each line, bytes.
     pub ends: Vec<u64>,
 }
 
-/// Reads a history. What follows the last end of a line is dropped: a kill left it.
+/// Reads a history. An incomplete last line is dropped: a killed run may leave one.
 pub(crate) fn read(path: &Path) -> Result<History> {
     let bytes = bytes(path)?;
     let mut history = History::default();
@@ -23,12 +23,12 @@ pub(crate) fn read(path: &Path) -> Result<History> {
         let end = start + length;
         let entry: Entry = serde_json::from_slice(&bytes[start..end]).map_err(|error| {
             let place = format!("line {}", history.entries.len() + 1);
-            Error::data(path, place, format!("is not a line of a history ({error}); correct or delete the line"))
+            Error::data(path, place, format!("is not a valid history line ({error}); fix or delete the line"))
         })?;
         if let Some(before) = history.entries.last().filter(|before| before.step() > entry.step()) {
             let place = format!("line {}", history.entries.len() + 1);
             let problem = format!(
-                "step {} comes after step {}; steps never fall; correct or delete the line",
+                "step {} comes after step {}; expected ascending steps; fix or delete the line",
                 entry.step(),
                 before.step()
             );

@@ -1,4 +1,4 @@
-//! Memory planned and measured, and times by pass.
+//! Planned and measured memory, and times by pass.
 
 use super::load::ReportedRun;
 use super::{columns, row, run_name};
@@ -6,19 +6,19 @@ use crate::report::text::{bytes, count, number, significant};
 use crate::run::passes::Pass;
 use maud::{Markup, html};
 
-/// Most stages with a bar of their own.
+/// Most stages with their own bar.
 const STAGES_MAX: usize = 8;
 
-/// Returns both.
+/// Returns both sections.
 pub(super) fn costs(runs: &[ReportedRun]) -> Markup {
     let rows = [
         row(runs, "planned for the first model", |run| run.info.memory.planned_start.map(bytes)),
         row(runs, "planned for the last model", |run| run.info.memory.planned_end.map(bytes)),
-        row(runs, "most used on the device", |run| run.info.memory.device_peak.map(bytes)),
-        row(runs, "most used in the host's memory", |run| run.info.memory.host_peak.map(bytes)),
+        row(runs, "peak on the device", |run| run.info.memory.device_peak.map(bytes)),
+        row(runs, "peak in host memory", |run| run.info.memory.host_peak.map(bytes)),
     ];
     html! {
-        h3 { "Time of a step by stage" }
+        h3 { "Step time by stage" }
         @for (index, run) in runs.iter().enumerate() {
             @if runs.len() > 1 { p { (run_name(index, run)) } }
             @match &run.profile {
@@ -30,13 +30,13 @@ pub(super) fn costs(runs: &[ReportedRun]) -> Markup {
                     (passes(&profile.passes))
                 }
                 None if run.info.passes.is_empty() => p.quiet {
-                    "Not measured: the run has not ended, or is too short, or its device has no clock. A profile of \
-                     the scene that is written to profile.json in the folder of the run is shown here."
+                    "Not measured: the run has not ended, is too short, or its device has no timestamps. To show a \
+                     profile here, write it to profile.json in the run folder."
                 },
                 None => {
                     p.quiet {
-                        "Means over the last steps, which ran once more after the end of the training, with a barrier \
-                         before each pass."
+                        "Means over the last steps, which were repeated after training with a barrier before each \
+                         pass."
                     }
                     (passes(&run.info.passes))
                 }
@@ -62,7 +62,7 @@ fn buffers(run: &ReportedRun) -> Markup {
     }
 }
 
-/// A bar for each of the largest stages and one for the others; all passes on demand.
+/// A bar for each of the largest stages, and one for the others; all passes on demand.
 fn passes(passes: &[Pass]) -> Markup {
     let mut stages: Vec<(String, f64, f64)> = Vec::new();
     for pass in passes {

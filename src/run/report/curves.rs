@@ -1,4 +1,4 @@
-//! Curves over the steps.
+//! Charts over the steps.
 
 use super::load::ReportedRun;
 use crate::report::text::{DECIBELS, SCORE};
@@ -7,7 +7,7 @@ use crate::run::history::{Entry, Steps, ViewScore};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
-/// Most marks of a kind that may come often.
+/// Most marks of a frequent kind of event.
 const MARKS_MAX: usize = 12;
 /// Shortest PSNR axis, dB.
 const PSNR_AXIS_MIN_DB: f64 = 5.0;
@@ -17,7 +17,7 @@ const IOU_AXIS_MIN: f64 = 0.1;
 /// Returns all charts.
 pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
     if runs.iter().all(|run| run.history.is_empty()) {
-        return html! { p.quiet { "There is no history.jsonl." } };
+        return html! { p.quiet { "No history.jsonl was found." } };
     }
     let marks = marks(runs);
     let mut charts = losses(runs);
@@ -37,12 +37,11 @@ pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
         digits: Digits::Count,
         ..chart("Gaussians", "", steps_of(runs, |steps| steps.gaussians.into()))
     });
-    charts.push(Chart { scale: Scale::FromZero, ..chart("Time of a step", "ms", steps_of(runs, |steps| steps.ms)) });
+    charts.push(Chart { scale: Scale::FromZero, ..chart("Step time", "ms", steps_of(runs, |steps| steps.ms)) });
     html! {
         p.quiet {
-            "Each point of a loss is the mean over ten steps. PSNR and IoU are those of one view during the \
-            training, and \
-             of all held-out views at the end."
+            "Each point of a loss is the mean over ten steps. PSNR and IoU are of the preview view during training, \
+            and of all held-out views at the end."
         }
         div.charts {
             @for (index, chart) in charts.into_iter().enumerate() {
@@ -52,7 +51,7 @@ pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
     }
 }
 
-/// The parts of the loss: in one chart for one run, in a chart each for several.
+/// The parts of the loss: one chart for a single run, or one chart per part for several runs.
 fn losses(runs: &[ReportedRun]) -> Vec<Chart> {
     let parts: [(&str, fn(&Steps) -> f64); 4] = [
         ("Photo loss", |steps| steps.loss),
@@ -87,7 +86,7 @@ fn steps_of(runs: &[ReportedRun], value: impl Fn(&Steps) -> f64) -> Vec<Series> 
     runs.iter().enumerate().map(|(index, run)| step_series(run, &run.name, index, &value)).collect()
 }
 
-/// Scores of the view of the previews, and those of all held-out views, which are few points.
+/// Scores of the preview view, and the few scores of all held-out views.
 fn views_of(runs: &[ReportedRun], value: impl Fn(&ViewScore) -> Option<f64>) -> Vec<Series> {
     let mut series = Vec::new();
     for (index, run) in runs.iter().enumerate() {
@@ -107,7 +106,7 @@ fn views_of(runs: &[ReportedRun], value: impl Fn(&ViewScore) -> Option<f64>) -> 
     series
 }
 
-/// Events by step. Those of one of several runs have its name and colour; those of all runs have neither.
+/// Events by step. With several runs, events of a single run have its name and colour; events of all runs have neither.
 fn marks(runs: &[ReportedRun]) -> Vec<Mark> {
     let mut known: BTreeMap<u32, Vec<(&str, Vec<usize>)>> = BTreeMap::new();
     for (index, run) in runs.iter().enumerate() {
@@ -135,7 +134,7 @@ fn marks(runs: &[ReportedRun]) -> Vec<Mark> {
     known.into_iter().map(mark).collect()
 }
 
-/// Events of a run with their steps.
+/// Events of a run, with their steps.
 fn events(run: &ReportedRun) -> Vec<(u32, &'static str)> {
     let train = &run.settings.train;
     let mut events = Vec::new();

@@ -1,4 +1,4 @@
-//! What was run, its numbers, warnings and settings.
+//! The head of a report: command, main numbers, warnings and settings.
 
 use super::load::ReportedRun;
 use super::{columns, row, run_name};
@@ -7,10 +7,10 @@ use crate::run::Settings;
 use maud::{Markup, html};
 use std::path::Path;
 
-/// What a run decides by itself where the default leaves it open.
+/// Text for settings that the run decides itself.
 const AUTOMATIC_TEXT: &str = "by the scene and the length of the run";
 
-/// Returns the title: the name of the scene, or that of the run where a run does not tell.
+/// Returns the title: the name of the scene, or of the run if the scene is unknown.
 pub(super) fn title(runs: &[ReportedRun]) -> String {
     let scene = |run: &ReportedRun| {
         let name = Path::new(&run.info.scene).file_name();
@@ -28,7 +28,7 @@ pub(super) fn title(runs: &[ReportedRun]) -> String {
 /// Returns the line below the title.
 pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
     let [run] = runs else {
-        return html! { p.quiet { "Trainings with labelgs, side by side." } };
+        return html! { p.quiet { "labelgs runs, side by side." } };
     };
     let state = match run.info.ended {
         Some(ended) if ended.stopped => "stopped",
@@ -61,11 +61,11 @@ pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     let unscored = runs[0].test().is_none_or(|test| test.psnr.is_none());
     html! {
         dl.numbers { @for (name, value) in tiles { div { dt { (name) } dd { (value) } } } }
-        @if unscored { p.quiet { "There are no scores: the run has not ended, or holds out no views." } }
+        @if unscored { p.quiet { "No scores: the run has not ended, or has no held-out views." } }
     }
 }
 
-/// Numbers for a second look.
+/// Secondary numbers.
 fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
     let objects = "IoU of objects, visible parts";
     [
@@ -83,7 +83,7 @@ pub(super) fn what(runs: &[ReportedRun]) -> Markup {
         row(runs, "masks", |run| run.info.masks.clone()),
         row(runs, "views", |run| {
             let (train, test) = (run.info.train_views, run.info.test_views);
-            (train > 0).then(|| format!("{} to train on, {} held out", count(train), count(test)))
+            (train > 0).then(|| format!("{} for training, {} held out", count(train), count(test)))
         }),
         row(runs, "seed", |run| Some(run.settings.train.seed.to_string())),
         row(runs, "device", |run| Some(part(run)?.device)),
@@ -113,7 +113,7 @@ pub(super) fn what(runs: &[ReportedRun]) -> Markup {
     }
 }
 
-/// Returns all warnings; none if there are none.
+/// Returns all warnings; empty if there are none.
 pub(super) fn warnings(runs: &[ReportedRun]) -> Option<Markup> {
     let of = |run: &ReportedRun| run.info.parts.iter().flat_map(|part| part.warnings.clone()).collect::<Vec<String>>();
     let all: Vec<(usize, Vec<String>)> = runs.iter().map(of).enumerate().filter(|(_, all)| !all.is_empty()).collect();
@@ -141,7 +141,7 @@ pub(super) fn settings(runs: &[ReportedRun]) -> Markup {
     html! {
         @if rows.is_empty() { p { "All settings are the defaults." } }
         @else {
-            p.quiet { "The settings that are not the default, by their names in config.toml." }
+            p.quiet { "Settings that differ from the default, by their names in config.toml." }
             div.scroll {
                 table {
                     thead {

@@ -1,4 +1,4 @@
-//! The files of a run, as a report needs them.
+//! Reads the files of a run that a report needs.
 
 use crate::error::{Error, Result};
 use crate::files::{read, run_folder};
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
-/// File with the times of passes, if the user put one there.
+/// Optional file with pass times, written by the user.
 const PROFILE_FILE: &str = "profile.json";
 
 /// A run.
@@ -20,7 +20,7 @@ pub(super) struct ReportedRun {
     pub settings: Settings,
     pub info: Info,
     pub history: Vec<Entry>,
-    /// None unless the run has ended.
+    /// `None` unless the run has ended.
     pub metrics: Option<Metrics>,
     pub profile: Option<Profile>,
 }
@@ -45,7 +45,7 @@ pub(super) struct TestScores {
     pub iou_object: Option<f64>,
 }
 
-/// Times of the stages of a step.
+/// Stage times of a step.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Profile {
@@ -54,26 +54,26 @@ pub(super) struct Profile {
     pub passes: Vec<Pass>,
 }
 
-/// Reads a file of JSON; none if there is none.
+/// Reads a JSON file; `None` if it does not exist.
 pub(crate) fn json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    const EXPECTED: &str = "this is not a valid record of a training; correct or delete it";
+    const EXPECTED: &str = "this is not a valid training record; fix or delete it";
     if path.is_file() { read::json(path, EXPECTED).map(Some) } else { Ok(None) }
 }
 
 impl ReportedRun {
-    /// Reads the files in the folder of a run. All but `config.toml` may be missing: an interrupted run lacks some.
+    /// Reads the files in a run folder. All except `config.toml` may be missing, because an interrupted run lacks some.
     pub(super) fn read(folder: &Path) -> Result<Self> {
         if !folder.is_dir() {
-            return Err(Error::data(folder, "", "is not a folder; name the folder that a training wrote"));
+            return Err(Error::data(folder, "", "is not a folder; name the output folder of a run"));
         }
         let Some(settings) = Settings::for_model(folder)? else {
-            let problem = format!("has no {}; name the folder that a training wrote", run_folder::CONFIG);
+            let problem = format!("has no {}; name the output folder of a run", run_folder::CONFIG);
             return Err(Error::data(folder, "", problem));
         };
         let path = folder.join(history::HISTORY_FILE);
         let history = if path.is_file() { history::read(&path)?.entries } else { Vec::new() };
         let info = Info::read(&folder.join(info::RUN_FILE))?.unwrap_or_default();
-        // Without an end, the file is of another run in this folder.
+        // If the run has not ended, the file belongs to another run in this folder.
         let metrics = if info.ended.is_some() { json(&folder.join(summary::METRICS_FILE))? } else { None };
         let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let name = whole.file_name().map_or_else(|| whole.display().to_string(), |name| name.to_string_lossy().into());
@@ -86,7 +86,7 @@ impl ReportedRun {
         self.metrics.as_ref()?.test.as_ref()
     }
 
-    /// Returns the seconds of the training, until its end or its last line.
+    /// Returns the training time until its end or its last history line, s.
     pub(super) fn seconds(&self) -> Option<f64> {
         self.info.ended.map(|ended| ended.seconds).or(self.last().map(|steps| steps.seconds))
     }
@@ -103,13 +103,13 @@ impl ReportedRun {
         self.metrics.as_ref().map(|metrics| metrics.gaussians).or(last).map(u64::from)
     }
 
-    /// Returns the last line about steps.
+    /// Returns the last history entry about steps.
     fn last(&self) -> Option<&Steps> {
         self.history.iter().rev().find_map(Entry::steps)
     }
 }
 
-/// Gives runs of the same name the path of their folder as name.
+/// Replaces duplicate run names by folder paths.
 pub(super) fn tell_apart(runs: &mut [ReportedRun]) {
     let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
     for run in runs {

@@ -1,7 +1,7 @@
-//! `report.html`: a run, or several beside each other, in one file.
+//! `report.html`: one run, or several side by side, in one file.
 //!
-//! A report is made of the files in the folders of the runs alone, without scene and device, so it can be made anew at
-//! any time. [`guide::outputs`](crate::guide::outputs) lists what it shows.
+//! A report needs only the files in the run folders, no scene or device, so it can be made again at any time.
+//! [`guide::outputs`](crate::guide::outputs) lists what it shows.
 
 mod costs;
 mod curves;
@@ -23,19 +23,19 @@ use std::path::{Path, PathBuf};
 /// Name of the report of one run, in its folder.
 pub(crate) const REPORT_FILE: &str = "report.html";
 
-/// Writes the report of the runs in some folders to `path`, and returns it.
+/// Writes the report of the runs in `folders` to `path`, and returns `path`.
 ///
 /// # Errors
 ///
-/// A folder that is none of a run; files in it that cannot be read; an output that cannot be written.
+/// A folder is not a run folder; a file in it cannot be read; the output cannot be written.
 pub fn write(folders: &[PathBuf], path: &Path) -> Result<PathBuf> {
     write_with(folders, path, "")
 }
 
-/// The same with a text above the runs.
+/// Same as [`write`], with a text above the runs.
 pub(crate) fn write_with(folders: &[PathBuf], path: &Path, text: &str) -> Result<PathBuf> {
     if folders.is_empty() {
-        return Err(Error::usage("runs", "names no run; name the folder of one or more trainings"));
+        return Err(Error::usage("runs", "names no run; name one or more run folders"));
     }
     let mut runs = folders.iter().map(|folder| ReportedRun::read(folder)).collect::<Result<Vec<_>>>()?;
     load::tell_apart(&mut runs);
@@ -65,7 +65,7 @@ fn compose(runs: &[ReportedRun], text: &str) -> Result<String> {
     Ok(page(&head::title(runs), &head::lead(runs), &body))
 }
 
-/// Returns a table with a column for each run; rows without any value are left out.
+/// Returns a table with a column per run; rows without values are omitted.
 fn columns(runs: &[ReportedRun], rows: &[(String, Vec<Option<String>>)]) -> Markup {
     let rows = rows.iter().filter(|(_, cells)| cells.iter().any(Option::is_some));
     html! {

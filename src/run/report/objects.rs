@@ -1,4 +1,4 @@
-//! A row for each object.
+//! The object table.
 
 use super::load::ReportedRun;
 use super::run_name;
@@ -24,9 +24,9 @@ pub(super) fn objects(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Ma
     }
     ids.sort();
     if ids.is_empty() {
-        return Ok(html! { p.quiet { "There are none: the run has no masks, or has not ended." } });
+        return Ok(html! { p.quiet { "No objects: the run has no masks, or has not ended." } });
     }
-    // Objects look alike in all runs.
+    // Objects look the same in all runs.
     let mut pictures = BTreeMap::new();
     for &(id, _) in &ids {
         for run in runs {
@@ -119,7 +119,7 @@ fn title(id: u32, name: Option<&str>, pictures: &Pictures) -> Markup {
     }
 }
 
-/// A number that tables are sorted by, with the title of its column for narrow screens.
+/// A sortable number, with its column title for narrow screens.
 fn cell(title: &str, value: Option<f64>, digits: usize) -> Markup {
     let key = value.map_or(String::new(), |value| value.to_string());
     html! { td.right data-title=(title) data-value=(key) { (number(value, digits)) } }

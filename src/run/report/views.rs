@@ -12,23 +12,23 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 use std::path::Path;
 
-/// Names of the pictures that are shown at once.
+/// Names of the pictures that are shown immediately.
 const FIRST_KINDS: [&str; 3] = [PICTURE_KINDS[0].0, PICTURE_KINDS[1].0, PICTURE_KINDS[2].0];
-/// Most bytes of all pictures in a page, before they become text.
+/// Most bytes of all pictures in a page, before base64 encoding.
 const BYTES_MAX: u64 = 12 << 20;
 
-/// Returns the figure that stands first, and the other pictures.
+/// Returns the first figure, and the other pictures.
 pub(super) fn views(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<(Markup, Markup)> {
     let mut figures = match runs {
         [run] => run.info.pictures.iter().map(|view| single(book, run, view)).collect::<Result<Vec<_>>>()?,
         _ => several(book, runs)?,
     };
     figures.retain(|figure| !figure.panels.is_empty());
-    // The worst view is no picture of the whole run, and neither is the best.
+    // Neither the worst nor the best view represents the run, so show the median.
     let middle = figures.len() / 2;
     let first = (!figures.is_empty()).then(|| Figure { is_large: true, ..figures.remove(middle) });
     let rest = html! {
-        @if first.is_none() { p.quiet { "There are no pictures: the run has not ended, or holds out no views." } }
+        @if first.is_none() { p.quiet { "No pictures: the run has not ended, or has no held-out views." } }
         @else if figures.is_empty() { p.quiet { "All pictures are at the top." } }
         @else { p.quiet { "Other held-out views, the lowest PSNR first." } }
         @for figure in &figures { (figure.markup()) }
@@ -45,12 +45,12 @@ fn single(book: &mut PictureBook, run: &ReportedRun, view: &PicturedView) -> Res
     let numbers = [("PSNR", view.psnr, DECIBELS, " dB"), ("SSIM", view.ssim, SCORE, ""), ("IoU", view.iou, SCORE, "")];
     let numbers = numbers.into_iter().filter(|(_, value, ..)| value.is_some());
     let numbers = numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
-    // Masks and errors are for a second look.
+    // Masks and errors are folded.
     let (more, panels) = panels.into_iter().partition(|panel: &Panel| !FIRST_KINDS.contains(&panel.name.as_str()));
     Ok(Figure { view: view.view.clone(), numbers, panels, more, ..Figure::default() })
 }
 
-/// The photo of each view, and what each run makes of it.
+/// The photo of each view, and each run's pictures of it.
 fn several(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Vec<Figure>> {
     let mut names: Vec<&str> = Vec::new();
     for view in runs.iter().flat_map(|run| &run.info.pictures) {
@@ -82,13 +82,13 @@ pub(super) struct PictureBook {
 }
 
 impl PictureBook {
-    /// Returns a picture of a view if there is one, and room for it.
+    /// Returns a picture of a view, if it exists and fits into the page.
     fn panel(&mut self, run: &ReportedRun, number: u32, file: &str, name: &str) -> Result<Option<Panel>> {
         let source = self.source(&path(&run.folder, number, file))?;
         Ok(source.map(|source| Panel { name: name.to_owned(), source, is_heat: file == HEAT_MAP_FILE }))
     }
 
-    /// Returns the address of a picture inside the page if there is one, and room for it.
+    /// Returns the in-page address of a picture, if it exists and fits into the page.
     pub(super) fn source(&mut self, path: &Path) -> Result<Option<String>> {
         let Ok(found) = std::fs::metadata(path) else { return Ok(None) };
         if !found.is_file() || self.is_full || self.bytes + found.len() > BYTES_MAX {

@@ -15,8 +15,8 @@ struct PlacedBuffer {
 
 /// Places every buffer outside of scratch, and the scratch buffers of the list; returns the sizes of the Step pages.
 ///
-/// Larger buffers go first, equal ones in the order of their names: this wastes little space in first fit, and the
-/// result does not depend on the order of the table.
+/// Places larger buffers first, ties by name: first fit then wastes little space, and the result does not depend on the
+/// table order.
 pub(super) fn place(
     table: &'static Table,
     sizes: &[u64],
@@ -53,7 +53,7 @@ pub(super) fn place(
     Ok((placements, pages))
 }
 
-/// Returns the lowest place in the first page with room, or the start of a new page.
+/// Returns the lowest offset in the first page with room, or the start of a new page.
 fn first_fit(placed: &[PlacedBuffer], pages: usize, bytes: u64, life: Lifetime, limits: &Limits) -> (usize, u64) {
     for page in 0..pages {
         let mut taken = placed

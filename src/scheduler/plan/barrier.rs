@@ -1,7 +1,7 @@
 //! Finds hazards on byte ranges, and the barriers that remove them.
 //!
-//! Hazards compare byte ranges, not buffers. Aliasing therefore needs no special rule: reused bytes are a write after a
-//! read, like any other. All barriers are global memory barriers: a barrier orders all earlier items before all later
+//! Hazards compare byte ranges, not buffers. Aliasing therefore needs no special rule: reuse of bytes is a write after
+//! a read, like any other. All barriers are global memory barriers: a barrier orders all earlier items before all later
 //! items, for the kinds of use in its masks.
 
 use super::buffers::{Buf, Table};
@@ -56,7 +56,7 @@ impl Uses {
     }
 }
 
-/// A use of bytes of a buffer that has no place yet.
+/// A use of bytes of a buffer, before placement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BufferUse {
     pub(super) buf: Buf,
@@ -81,7 +81,7 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Returns true if the order of the two matters: they share bytes and at least one writes.
+    /// Returns true if the order matters: both share bytes, and at least one writes.
     pub fn conflicts(&self, other: &Self) -> bool {
         self.page == other.page
             && self.start < other.end
@@ -138,7 +138,7 @@ pub(super) fn touches(uses: &[BufferUse], placements: &[Option<Placement>]) -> R
     uses.iter()
         .map(|used| {
             let place = placements[used.buf.index()]
-                .ok_or_else(|| Error::Bug(format!("buffer {} is in use but has no place", used.buf.0)))?;
+                .ok_or_else(|| Error::Bug(format!("buffer {} is used but not placed", used.buf.0)))?;
             let (start, end) = used.range.unwrap_or((0, place.bound));
             let (page, buf, kind) = (place.page, used.buf, used.kind);
             Ok(Touch { buf, kind, page, start: place.offset + start, end: place.offset + end })
@@ -146,10 +146,10 @@ pub(super) fn touches(uses: &[BufferUse], placements: &[Option<Placement>]) -> R
         .collect()
 }
 
-/// Derives the barriers: at most one before each item, and as few as possible.
+/// Derives as few barriers as possible, with at most one before each item.
 ///
-/// A barrier is placed as late as possible, directly before the item that needs it. Later hazards across it only widen
-/// its masks, which costs nothing, because it is global.
+/// Each barrier is placed as late as possible, directly before the item that needs it. Later hazards across it only
+/// widen its masks, which is free because it is global.
 pub(super) fn derive(
     table: &'static Table,
     labels: &[String],

@@ -1,7 +1,7 @@
 //! Types for a table of buffers, which the owner of the pass lists declares.
 //!
-//! A buffer is an array of equal elements. The shaders declare its bindings (read, written, texel); the planner chooses
-//! its place in memory by its class.
+//! A buffer is an array of equal elements. The shaders declare its bindings (read, written, texel); the planner places
+//! it by its class.
 
 use super::Limits;
 use crate::error::{Error, Result};
@@ -34,12 +34,12 @@ pub enum Class {
 }
 
 impl Class {
-    /// Returns true if the host shares the buffer with the steps in flight: each has a copy.
+    /// Returns true if each frame in flight has its own copy of the buffer.
     pub fn is_shared(self) -> bool {
         matches!(self, Self::PerFrame | Self::Report)
     }
 
-    /// Number of copies on a device: those of the frames, and their staging after them if there is one.
+    /// Returns the number of copies on a device: one per frame, followed by staging copies if there are any.
     pub fn copies(self, limits: &Limits) -> usize {
         match self {
             Self::PerFrame if limits.stages => 2 * limits.frames,
@@ -89,18 +89,18 @@ impl TexelFormat {
 pub enum Count {
     /// The same in every plan.
     Fixed(u32),
-    /// The number at this place of the counts that a plan is made with.
+    /// Index into the counts that a plan is made with.
     At(usize),
 }
 
 /// What the elements of a buffer stand for.
 #[derive(Clone, Copy, Debug)]
 pub struct Domain {
-    /// How many there are.
+    /// Number of elements.
     pub count: Count,
-    /// Advice to the user if at most so many fit.
+    /// Advice to the user if at most this many fit.
     pub cure: fn(u64) -> String,
-    /// Reports of memory leave the buffers out while there are no elements.
+    /// Memory reports omit the buffers while there are no elements.
     pub is_optional: bool,
 }
 
@@ -121,7 +121,7 @@ pub struct BufferDecl {
     pub name: &'static str,
     /// Bytes per element; a multiple of 4.
     pub element_bytes: u32,
-    /// What the elements stand for, and how many there are.
+    /// What the elements stand for, and their number.
     pub domain: Domain,
     /// Lifetime of the contents.
     pub class: Class,
@@ -162,9 +162,9 @@ impl Deref for Table {
 
 /// Declares a table of buffers: `pub static TABLE: &Table`, and a constant for each row.
 ///
-/// First comes the advice if not all fit. Each row is `NAME "name": element_bytes, domain, class, texel, "doc";`. The
-/// constants are `Buf::NAME`; with `consts;` before the rows they are free, for tables of tests. `Buf`, `BufferDecl`
-/// and `Table` have to be in scope.
+/// The first argument is the advice if the memory does not suffice. Each row is `NAME "name": element_bytes, domain,
+/// class, texel, "doc";`. The constants are `Buf::NAME`; with `consts;` before the rows they are free constants, for
+/// tests. `Buf`, `BufferDecl` and `Table` have to be in scope.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! buffers {

@@ -1,4 +1,4 @@
-//! First and last use of each buffer in a list.
+//! Finds the first and last use of each buffer in a list.
 
 use super::barrier::BufferUse;
 use super::buffers::{Class, Table};
@@ -31,7 +31,7 @@ pub(super) fn lives(buffers: usize, uses: &[Vec<BufferUse>]) -> Vec<Option<Lifet
     lives
 }
 
-/// Fails if the first use of a scratch buffer only reads it: its contents are undefined, so a pass is missing.
+/// Fails if the first use of a scratch buffer only reads it: its contents would be undefined, so a pass is missing.
 pub(super) fn check_written_first(table: &'static Table, labels: &[String], uses: &[Vec<BufferUse>]) -> Result<()> {
     let mut written = vec![false; table.len()];
     for (item, uses) in uses.iter().enumerate() {
@@ -42,9 +42,7 @@ pub(super) fn check_written_first(table: &'static Table, labels: &[String], uses
             let decl = &table[touched.buf.index()];
             if decl.class == Class::Step && !written[touched.buf.index()] {
                 let (label, name) = (&labels[item], decl.name);
-                return Err(Error::Bug(format!(
-                    "{label} reads the scratch buffer {name} before anything has written it"
-                )));
+                return Err(Error::Bug(format!("{label} reads the scratch buffer {name} before anything writes it")));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Sizes of buffers, and the memory of pass lists, predicted before anything is allocated.
+//! Sizes of buffers, and memory of pass lists, predicted before anything is allocated.
 
 use super::Limits;
 use super::buffers::{BufferDecl, Class, Table};
@@ -33,7 +33,7 @@ pub(crate) fn bytes_of(decl: &BufferDecl, counts: &[u64]) -> Result<u64> {
     })
 }
 
-/// Memory of a copy of a buffer: who uses it. Copies after those of the frames are staging.
+/// Returns the memory kind of a buffer's copy. Copies after the frames' copies are staging.
 pub(crate) fn kind(class: Class, copy: usize, limits: &Limits) -> MemoryKind {
     match class {
         Class::Model | Class::Persistent | Class::Step => MemoryKind::Device,
@@ -70,14 +70,14 @@ pub struct MemoryRow {
     pub bytes: u64,
 }
 
-/// Memory needs of the engine.
+/// Memory use of the engine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryReport {
     /// Every used buffer, in the order of the table.
     pub rows: Vec<MemoryRow>,
     /// Bytes of each page of the Step arena. Lists share the pages, so each has the size of the largest list.
     pub step_pages: Vec<u64>,
-    /// Bytes of the Step buffers without aliasing, for the list that needs most.
+    /// Bytes of the Step buffers without aliasing, for the list that needs the most.
     pub step_unaliased: u64,
     /// Bytes of staging memory.
     pub staging: u64,
@@ -99,7 +99,7 @@ impl MemoryReport {
         Self::from_plans(table, counts, &plans.iter().collect::<Vec<_>>(), limits, options)
     }
 
-    /// Memory of existing plans.
+    /// Returns the memory of existing plans.
     pub fn from_plans(
         table: &'static Table,
         counts: &[u64],
@@ -136,7 +136,7 @@ impl MemoryReport {
     }
 }
 
-/// Fails if so many bytes in total are more than the engine may use; the error suggests a cure.
+/// Fails if the total exceeds the memory that the engine may use; the error suggests a cure.
 pub(crate) fn check_total(table: &Table, what: &str, needed: u64, limits: &Limits) -> Result<()> {
     if needed <= limits.max_memory {
         return Ok(());
@@ -155,7 +155,7 @@ fn unaliased(plan: &Plan) -> u64 {
     step.filter_map(|(_, place)| place.map(|place| place.bound)).sum()
 }
 
-/// Page sizes that fit each of several arenas.
+/// Returns page sizes that fit each of several arenas.
 pub(crate) fn merge_pages<'a>(arenas: impl Iterator<Item = &'a [u64]>) -> Vec<u64> {
     let mut merged: Vec<u64> = Vec::new();
     for pages in arenas {

@@ -1,5 +1,5 @@
-//! The planner: derives sizes, places in memory and barriers from a table of buffers, counts of their
-//! elements, a pass list and the limits of a device.
+//! The planner: derives sizes, placements and barriers from a table of buffers, element counts, a pass list and device
+//! limits.
 //!
 //! These are pure functions without Vulkan. A plan exists before anything is allocated, can be printed
 //! ([`Plan::report`]) and is tested without a GPU. The same input gives the same plan, byte for byte.
@@ -35,7 +35,7 @@ pub struct PlanOptions {
     pub alias: bool,
     /// A guard after each buffer. Guards turn aliasing off, because a neighbour in shared bytes would overwrite them.
     pub guards: bool,
-    /// A full barrier before each item, so that each time belongs to one item. Results do not change.
+    /// A full barrier before each item, so that each measured time belongs to one item. Results do not change.
     pub barrier_everywhere: bool,
 }
 
@@ -70,7 +70,7 @@ pub struct Placement {
     pub offset: u64,
     /// Bytes of the elements, at least one element.
     pub bytes: u64,
-    /// Bytes bound to shaders: the elements and, with guards, the guard, so that it catches writes past the end.
+    /// Bytes bound to shaders: the elements and, if enabled, the guard, so that it catches writes past the end.
     pub bound: u64,
 }
 
@@ -85,7 +85,7 @@ pub struct DescriptorCounts {
     pub texel: u32,
 }
 
-/// One planned item of a pass list.
+/// A planned item of a pass list.
 #[derive(Clone, Debug)]
 pub struct PlanItem {
     /// Name in reports.
@@ -149,7 +149,7 @@ impl Plan {
         Ok(Self { table, list, counts, options, placements, lives, step_pages, items, descriptors })
     }
 
-    /// Returns the place of a buffer; a scratch buffer must be part of the list.
+    /// Returns the placement of a buffer; a scratch buffer must be part of the list.
     pub fn placement(&self, buf: Buf) -> Result<Placement> {
         self.placements.get(buf.index()).copied().flatten().ok_or_else(|| {
             Error::Bug(format!("pass list {} does not touch buffer {}", self.list.name, name(self.table, buf)))

@@ -3,10 +3,10 @@
 use super::buffers::Buf;
 use crate::shaders::ShaderDesc;
 
-/// A part of the work, for reports, which sum times by stage. The owner of the lists numbers and names its stages.
+/// A part of the work, by which reports sum times. The owner of the lists numbers and names its stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Stage {
-    /// Place in the order of execution.
+    /// Position in the order of execution.
     pub order: u8,
     /// Name for tables.
     pub name: &'static str,

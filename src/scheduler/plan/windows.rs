@@ -1,8 +1,8 @@
-//! Buffers that share bindings, on a device that has too few storage bindings for one each.
+//! Lets buffers share bindings, on devices with too few storage bindings.
 //!
-//! All buffers outside of scratch lie in a block for each kind of memory (several if they exceed the largest
-//! allocation). A pass binds windows: ranges of blocks and of scratch pages that hold its buffers. `gpu/packed.rs` has
-//! the kernels for that.
+//! All buffers outside of scratch lie in one block per memory kind (several if they exceed the largest allocation). A
+//! pass binds windows: ranges of blocks and scratch pages that contain its buffers. `gpu/packed.rs` rewrites the
+//! kernels accordingly.
 
 use super::buffers::{Class, Table};
 use super::pass::{PassDecl, PassList, Work};
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::gpu::MemoryKind;
 use crate::shaders::BindingKind;
 
-/// Where the buffers outside of scratch lie.
+/// Placement of the buffers outside of scratch.
 pub(crate) struct Layout {
     /// Kind and bytes of each block.
     pub(crate) blocks: Vec<(MemoryKind, u64)>,
@@ -20,7 +20,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Lays out the buffers: what the host writes by frame, then the others in the order of the table.
+    /// Lays out the buffers: host-written buffers by frame, then the others in table order.
     pub(crate) fn new(table: &'static Table, counts: &[u64], options: PlanOptions, limits: &Limits) -> Result<Self> {
         let mut layout = Self { blocks: Vec::new(), places: vec![Vec::new(); table.len()] };
         let mut sizes = vec![0; table.len()];
@@ -32,7 +32,8 @@ impl Layout {
         let most = layout.places.iter().map(Vec::len).max().unwrap_or(0);
         for kind in [MemoryKind::Device, MemoryKind::Upload, MemoryKind::Download] {
             let mut bytes = 0;
-            // The first copy last: buffers with one copy follow it, so that those of a frame are neighbours.
+            // The first copies come last and are followed by the buffers with one copy, so that buffers of a frame are
+            // adjacent.
             for copy in (1..most).chain([0]) {
                 for (index, decl) in table.iter().enumerate() {
                     if copy >= layout.places[index].len() || memory::kind(decl.class, copy, limits) != kind {
@@ -53,7 +54,7 @@ impl Layout {
     }
 }
 
-/// Bytes of a block or page, which `of` names.
+/// A byte range of a block or page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span<K> {
     pub(crate) of: K,
@@ -61,7 +62,7 @@ pub(crate) struct Span<K> {
     pub(crate) end: u64,
 }
 
-/// Windows that hold all buffers of a pass.
+/// Windows that contain all buffers of a pass.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Cover<K> {
     pub(crate) windows: Vec<Span<K>>,
@@ -69,8 +70,8 @@ pub(crate) struct Cover<K> {
     pub(crate) window_of: Vec<u8>,
 }
 
-/// Covers buffers with the fewest windows. Windows are in the order in which buffers name their blocks, whose names do
-/// not matter, so that passes with the same places have the same kernels.
+/// Covers buffers with the fewest windows. Windows are ordered by the first buffer that uses their block, so that
+/// passes with the same placement share kernels.
 pub(crate) fn cover<K: Copy + PartialEq>(buffers: &[Span<K>], limits: &Limits) -> Cover<K> {
     let mut blocks: Vec<K> = Vec::new();
     for buffer in buffers {
@@ -85,7 +86,7 @@ pub(crate) fn cover<K: Copy + PartialEq>(buffers: &[Span<K>], limits: &Limits) -
         let first = cover.windows.len();
         for index in own {
             let Span { of, start, end } = buffers[index];
-            // Whole elements, also of a struct with room after it.
+            // Round up to whole elements, including padded structs.
             let end = end.next_multiple_of(limits.alignment());
             match cover.windows[first..].last_mut() {
                 Some(window) if end.max(window.end) - window.start <= limits.max_storage_range => {
@@ -99,7 +100,7 @@ pub(crate) fn cover<K: Copy + PartialEq>(buffers: &[Span<K>], limits: &Limits) -
     cover
 }
 
-/// Fails if a pass of a list needs more windows than the device binds.
+/// Fails if a pass of a list needs more windows than the device can bind.
 pub(super) fn check(
     table: &'static Table,
     counts: &[u64],

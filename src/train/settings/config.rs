@@ -337,7 +337,8 @@ impl TrainConfig {
             return refuse(Setting("grow_box"), "is empty; the smaller corner comes first".into());
         }
         if self.random_background && self.exposure == ExposureMode::On {
-            let problem = format!("is on, which needs {}: no photo exposed it", Setting("exposure").to("off"));
+            let problem =
+                format!("is on, which needs {}: a random background has no exposure", Setting("exposure").to("off"));
             return refuse(Setting("random_background"), problem);
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! A step of an antialiased model, and the pass that keeps its Gaussians smooth, against the mirrors.
+//! Compares a step of an antialiased model, and the pass that keeps Gaussians smooth, with the reference.
 
 use super::Judge;
 use super::checks::bounds;
@@ -16,7 +16,7 @@ use crate::train::strategy::Strategy as _;
 use crate::train::strategy::budget::BudgetStrategy;
 use crate::train::strategy::passes::SMOOTH_BIT;
 
-/// Gaussians from a twentieth of a pixel to some pixels.
+/// Gaussians from a twentieth of a pixel to several pixels.
 pub fn fine(seed: u64) -> Scene {
     let shape = Shape { gaussians: 300, scales: (0.004, 0.4), opacities: (-2.0, 6.0), ..Shape::default() };
     let mut scene = scene(seed, &shape);
@@ -24,23 +24,23 @@ pub fn fine(seed: u64) -> Scene {
     scene
 }
 
-/// A scene of which a half lies outside of the view.
+/// A scene that is half outside of the view.
 pub fn around(seed: u64) -> Scene {
     let mut scene = fine(seed);
     scene.gaussians.means.iter_mut().step_by(2).for_each(|mean| *mean = mean.map(|value| 3.0 * value));
     scene
 }
 
-/// Runs a step of an antialiased model; its splats and their gradients are compared.
+/// Runs a step of an antialiased model, and compares splats and gradients.
 pub fn step(fixture: &mut Fixture, leeway: f64) -> Result<Judge> {
     fixture.train()?;
     let splats = fixture.splats()?;
     let (v_splats, rows) = (fixture.splat_gradients(&splats)?, fixture.rows(GRADIENT_PLANES, splats.len())?);
     let (model, camera) = (fixture.model(), fixture.scene.camera.clone());
-    // Determinants of needles are differences: opacities have larger errors than without.
+    // Determinants of thin splats are differences, so opacities have larger errors.
     let tolerance = Tolerance { absolute: 4e-5 * leeway, relative: 0.0 };
     Ok(Box::new(move |rules: &Rules| {
-        // A mutant of the switch turns it off.
+        // A mutation of the switch turns it off.
         let rules = &Rules { antialiased: !rules.antialiased, ..rules.clone() };
         let of_splats = judge::projection(rules, (&camera, &model), &splats, tolerance);
         let margin = |s: &Splat| {
@@ -54,9 +54,8 @@ pub fn step(fixture: &mut Fixture, leeway: f64) -> Result<Judge> {
     }))
 }
 
-/// Runs a step without the pass for the least sizes, and one with it. A third of the Gaussians has a limit below, a
-/// third one above that of the view; some of the Gaussians are outside of the view. Decisions too near to a threshold
-/// are left out.
+/// Runs a step without the pass for smallest sizes, and one with it. A third of the Gaussians have a limit below the
+/// view's, a third above; some are outside of the view. Decisions too close to a threshold are skipped.
 pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
     let step = |passes: u32| -> Result<_> {
         let mut fixture = rig()?;
@@ -83,7 +82,10 @@ pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
         let limited = sure.iter().filter(|&&row| expected[row].1 != f64::from(before[row][3])).count();
         let all = before.len();
         if raised * 5 < all || limited * 5 < all || limited == all {
-            return Err(format!("of {} sure Gaussians, {raised} grow and {limited} have a new limit", sure.len()));
+            return Err(format!(
+                "of {} clearly decided Gaussians, {raised} grow and {limited} have a new limit",
+                sure.len()
+            ));
         }
         let found: Vec<f64> = sure.iter().flat_map(|&at| after[at].map(f64::from)).collect();
         let wanted = |&at: &usize| {

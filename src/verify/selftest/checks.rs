@@ -1,4 +1,4 @@
-//! Each pass of a training step against the reference, on a small scene with labels.
+//! Checks each pass of a training step against the reference, on a small scene with labels.
 
 use super::compare::{Band, GradientBounds, Summary, Tolerance, Verdict, close, exact, gradients, pick, sure};
 use super::fixture::{Fixture, GRADIENT_PLANES, readable};
@@ -26,7 +26,7 @@ use crate::train::LabelRule;
 use crate::train::strategy::weights::weights;
 use std::sync::Arc;
 
-/// Decisions (alpha 1/255, the stop) with a smaller distance to their threshold may go either way.
+/// Decisions (alpha 1/255, early stop) closer to their threshold than this may go either way.
 const DECISION_MARGIN: f64 = 1e-4;
 const COLOUR_TOLERANCE: Tolerance = Tolerance { absolute: 6.5e-7 * ERROR_FACTOR, relative: 0.0 };
 const CUT_BAND: Band = Band { width: DECISION_MARGIN, flip: 0.01, ratio: 0.005 };
@@ -41,7 +41,7 @@ pub(super) const fn bounds(element: f64, whole: f64) -> GradientBounds {
     }
 }
 
-/// The colours of pixels.
+/// Returns the colours of pixels.
 pub(super) fn colours(pixels: &[[f32; 4]]) -> Vec<[f64; 3]> {
     pixels.iter().map(|&[r, g, b, _]| [r, g, b].map(f64::from)).collect()
 }
@@ -77,11 +77,11 @@ impl FinishedStep {
         let found = DepthOrder::read(&mut self.fixture)?;
         let by_depth: Vec<(u32, u32)> = found.keys.iter().copied().zip(found.gaussians).collect();
         if visible * 2 <= count || !by_depth.is_sorted_by(|a, b| a < b) {
-            return Ok(Err(format!("{visible} of {count} Gaussians are visible, or they are not in depth order")));
+            return Ok(Err(format!("{visible} of {count} Gaussians are visible, or not in depth order")));
         }
         let depths: Vec<f64> = found.keys.iter().map(|&key| f64::from(f32::from_bits(key))).collect();
         let expected: Vec<f64> = self.splats.iter().map(|splat| splat.depth).collect();
-        // Two sums of three products of some 4 units, in different kernels.
+        // Two sums of three products of about 4 units, in different kernels.
         Ok(close(&depths, &expected, Tolerance { absolute: 1e-6 * ERROR_FACTOR, relative: 0.0 }))
     }
 
@@ -93,7 +93,7 @@ impl FinishedStep {
         Ok(judge::projection(&self.rules, place, &self.splats, tolerance))
     }
 
-    /// Checks that each splat is listed in every tile in which it counts, and that the lists are sorted.
+    /// Checks that each splat is listed in every tile where it counts, and that the lists are sorted.
     pub(super) fn tiles(&mut self) -> Result<Verdict> {
         let pairs = self.report.counters.instance_count as usize;
         let (keys, _) = self.fixture.sorted_pairs(pairs)?;
@@ -142,7 +142,7 @@ impl FinishedStep {
         let sums = [counters.loss_l1, counters.loss_ssim].map(|sum| f64::from(sum) / photo.elements());
         let values =
             close(&sums, &[expected.l1, expected.ssim], Tolerance { absolute: 1e-6 * ERROR_FACTOR, relative: 0.0 });
-        // Near its kink, the sign of L1 is not determined.
+        // Near its kink, the sign of L1 is undetermined.
         let verdict = sure(expected.margins, 1e-5, 0.0).and_then(|sure| {
             let (actual, wanted) = (pick(&v_image, &sure), pick(&expected.v_image, &sure));
             gradients(actual.as_flattened(), wanted.as_flattened(), bounds(1.1e-6, 4.6e-6))
@@ -166,9 +166,9 @@ impl FinishedStep {
         Ok(judge::splat_gradients(&actual, &expected.values, margins, bounds(4e-7, 4e-7)))
     }
 
-    /// Checks the disagreement of a step's labels: value, and the change of the gradient by opacity.
+    /// Checks the label disagreement of a step: its value, and its contribution to the opacity gradient.
     pub(super) fn disagreement(&mut self) -> Result<Verdict> {
-        // Far above the photo's weight, so that the difference of two steps is exact enough.
+        // Far above the photo loss, so that the difference of two steps is accurate enough.
         const WEIGHT: f32 = 1e5;
         let layers = std::mem::take(&mut self.fixture.input.layers);
         let label_weight = std::mem::replace(&mut self.fixture.config.label_weight, WEIGHT);
@@ -228,8 +228,7 @@ impl FinishedStep {
         Ok(exact(&second, &first))
     }
 
-    /// Checks the sums of blending weights by label of the mask. `alone`: with each Gaussian as if nothing were in
-    /// front of it.
+    /// Checks the sums of blending weights by mask label. With `alone`, occlusion is ignored.
     pub(super) fn votes(&mut self, alone: bool) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, target) = (self.fixture.scene.camera.clone(), &self.fixture.scene.target);
@@ -263,7 +262,7 @@ impl FinishedStep {
         Ok(judge::label_map((&shown.ids, &weights), &expected, (COLOUR_TOLERANCE, DECISION_MARGIN)))
     }
 
-    /// Checks the sums of blending weights of two views that are the same.
+    /// Checks the sums of blending weights over two identical views.
     pub(super) fn weights(&mut self) -> Result<Verdict> {
         let (size, count) = (self.fixture.size(), self.fixture.scene.gaussians.len());
         let (camera, near) = (self.fixture.scene.camera.clone(), self.fixture.config.near);
@@ -280,9 +279,9 @@ impl FinishedStep {
     }
 }
 
-/// Checks a tile with more splats than some drivers run rounds of a loop (65,535). The first ones close all pixels
-/// except those around the tile's last, so that most lanes of a subgroup are done. The last ones cover the last pixel,
-/// where they are visible only if the walk goes on to its end for the lanes that are left.
+/// Checks a tile with more splats than some drivers allow loop iterations (65,535). The first splats saturate all
+/// pixels except those around the last pixel, so that most lanes of a subgroup finish early. The last splats cover the
+/// last pixel, where they are visible only if the remaining lanes process the whole list.
 pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict> {
     const SPLATS: usize = 70_000;
     let (width, height) = (kernels.tile_width, kernels.tile_height);
@@ -292,7 +291,7 @@ pub(super) fn long_list(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Verdict>
     let closed: Vec<[f64; 2]> = centres.filter(|at| (at[0] - last[0]).hypot(at[1] - last[1]) > 2.5).collect();
     let row = |i: usize| {
         let (at, opacity) = match closed.get(i % closed.len()) {
-            // Four times 0.99 ends a ray.
+            // Four splats of 0.99 end a ray.
             Some(&centre) if i < 4 * closed.len() => (centre, 0.999),
             _ if i + 5 < SPLATS => ([0.5, 0.5], 0.3),
             _ => (last, 0.3),

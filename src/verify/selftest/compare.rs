@@ -1,11 +1,11 @@
-//! Comparisons. A failure names the place and the numbers; `tests/verify/comparisons.rs` makes each comparison fail.
+//! Comparisons. A failure names the element and the values; `tests/verify/comparisons.rs` makes each comparison fail.
 
 use std::fmt::Debug;
 
 /// Outcome of a comparison.
 pub type Verdict = Result<Summary, String>;
 
-/// Measured errors of a passed comparison; tolerances in the tests are the worst observed error x 1.5.
+/// Measured errors of a passed comparison; test tolerances are the worst observed error x 1.5.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     /// Largest error in units of the tolerance.
@@ -42,21 +42,21 @@ fn same_length<A, B>(actual: &[A], expected: &[B]) -> Result<(), String> {
     if actual.len() == expected.len() {
         return Ok(());
     }
-    Err(format!("{} elements where {} are expected", actual.len(), expected.len()))
+    Err(format!("{} elements, expected {}", actual.len(), expected.len()))
 }
 
-/// Returns the places with a margin above `least`; an error unless they are more than a share of all. Decisions at the
-/// other places may go either way.
+/// Returns the indices with a margin above `least`; an error unless they exceed a share of all. Decisions at other
+/// indices may go either way.
 pub fn sure(margins: impl IntoIterator<Item = f64>, least: f64, share: f64) -> Result<Vec<usize>, String> {
     let is_sure: Vec<bool> = margins.into_iter().map(|margin| margin > least).collect();
     let sure: Vec<usize> = (0..is_sure.len()).filter(|&place| is_sure[place]).collect();
     if sure.len() as f64 > share * is_sure.len() as f64 {
         return Ok(sure);
     }
-    Err(format!("only {} of {} are away from all decisions", sure.len(), is_sure.len()))
+    Err(format!("only {} of {} are far enough from all decisions", sure.len(), is_sure.len()))
 }
 
-/// Returns the values at some places.
+/// Returns the values at some indices.
 pub fn pick<T: Copy>(values: &[T], places: &[usize]) -> Vec<T> {
     places.iter().map(|&place| values[place]).collect()
 }
@@ -68,7 +68,7 @@ pub fn exact<T: PartialEq + Debug>(actual: &[T], expected: &[T]) -> Verdict {
     match wrong.first() {
         None => Ok(Summary::default()),
         Some(&i) => Err(format!(
-            "{} of {} elements differ, first at {i}: {:?} where {:?} is expected",
+            "{} of {} elements differ, first at {i}: {:?}, expected {:?}",
             wrong.len(),
             actual.len(),
             actual[i],
@@ -77,14 +77,14 @@ pub fn exact<T: PartialEq + Debug>(actual: &[T], expected: &[T]) -> Verdict {
     }
 }
 
-/// Every element is within the tolerance; NaN never is.
+/// Every element is within the tolerance; NaN never passes.
 pub fn close(actual: &[f64], expected: &[f64], tolerance: Tolerance) -> Verdict {
     same_length(actual, expected)?;
     let mut summary = Summary::default();
     for (place, (&a, &e)) in actual.iter().zip(expected).enumerate() {
         let error = (a - e).abs() / tolerance.bound(e).max(f64::MIN_POSITIVE);
         if !error.is_finite() && a != e {
-            return Err(format!("element {place}: {a} where {e} is expected"));
+            return Err(format!("element {place}: {a}, expected {e}"));
         }
         if error > summary.worst {
             summary = Summary { worst: error, place, ..Summary::default() };
@@ -93,7 +93,7 @@ pub fn close(actual: &[f64], expected: &[f64], tolerance: Tolerance) -> Verdict 
     if summary.worst > 1.0 {
         let (place, a) = (summary.place, actual[summary.place]);
         let e = expected[place];
-        return Err(format!("element {place}: {a} where {e} is expected, {:.3} times the tolerance", summary.worst));
+        return Err(format!("element {place}: {a}, expected {e}: {:.3} times the tolerance", summary.worst));
     }
     Ok(summary)
 }
@@ -133,18 +133,15 @@ pub fn close_with_band(
     for &i in &flips {
         let (a, e) = (actual[i], expected[i]);
         if !((a - e).abs() <= band.flip) {
-            return Err(format!(
-                "element {i} in the band: {a} where {e} is expected, more than a flip ({})",
-                band.flip
-            ));
+            return Err(format!("element {i} in the band: {a}, expected {e}: more than a flip ({})", band.flip));
         }
         if !crossing(i, a) {
-            return Err(format!("element {i} in the band: {a} where {e} is expected, and no crossing explains it"));
+            return Err(format!("element {i} in the band: {a}, expected {e}: no crossing explains it"));
         }
     }
     let allowed = ((band.ratio * actual.len() as f64) as usize).max(1);
     if flips.len() > allowed {
-        return Err(format!("{} flips among {} elements, {allowed} are allowed", flips.len(), actual.len()));
+        return Err(format!("{} flips among {} elements; {allowed} are allowed", flips.len(), actual.len()));
     }
     let up = flips.iter().filter(|&&i| actual[i] > expected[i]).count();
     if flips.len() >= FLIPS_MIN && (up * 5 < flips.len() || up * 5 > 4 * flips.len()) {

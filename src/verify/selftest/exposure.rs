@@ -1,4 +1,4 @@
-//! A step with an exposure of its photo, against the mirrors.
+//! Compares a step with an exposure of its photo with the reference.
 
 use super::checks::{bounds, colours};
 use super::compare::{Tolerance, close, gradients};
@@ -18,7 +18,7 @@ use crate::train::shared::{RowOffsets, SharedLayout, SharedParameters};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of three photos; the step is on the second one, with some channels above 1.
+/// Rows of three photos; the step uses the second one, with some channels above 1.
 const PHOTO_ROWS: [[f32; 4]; 9] = [
     [0.3, -0.1, 0.0, 0.0],
     [0.1, 0.0, -0.2, 0.0],
@@ -33,8 +33,8 @@ const PHOTO_ROWS: [[f32; 4]; 9] = [
 const ROWS_PER_PHOTO: usize = EXPOSURE_ROWS as usize;
 const STEP_ROWS: Range<usize> = ROWS_PER_PHOTO..2 * ROWS_PER_PHOTO;
 
-/// Runs a step on a photo with some saturated pixels. Compares the gradients of the picture and of the rows of the
-/// photo; the other photos have none.
+/// Runs a step on a photo with some saturated pixels. Compares the gradients of the picture and of the photo's rows;
+/// other photos have no gradient.
 pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let mut scene = scene(91, &shape);
@@ -62,7 +62,7 @@ pub(super) fn step(rig: &Rig) -> Result<Judge> {
         let rows = of_photo(1);
         let loss = photo_loss(rules, &exposed(&image, &rows), &photo);
         if loss.margin() < 1e-6 {
-            return Err(format!("a pixel of this seed is too close to the kink of the loss: {}", loss.margin()));
+            return Err(format!("a pixel of this seed is too close to the loss's kink: {}", loss.margin()));
         }
         let photos = PHOTO_ROWS.len() / ROWS_PER_PHOTO;
         let sum = |row: usize, c: usize| (0..photos).map(|photo| of_photo(photo)[row][c]).sum::<f64>();

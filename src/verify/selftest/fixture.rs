@@ -1,4 +1,4 @@
-//! A scene on the device: runs the engine's own pass lists and reads all buffers back.
+//! A scene on the device: runs the engine's pass lists and reads all buffers back.
 
 use super::order::DepthOrder;
 use super::scenes::Scene;
@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
-/// Planes of the parameters in the order of `plane_rows`.
+/// Parameter planes, in the order of `plane_rows`.
 pub const PARAMETER_PLANES: [Buf; 7] = [Buf::MEANS, Buf::SCALES, Buf::QUATS, Buf::SH0, Buf::SH1, Buf::SH2, Buf::SH3];
 /// First moments.
 pub const MOMENTS_1: [Buf; 7] =
@@ -35,7 +35,7 @@ pub const MOMENTS_2: [Buf; 7] =
 pub const GRADIENT_PLANES: [Buf; 7] =
     [Buf::V_MEANS, Buf::V_SCALES, Buf::V_QUATS, Buf::V_SH0, Buf::V_SH1, Buf::V_SH2, Buf::V_SH3];
 
-/// Floats of each plane, and their positions in `Row::floats`: (floats, runs of (from, to, length)).
+/// Floats per row of each plane, and their positions in `Row::floats`: (floats, runs of (from, to, length)).
 pub(super) const PLANE_LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (4, &[(0, 0, 3), (3, 10, 1)]),
     (4, &[(0, 7, 3)]),
@@ -46,7 +46,7 @@ pub(super) const PLANE_LAYOUT: [(usize, &[(usize, usize, usize)]); 7] = [
     (20, &[(0, 39, 20)]),
 ];
 
-/// Labels that one sweep of votes counts: few, so that sweeps need several rounds.
+/// Labels per vote sweep: few, so that several sweeps are needed.
 pub const VOTE_COLUMNS: u32 = 3;
 
 /// A scene, an engine with its model, and a training step.
@@ -65,7 +65,7 @@ pub struct Fixture {
     pub fixed: SceneScale,
     /// Another camera with free space on the way to it, and the near plane there.
     pub free_space: Option<(Camera, f32)>,
-    /// The last list had object layers.
+    /// True if the last list had object layers.
     layered: bool,
     /// Shared rows of the step.
     pub(crate) shared: Vec<SharedRow>,
@@ -77,7 +77,7 @@ pub fn readable() -> SchedulerOptions {
     SchedulerOptions { plan, poison_step: true, ..SchedulerOptions::default() }
 }
 
-/// What a step uses of a scene's only view besides camera and masks.
+/// Data of a scene's only view besides camera and masks.
 pub struct OwnView {
     /// Near plane, world units.
     pub near: f32,
@@ -109,7 +109,7 @@ impl OwnView {
         }
     }
 
-    /// Returns the view of its scene for a step.
+    /// Returns the scene's view for a step.
     pub fn step_view<'a>(&'a self, scene: &'a Scene) -> StepView<'a> {
         let Self { near, photo, occluders, depths, shown } = self;
         let (camera, near, valid_pixels) = (&scene.camera, *near, step_input::valid_pixels(&photo.rgba));
@@ -131,8 +131,8 @@ impl OwnView {
 }
 
 impl Fixture {
-    /// Uploads the scene to a device, with or without labels, with kernels of a given shape, but with a pass for each
-    /// part of an update, so that gradients can be read. Without [`readable`], only some buffers can be read back.
+    /// Uploads the scene to a device, with or without labels, with kernels of the given shape, but with separate update
+    /// passes, so that gradients can be read. Without [`readable`], only some buffers can be read back.
     pub fn new(
         gpu: Arc<Gpu>,
         scene: Scene,
@@ -144,7 +144,7 @@ impl Fixture {
         Self::with_room(gpu, scene, labels, (shape, options), |room| room)
     }
 
-    /// Same as [`Fixture::new`], with updates of the shape, and with room for other things too.
+    /// Same as [`Fixture::new`], with the shape's own update, and with additional memory.
     pub fn with_room(
         gpu: Arc<Gpu>,
         scene: Scene,
@@ -166,7 +166,7 @@ impl Fixture {
             background: scene.target.background.map(|v| v as f32),
             sh_degree: scene.gaussians.sh_degree,
             label_rule: LabelRule::Main,
-            // Weights of the mirrors' rules.
+            // Weights of the reference's rules.
             label_weight: 1.0,
             label_alpha: 0.1,
             label_balance: true,
@@ -214,7 +214,7 @@ impl Fixture {
         }
     }
 
-    /// Sorted pairs of the device: keys, and positions before the sort.
+    /// Sorted pairs on the device: keys, and positions before the sort.
     pub fn sorted_pairs(&mut self, count: usize) -> Result<(Vec<u32>, Vec<u32>)> {
         let (shape, capacity) = (*self.engine.shape(), *self.engine.capacity());
         let TileSort { bits, buffers } = TileSort::new(&shape, &capacity, self.layered);
@@ -228,7 +228,7 @@ impl Fixture {
         Ok((narrow.into_iter().take(count).map(u32::from).collect(), places))
     }
 
-    /// The splats of the sorted (splat, tile) pairs, by their place in the order of depth.
+    /// Splats of the sorted (splat, tile) pairs, by depth rank.
     pub fn sorted_splats(&mut self, count: usize) -> Result<Vec<u32>> {
         let splat_from_instance = self.get::<u32>(Buf::SPLAT_FROM_INSTANCE, count)?;
         let (places, ranks) = (self.sorted_pairs(count)?.1, DepthOrder::read(self)?.ranks());
@@ -236,7 +236,7 @@ impl Fixture {
         Ok(places.into_iter().map(|place| rank(place).unwrap_or(u32::MAX)).collect())
     }
 
-    /// Runs a training step; no pass may write outside of its buffers.
+    /// Runs a training step; fails if a pass writes outside of its buffers.
     pub fn train(&mut self) -> Result<Report> {
         self.train_as(self.key())
     }
@@ -253,13 +253,8 @@ impl Fixture {
     pub fn train_as(&mut self, key: ListKey) -> Result<Report> {
         let uniforms = self.uniforms();
         self.layered = matches!(key, ListKey::Train(of) | ListKey::Extended(of, _) if of.supervision.has_layers());
-        let data = step_input::train_input(
-            &self.input,
-            self.view.step_view(&self.scene),
-            &self.config,
-            uniforms,
-            &self.engine,
-        );
+        let view = self.view.step_view(&self.scene);
+        let data = step_input::train_input(&self.input, view, &self.config, uniforms, &self.engine);
         self.engine.run(key, &TrainInput { shared: self.shared.clone(), ..data })
     }
 
@@ -297,10 +292,10 @@ impl Fixture {
     pub fn splats(&mut self) -> Result<Vec<Splat>> {
         let order = DepthOrder::read(self)?;
         let records = self.get::<[f32; 12]>(Buf::SPLATS, order.splats.len())?;
-        // The mirrors look these Gaussians up.
+        // The reference looks up these Gaussians.
         let count = self.scene.gaussians.len();
         if let Some(wrong) = order.gaussians.iter().find(|&&gaussian| gaussian as usize >= count) {
-            return Err(Error::Check(format!("the device sorts {count} Gaussians and lists number {wrong}")));
+            return Err(Error::Check(format!("the device sorts {count} Gaussians but lists number {wrong}")));
         }
         let records = order.sorted(&records);
         Ok(order.gaussians.iter().zip(&records).map(|(&gaussian, record)| splat_of(gaussian, record)).collect())
@@ -326,7 +321,7 @@ impl Fixture {
     /// `count` rows of a set of planes: parameters or moments by Gaussian, or gradients of splats by depth.
     pub fn rows(&mut self, planes: [Buf; 7], count: usize) -> Result<Vec<Row>> {
         let mut floats = vec![[0.0; ROW_FLOATS]; count];
-        // Bands of colour above the degree have no plane.
+        // Colour bands above the degree have no plane.
         let there = 4 + self.config.sh_degree as usize;
         for (plane, (stride, runs)) in planes.into_iter().zip(PLANE_LAYOUT).take(there) {
             let values = self.get::<f32>(plane, count * stride)?;
@@ -376,7 +371,7 @@ impl Fixture {
         Ok(rows)
     }
 
-    /// The model for the mirrors.
+    /// The model for the reference.
     pub fn model(&self) -> Model {
         self.scene.model()
     }

@@ -1,4 +1,4 @@
-//! Compares the buffers of the device with the reference, pass by pass.
+//! Compares device buffers with the reference, pass by pass.
 
 use super::compare::{
     Band, GradientBounds, Summary, Tolerance, Verdict, close, close_with_band, exact, gradients, pick, sure,
@@ -34,7 +34,7 @@ pub fn projection(
     let projected = |s: &Splat| project_forward(rules, camera, model, s.gaussian).map(|found| found.splat);
     let expected: Vec<Splat> = actual.iter().filter_map(projected).collect();
     if expected.len() < actual.len() {
-        return Err(format!("{} splats count at no pixel", actual.len() - expected.len()));
+        return Err(format!("{} splats do not count at any pixel", actual.len() - expected.len()));
     }
     splats(actual, &expected, tolerance)
 }

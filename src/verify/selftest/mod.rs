@@ -27,11 +27,11 @@ use scenes::{Scene, population, scene_of};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Vulkan allows `exp2`, division, square roots and similar functions an error of several units in the last place;
-/// lavapipe's error is about one. Bounds are this many times those of the tests on lavapipe.
+/// Factor between the self-test's error bounds and those of the tests on lavapipe. Vulkan allows `exp2`, division,
+/// square roots and similar functions several units in the last place; lavapipe's error is about one.
 const ERROR_FACTOR: f64 = 8.0;
 
-/// Compares what a device did with the reference under some rules.
+/// Compares a device's results with the reference under given rules.
 pub type Judge = Box<dyn Fn(&Rules) -> Verdict>;
 
 /// One check of the self-test.
@@ -52,8 +52,8 @@ impl Check {
     }
 }
 
-/// Runs every check on a device and passes each to `done` when it ends. An error is a failure of the device itself,
-/// such as a lack of memory.
+/// Runs every check on a device, and passes each to `done` when it is finished. An error is a failure of the device
+/// itself, such as insufficient memory.
 pub fn run(gpu: &Arc<Gpu>, done: impl FnMut(Check)) -> Result<()> {
     run_against(&Rules::default(), gpu, done)
 }
@@ -68,9 +68,9 @@ pub fn run_against(rules: &Rules, gpu: &Arc<Gpu>, mut done: impl FnMut(Check)) -
     wholes(gpu, kernels, &mut done)
 }
 
-/// Passes checks on as they end.
+/// Reports checks as they finish.
 struct CheckClock<F> {
-    /// End of the check before.
+    /// End of the previous check.
     last: Instant,
     done: F,
 }
@@ -94,7 +94,7 @@ pub fn wholes(gpu: &Arc<Gpu>, kernels: KernelShape, done: impl FnMut(Check)) -> 
     Ok(())
 }
 
-/// Runs the checks of the passes of a step, with kernels of a shape. `suffix` follows their names.
+/// Runs the checks of a step's passes with kernels of a shape. `suffix` is appended to their names.
 pub fn passes(
     rules: &Rules,
     gpu: &Arc<Gpu>,
@@ -139,7 +139,7 @@ impl Rig<'_> {
         Fixture::new(Arc::clone(self.gpu), scene, true, self.kernels, readable())
     }
 
-    /// With the update in one kernel, if the device can run it, and full or packed moments.
+    /// Makes a fixture with the update in one kernel, if the device supports it, and with full or packed moments.
     fn lazy(&self, scene: Scene, half: bool) -> Result<Option<Fixture>> {
         let Some(kernels) = self.kernels.with_lazy_updates(self.gpu.capabilities()) else { return Ok(None) };
         let with = |room: EngineSize| room.with_half_moments(half);
@@ -149,7 +149,7 @@ impl Rig<'_> {
 
 /// Runs the checks of passes that change the model.
 pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl FnMut(Check)) -> Result<()> {
-    /// A densification of Gaussians below and above each threshold.
+    /// Checks a densification with Gaussians below and above each threshold.
     fn densified(rig: &Rig, splits_long: bool) -> Result<Judge> {
         let before = population(710, 500);
         let tolerance = Tolerance { absolute: 3.5e-7, relative: 3.5e-8 }.times(ERROR_FACTOR);
@@ -186,7 +186,7 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
         ("antialiased splats and their gradient", |rig| {
             antialias::step(&mut rig.fixture(antialias::fine(93))?, ERROR_FACTOR)
         }),
-        ("least sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), ERROR_FACTOR)),
+        ("smallest sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), ERROR_FACTOR)),
         ("lift of labels by the paper's rule", |rig| model::lift(&mut rig.fixture(model::dominant(131))?)),
     ];
     let (mut clock, rig) = (CheckClock::new(done), Rig { gpu, kernels });

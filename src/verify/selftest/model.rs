@@ -1,4 +1,4 @@
-//! Changes of the model against the reference: Adam, densification, opacity reset, marks of fog, lift of labels.
+//! Compares changes of the model with the reference: Adam, densification, opacity reset, fog marks, label lift.
 
 use super::Judge;
 use super::compare::{Tolerance, Verdict, close, exact, pick, sure};
@@ -26,14 +26,15 @@ use crate::train::strategy::passes::FREE_SPACE_BIT;
 use glam::DVec3;
 
 pub(super) const SEED: u32 = 0x1234_5678;
-/// Box in which Gaussians of the strategies budget and mcmc grow, turned against the world: a half of the populations.
+/// Box in which Gaussians of the strategies budget and mcmc grow, rotated in the world; it contains half of the
+/// population.
 pub(super) const GROW_ZONE: Zone = Zone {
     axes: [DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.8, 0.6, 0.0), DVec3::Z],
     low: DVec3::new(0.0, f64::NEG_INFINITY, -64.0),
     high: DVec3::new(64.0, f64::INFINITY, 64.0),
 };
 
-/// Runs steps with an update; each is compared on its own, from the device's state before.
+/// Runs steps with an update; each is compared separately, starting from the device's state before it.
 pub fn adam(fixture: &mut Fixture, steps: u32) -> Result<Judge> {
     let mut done = Vec::new();
     fixture.input.update = true;
@@ -67,7 +68,7 @@ pub(super) fn states(fixture: &mut Fixture) -> Result<Vec<AdamState>> {
     Ok((0..count).map(|i| AdamState { row: rows[i], m: m[i], u: u[i] }).collect())
 }
 
-/// Uploads a population with moments and statistics to a fixture; returns the uniforms that change it at `step` in a
+/// Uploads a population with moments and statistics to a fixture. Returns the uniforms to change it at `step` in a
 /// scene of extent 1.
 pub(super) fn holding(
     fixture: &mut Fixture,
@@ -94,7 +95,7 @@ pub(super) fn holding(
     Ok(grow_box.map_or(uniforms, |zone| fixture.engine.with_grow_box(uniforms, zone)))
 }
 
-/// A population after a change of its number.
+/// A population after its number of Gaussians changed.
 pub(super) struct ChangedPopulation {
     frozen: usize,
     /// Parameters, and both moments of the trained Gaussians.
@@ -129,7 +130,7 @@ impl ChangedPopulation {
 }
 
 /// Counts and applies a densification at a step; the fixture's model is the population. Splits go along the longest
-/// axis or to random places. Positions and scales of children may differ from the reference's by `tolerance`.
+/// axis or to random positions. Positions and scales of children may differ from the reference's by `tolerance`.
 pub fn densification(
     fixture: &mut Fixture,
     before: Population,
@@ -166,7 +167,7 @@ pub fn reset(fixture: &mut Fixture, before: Population, leeway: f64) -> Result<J
     let count = before.model.rows.len();
     let trained = count - before.frozen;
     let (after, labels) = (fixture.planes(count, trained)?, fixture.get::<u32>(Buf::LABELS, count)?);
-    // The constant is the logit of 0.01, not of the nearest f32; 8e-8 seen.
+    // The constant is the logit of 0.01, not of the nearest f32; the observed error is 8e-8.
     let tolerance = Tolerance { absolute: 1.2e-7 * leeway, relative: 0.0 };
     Ok(Box::new(move |rules: &Rules| {
         let mut expected = [before.model.rows.clone(), before.m[..trained].to_vec(), before.u[..trained].to_vec()];
@@ -179,8 +180,8 @@ pub fn reset(fixture: &mut Fixture, before: Population, leeway: f64) -> Result<J
     }))
 }
 
-/// Runs a training step with the paper's lift of labels; the scene has the labels from before. Exactly the expected
-/// labels must change. If several Gaussians have nearly the same weight, any of them may win.
+/// Runs a training step with the paper's label lift; the scene has the labels from before. Exactly the expected labels
+/// must change. If several Gaussians have nearly equal weights, any of them may win.
 pub fn lift(fixture: &mut Fixture) -> Result<Judge> {
     let before = fixture.model().labels;
     fixture.train()?;
@@ -212,18 +213,18 @@ pub fn dominant(seed: u64) -> Scene {
     s
 }
 
-/// A scene in which some Gaussians are before the near plane of [`fog`], and some engulf the camera. Its step runs
-/// twice, because its pairs need more room.
+/// A scene in which some Gaussians are in front of the near plane of [`fog`], and some contain the camera. Its step
+/// runs twice, because its pairs need more memory.
 pub fn large(seed: u64) -> Scene {
     let mut scene = scene(seed, &Shape { gaussians: 3000, scales: (0.02, 5.0), ..Shape::default() });
     scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|value| 2.5 * value));
     scene
 }
 
-/// Runs a step with the pass that marks Gaussians that fog its camera, or one on the way to another camera. Decisions
-/// too near to a threshold are left out.
+/// Runs a step with the pass that marks Gaussians that fog its camera, or a camera on the way to another one. Decisions
+/// too close to a threshold are skipped.
 pub fn fog(fixture: &mut Fixture) -> Result<Judge> {
-    /// Near plane; about half of the Gaussians of [`large`] are before it, world units.
+    /// Near plane, world units; about half of the Gaussians of [`large`] are in front of it.
     const NEAR: f32 = 4.0;
     /// Near plane of the other camera, world units.
     const OTHER_NEAR: f32 = 2.5;

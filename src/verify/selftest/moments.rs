@@ -1,4 +1,4 @@
-//! Packed moments of Adam against the reference, word by word.
+//! Compares packed Adam moments with the reference, word by word.
 
 use super::Judge;
 use super::compare::{Summary, Tolerance, Verdict, close};
@@ -14,17 +14,17 @@ use crate::reference::model::ROW_FLOATS;
 use crate::reference::moments::{draw, pack, unpack};
 use crate::reference::{Group, Row, Rules, adam, lazy};
 
-/// What a Gaussian draws to catch up, after what it draws in a step: planes of attributes.
+/// Attribute planes: the draws for catching up follow the draws of a step's planes.
 const ATTRIBUTE_PLANES: u32 = 7;
-/// Share of the words that have the bits of the mirror: a logarithm is off by up to 2^-12 of a step.
+/// Smallest share of words that must equal the reference exactly: a logarithm is off by up to 2^-12 of a step.
 const EQUAL_SHARE_MIN: f64 = 0.97;
 
-/// Where a parameter is on the device.
+/// The location of a parameter on the device.
 struct ParameterSlot {
     plane: usize,
     /// Floats of a row of the plane.
     floats: usize,
-    /// Place in that row, and among the floats of a Gaussian.
+    /// Index in that row, and among the floats of a Gaussian.
     offset: usize,
     at: usize,
 }
@@ -38,7 +38,7 @@ impl ParameterSlot {
         })
     }
 
-    /// What its word draws in a step with this seed; `late`: when it catches up.
+    /// Returns the draw of its word in a step with this seed; with `late`, the draw for catching up.
     fn draw(&self, seed: u32, row: usize, late: bool) -> u32 {
         let element = row * (self.floats / 4) + self.offset / 4;
         let plane = self.plane as u32 + if late { ATTRIBUTE_PLANES } else { 0 };
@@ -46,19 +46,19 @@ impl ParameterSlot {
     }
 }
 
-/// Returns the moments of words.
+/// Unpacks the moments of words.
 fn unpacked(rules: &Rules, words: &[u32; ROW_FLOATS]) -> [Row; 2] {
     let both = words.map(|word| unpack(rules, word));
     [Row::from_floats(&both.map(|(m, _)| m)), Row::from_floats(&both.map(|(_, u)| u))]
 }
 
-/// Returns the words of moments, rounded to the nearest.
+/// Packs moments into words, rounded to nearest.
 fn words_of(m: &Row, u: &Row) -> [u32; ROW_FLOATS] {
     let (m, u) = (m.floats(), u.floats());
     std::array::from_fn(|at| pack(&Rules::default(), (m[at], u[at]), 0x7fff_7fff))
 }
 
-/// Replaces the moments of a population by the nearest ones that have words.
+/// Rounds the moments of a population to values that words represent.
 pub fn round(population: &mut Population) {
     for (m, u) in population.m.iter_mut().zip(&mut population.u) {
         [*m, *u] = unpacked(&Rules::default(), &words_of(m, u));
@@ -108,7 +108,7 @@ impl Fixture {
     }
 }
 
-/// A scene of which the camera sees a half, so that others are late.
+/// A scene that is half outside of the view, so that some Gaussians miss updates.
 pub fn away(seed: u64) -> Scene {
     let mut scene = partly_frozen(seed);
     scene.camera.cx -= 40.0;
@@ -122,7 +122,7 @@ struct MomentState {
 }
 
 impl MomentState {
-    /// Reads that of `count` Gaussians.
+    /// Reads the state of `count` Gaussians.
     fn read(fixture: &mut Fixture, count: usize) -> Result<Self> {
         Ok(Self { rows: fixture.rows(PARAMETER_PLANES, count)?, words: fixture.words(count)? })
     }
@@ -143,8 +143,8 @@ struct StepChange {
     states: [MomentState; 2],
 }
 
-/// Runs steps with packed moments. With `split`, which has gradients of the same model, Gaussians may be late: then all
-/// catch up.
+/// Runs steps with packed moments. With `split`, which provides gradients of the same model, Gaussians may miss
+/// updates; in the end all catch up.
 pub fn packed(fixture: &mut Fixture, mut split: Option<&mut Fixture>) -> Result<Judge> {
     let count = fixture.scene.gaussians.len() - fixture.scene.frozen as usize;
     let all = fixture.scene.gaussians.len();
@@ -176,12 +176,12 @@ pub fn packed(fixture: &mut Fixture, mut split: Option<&mut Fixture>) -> Result<
 }
 
 impl StepChange {
-    /// Returns a Gaussian after the step, what it drew from, and whether it was late.
+    /// Returns a Gaussian after the step, the seed of its draws, and whether it was late.
     fn expected(&self, rules: &Rules, row: usize, is_late: bool) -> (AdamState, u32, bool) {
         let (state, gradient) = (self.states[0].optimised(rules, row), &self.gradients[row]);
         if is_late && *gradient == Row::default() {
             let missed = [lazy::corrected(rules, &self.rates, self.step)];
-            // The list in which all catch up draws by the number of updates.
+            // The catch-up list draws by the number of updates.
             (lazy::caught_up(rules, &missed, &state), self.step, true)
         } else {
             (adam::adam(rules, &self.rates, self.step, &state, gradient), self.seed, false)
@@ -203,14 +203,14 @@ impl StepChange {
                 let word = pack(rules, (first[at], second[at]), place.draw(seed, row, was_late));
                 let (m, u) = unpack(rules, after.words[row][at]);
                 let root = second[at].sqrt();
-                // A step of the root, of v, and of the ratio to either side of that.
+                // One quantisation step of the root, of v, and of the ratio.
                 let units = [
                     1e-7 * values[at].abs() + 1e-5 * rates[at],
                     7e-4 * first[at].abs() + 5e-4 * root,
                     1.4e-3 * second[at],
                 ];
                 let off = [found[at] - values[at], m - first[at], u - second[at]];
-                // The smallest root that a word has, and moments of none.
+                // The smallest root that a word represents, and zero moments.
                 errors.extend(off.into_iter().zip(units).map(|(off, unit)| off / (unit + 1e-15)));
                 words += usize::from(word != 0);
                 equal += usize::from(word != 0 && word == after.words[row][at]);
@@ -218,7 +218,7 @@ impl StepChange {
         }
         let share = f64::from(equal as u32) / f64::from(words.max(1) as u32);
         if share < EQUAL_SHARE_MIN || words == 0 || (is_late && late == 0) {
-            return Err(format!("{share:.4} of {words} words are those of the mirror, {late} Gaussians were late"));
+            return Err(format!("{share:.4} of {words} words equal the reference, {late} Gaussians were late"));
         }
         let worst = close(&errors, &vec![0.0; errors.len()], Tolerance { absolute: 1.0, relative: 0.0 })?;
         Ok(Summary { whole: (1.0 - share) / (1.0 - EQUAL_SHARE_MIN), ..worst })

@@ -1,4 +1,4 @@
-//! The splats of a view in the order of depth, whichever order numbers them.
+//! The splats of a view in depth order, however they are numbered.
 
 use super::fixture::Fixture;
 use crate::error::{Error, Result};
@@ -27,16 +27,17 @@ impl DepthOrder {
         };
         let gaussian = |&splat: &u32| own.get(splat as usize).copied();
         let gaussians: Option<Vec<u32>> = splats.iter().map(gaussian).collect();
-        let gaussians = gaussians.ok_or_else(|| Error::Check(format!("the order of {visible} splats names others")))?;
+        let gaussians =
+            gaussians.ok_or_else(|| Error::Check(format!("the order of {visible} splats contains invalid indices")))?;
         Ok(Self { splats, gaussians, keys: fixture.get(Buf::DEPTH_KEYS_A, visible)? })
     }
 
-    /// What each splat has, by depth.
+    /// Reorders per-splat values by depth.
     pub fn sorted<T: Copy>(&self, of: &[T]) -> Vec<T> {
         self.splats.iter().map(|&splat| of[splat as usize]).collect()
     }
 
-    /// Place of each splat in the order.
+    /// Depth rank of each splat.
     pub fn ranks(&self) -> Vec<u32> {
         let mut ranks = vec![0; self.splats.len()];
         (0..).zip(&self.splats).for_each(|(rank, &splat)| ranks[splat as usize] = rank);

@@ -1,4 +1,4 @@
-//! A step with a corrected pose of its photo, against the mirrors.
+//! Compares a step with a corrected photo pose with the reference.
 
 use super::compare::{Tolerance, close};
 use super::fixture::{Fixture, readable};
@@ -16,13 +16,13 @@ use crate::train::shared::{RowOffsets, SharedLayout, SharedParameters};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// The trained numbers of two photos; the step is on the second one, whose pose is settled by a quarter. The last is
-/// the unit of moves.
+/// The trained numbers of two photos; the step uses the second one, whose pose is a quarter settled. The last number is
+/// the unit of translation.
 const TRAINED_NUMBERS: [[[f32; 4]; 2]; 2] =
     [[[0.1, 0.2, 0.3, 0.0], [0.1, 0.0, 0.0, 2.0]], [[0.06, -0.11, 0.08, 0.25], [-0.02, 0.03, 0.05, 2.0]]];
 const STEP_PHOTO_ROW: usize = poses::ROWS_PER_PHOTO;
 
-/// The rows of both photos, with preconditioners that mix all numbers.
+/// Returns the rows of both photos, with preconditioners that mix all numbers.
 fn rows() -> Vec<[f32; 4]> {
     let mixed = |k: usize| if k.is_multiple_of(7) { 1.1 } else { 0.02 * (k % 5) as f32 - 0.03 };
     let matrix = (0..12).map(|row| [mixed(3 * row), mixed(3 * row + 1), mixed(3 * row + 2), 0.0]);
@@ -30,7 +30,7 @@ fn rows() -> Vec<[f32; 4]> {
 }
 
 /// Runs a step on a photo whose pose is corrected. Compares the splats of the corrected camera and the gradient of the
-/// correction; the other photo has none.
+/// correction; the other photo has no gradient.
 pub(super) fn step(rig: &Rig) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
     let (scene, rows) = (scene(92, &shape), rows());

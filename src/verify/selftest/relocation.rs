@@ -1,4 +1,4 @@
-//! The passes of the strategy mcmc against the reference: relocation, random moves, regularisation.
+//! Compares the passes of the strategy mcmc with the reference: relocation, random moves, regularisation.
 
 use super::compare::{Tolerance, close, exact};
 use super::fixture::{Fixture, PARAMETER_PLANES};
@@ -28,7 +28,7 @@ pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway:
     let uniforms = StepUniforms { draws, draws_per_weight, ..uniforms };
     let applied = fixture.engine.run(ListKey::RelocateApply, &uniforms)?.counters;
     let after = ChangedPopulation::read(fixture, applied.densified_count, before.frozen)?;
-    // They are logarithms, some after a division by the number of copies.
+    // Values are logarithms, some after a division by the number of copies.
     let tolerance = Tolerance { absolute: 1e-6, relative: 1e-6 }.times(leeway);
     Ok(Box::new(move |rules: &Rules| {
         let rules = &Rules { grow_box: Some(GROW_ZONE), ..rules.clone() };
@@ -45,8 +45,8 @@ pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway:
     }))
 }
 
-/// Runs three steps of the strategy mcmc, each on a new fixture of `rig`: as any step, with regularisation, and with
-/// random moves too. Returns how the moves and the terms of the loss compare with the reference.
+/// Runs three steps of the strategy mcmc, each on a new fixture of `rig`: plain, with regularisation, and also with
+/// random moves. Returns the verdicts of the moves and of the loss terms.
 pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Judge; 2]> {
     let (mut uniforms, mut start, mut visible) = (StepUniforms::default(), Vec::new(), Vec::new());
     // Gradients and parameters after each step.
@@ -55,7 +55,7 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
         let mut fixture = rig()?;
         let count = fixture.scene.gaussians.len();
         fixture.config.strategy = StrategyKind::Mcmc;
-        // Enough to stand out from the gradients of the picture, and to move all but opaque Gaussians.
+        // Large enough to stand out from the picture's gradients, and to move all except opaque Gaussians.
         (fixture.config.opacity_weight, fixture.config.scale_weight) = (Some(1.0), Some(1.0));
         fixture.config.position_lr_init = 2e-5;
         fixture.input.update = true;

@@ -1,4 +1,4 @@
-//! Small seeded scenes. Every number is an f32, so that an engine in f32 and a mirror in f64 start with equal values.
+//! Small seeded scenes. Every number is an f32, so that the f32 engine and the f64 reference start with equal values.
 
 use crate::reference::densify::Population;
 use crate::reference::loss::{ObjectPixel, Photo};
@@ -56,7 +56,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The Gaussians as the mirrors' model.
+    /// The Gaussians as the reference's model.
     pub fn model(&self) -> Model {
         Model::from_gaussians(&self.gaussians)
     }
@@ -145,7 +145,7 @@ pub fn target(random: &mut Pcg32, shape: &Shape) -> Target {
             label,
             occluders: match label % 4 {
                 1 => Vec::new(),
-                // What has no label.
+                // Unlabelled areas hide the object.
                 3 => vec![0],
                 _ => vec![label - 1],
             },
@@ -191,7 +191,7 @@ pub fn dot(camera: &Camera, at: [f64; 2], depth: f64, deviation: f64, opacity: f
     }
 }
 
-/// Rows for densification in a scene of extent 1: some below and some above each threshold, all with labels; the last
+/// Rows for densification in a scene of extent 1: some below and some above each threshold, all labelled; the last
 /// tenth is frozen.
 pub fn population(seed: u64, count: usize) -> Population {
     let mut random = generator(seed);
@@ -203,7 +203,7 @@ pub fn population(seed: u64, count: usize) -> Population {
     let gradient_count: Vec<f64> = (0..count).map(|_| f64::from(random.random_range(0..6))).collect();
     let mut sum = |views: &f64| round(views * uniform(&mut random, 5e-5_f64.ln(), 1e-3_f64.ln()).exp());
     let gradient_sum = gradient_count.iter().map(&mut sum).collect();
-    // Some are marked for removal.
+    // Some Gaussians are marked for removal.
     let gradient_count =
         gradient_count.iter().enumerate().map(|(row, &n)| if row % 23 == 7 { 1e9 } else { n }).collect();
     let model = Model::from_gaussians(&gaussians(&mut random, &shape));

@@ -1,4 +1,4 @@
-//! A short training, run twice.
+//! Runs a short training twice.
 
 use super::compare::{Verdict, exact};
 use crate::error::Result;

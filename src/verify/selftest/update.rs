@@ -1,4 +1,4 @@
-//! The update of a step in one kernel, and late Gaussians, against the reference.
+//! Compares the single-kernel update and late Gaussians with the reference.
 
 use super::fixture::{Fixture, PARAMETER_PLANES};
 use super::model::{rates_of, states};
@@ -43,7 +43,7 @@ pub fn step(fused: &mut Fixture, split: &mut Fixture) -> Result<Judge> {
     }))
 }
 
-/// Steps of a view that shows nothing, after which all Gaussians catch up.
+/// Runs steps of a view that shows nothing, after which all Gaussians catch up.
 pub fn late(fixture: &mut Fixture) -> Result<Judge> {
     fixture.input.update = true;
     fixture.scene.camera.cx += 1e5;
