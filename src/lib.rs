@@ -1,11 +1,11 @@
 //! Label-aware 3D Gaussian Splatting on Vulkan compute.
 //!
 //! From posed photos and object masks, labelgs trains a scene of 3D Gaussians in which every Gaussian carries the id of
-//! its object, so that objects can be listed, taken out, removed, rendered and scored. It follows *LabelGS* (arXiv
-//! 2508.19699) on *3D Gaussian Splatting* (Kerbl et al. 2023), and runs on any Vulkan 1.2 device: a graphics card, or
-//! the processor through Mesa's lavapipe. It needs no CUDA, no Python and no network.
+//! its object, so that objects can be listed, extracted, removed, rendered and scored. It follows *LabelGS* (arXiv
+//! 2508.19699) on *3D Gaussian Splatting* (Kerbl et al. 2023), and runs on any Vulkan 1.2 device: a GPU, or the CPU
+//! through Mesa's lavapipe. It needs no CUDA, no Python and no network.
 //!
-//! A made scene, a training, one object out of it, and a picture of the rest:
+//! Make a synthetic scene, train it, extract one object, and render the rest:
 //!
 //! ```no_run
 //! use labelgs::engine::Engine;
@@ -40,9 +40,9 @@
 //! | change the training itself | [`train`] |
 //! | read scenes, masks, models; write models | [`scenes::open`], [`masks`], [`formats`] |
 //! | draw pictures, depth, label maps | [`engine::Engine::for_model`], [`render::render`] |
-//! | choose, take out, change objects | [`edit`] |
+//! | choose, extract, change objects | [`edit`] |
 //! | label a finished model, repair masks | [`label`] |
-//! | train a scene that no card holds | [`blocks`] |
+//! | train a scene that fits no GPU | [`blocks`] |
 //! | score | [`eval`] |
 //! | read the manual | [`guide`] |
 //!
@@ -50,16 +50,15 @@
 //!
 //! World units are the data set's. Camera axes are OpenCV's (x right, y down, z forward); pixel (0, 0) has its centre
 //! at (0.5, 0.5). Quaternions are (w, x, y, z). Opacity and scale are stored before their sigmoid and exponential.
-//! Labels are ids from 1 to 65535, in models to 2^31 - 1; 0 is none. Functions return [`Result`] with one [`Error`]
+//! Labels are ids from 1 to 65535, in models to 2^31 - 1; 0 is no label. Functions return [`Result`] with one [`Error`]
 //! type and print nothing; progress and warnings go to `tracing`.
 //!
 //! # Features
 //!
 //! `cli` (default): the program, with clap, progress bars and signals; without it the library needs none of them.
-//! `viewer`, a part of `cli`: the page that shows a model or a training in a browser.
-//! `network`, a part of `cli`: masks by a segmentation network.
-//! `build-shaderc` (default): builds the shader compiler from source instead of linking the system's. `lab`: faults on
-//! purpose, for tests.
+//! `viewer`, a part of `cli`: shows a model or a run in a browser. `network`, a part of `cli`: makes masks with a
+//! segmentation network. `build-shaderc` (default): builds the shader compiler from source instead of linking the
+//! system's. `lab`: fault injection, for tests.
 #![deny(unsafe_code)]
 #![warn(unreachable_pub)]
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
@@ -101,7 +100,7 @@ use labelgs_scene::{error, lab, options, phases, stage, words};
 #[cfg(feature = "viewer")]
 use labelgs_web as web;
 
-/// The programs of README.md compile.
+/// Compiles the programs in README.md.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

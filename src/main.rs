@@ -3,18 +3,18 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::Write;
 
-/// Bytes (64 TiB) above which a request comes from a number in a damaged file, not from a lack of memory: no computer
-/// has as much. It fails like any other, and the reader of the file reports it.
+/// Requests above this many bytes (64 TiB) come from corrupt length fields rather than a lack of memory. They fail
+/// normally, so that the reader reports the file.
 const PLAUSIBLE_ALLOCATION_MAX: usize = 1 << 46;
 
-/// The system's allocator. If memory runs out, the process ends with status 5 and a message, as for device memory; by
-/// default Rust aborts.
+/// The system's allocator. If memory runs out, the process exits with status 5 and a message, as for device memory.
+/// Rust's default is to abort.
 struct Host;
 
 #[global_allocator]
 static ALLOCATOR: Host = Host;
 
-// SAFETY: every call goes to the system's allocator.
+// SAFETY: every call is forwarded to the system's allocator.
 unsafe impl GlobalAlloc for Host {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller upholds the contract of `GlobalAlloc`, here and below.
@@ -37,14 +37,14 @@ unsafe impl GlobalAlloc for Host {
     }
 }
 
-/// Returns what the allocator returned; ends the process if that is none of a plausible number of bytes.
+/// Returns the allocator's result; exits if a plausible request failed.
 fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() && bytes < PLAUSIBLE_ALLOCATION_MAX {
         // Standard error is unbuffered, so this allocates no memory.
         let _ = writeln!(
             std::io::stderr(),
-            "error: this computer has no memory left for {bytes} more bytes; use smaller images or \
-             fewer Gaussians, or free memory"
+            "error: out of memory while allocating {bytes} bytes; use smaller images or fewer Gaussians, or free \
+             memory"
         );
         signal_hook::low_level::exit(5);
     }
@@ -52,7 +52,7 @@ fn checked(memory: *mut u8, bytes: usize) -> *mut u8 {
 }
 
 /// The commit that this program was built from, as `tools/setup` exports it. Only this file reads the variable, so that
-/// a commit compiles neither library nor shaders anew.
+/// a new commit does not recompile the library or the shaders.
 const BUILD_COMMIT: Option<&str> = option_env!("LABELGS_COMMIT");
 
 fn main() -> std::process::ExitCode {

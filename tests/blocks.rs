@@ -99,7 +99,7 @@ fn a_region_needs_something_to_train() {
     let all = Region { frozen: start().len() as u32, ..region() };
     let options = TrainerOptions { region: Some(all), ..TrainerOptions::default() };
     let trainer = Trainer::new(turn.gpu(), settings(StrategyKind::Budget), &small(), &start(), options);
-    assert!(trainer.err().expect("refused").to_string().contains("none is trained"));
+    assert!(trainer.err().expect("refused").to_string().contains("none would be trained"));
 }
 
 fn json(path: &Path) -> Value {

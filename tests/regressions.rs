@@ -95,7 +95,7 @@ fn a_training_stays_within_the_limits_of_a_device() {
     let place = Place::new();
     let flags = ["--config", &place.settings(), "--set", "densify_grad_threshold=1e-9"];
     let free = succeeded(&place.trained("free", &flags));
-    let bound = "from here on only the best may grow";
+    let bound = "from here, only the best may grow";
     assert!(!free.contains(bound), "{free}");
     let mut outcomes = std::collections::BTreeMap::new();
     for (name, limit) in [

@@ -1,8 +1,8 @@
-//! Poses of views by a finished model: the Gaussians stay, the cameras move.
+//! Aligns the poses of views with a finished model: the Gaussians stay fixed, the cameras move.
 //!
-//! A model whose photos had their poses refined bends with them, and held-out views keep the poses of the
-//! reconstruction. Scores of such views tell quality only after their poses were refined by the model too (as in BARF,
-//! Lin et al. 2021).
+//! If the training photos' poses were refined, the model moved with them, but held-out views keep the poses of the
+//! reconstruction. Their scores are only meaningful after their poses were aligned with the model too (as in BARF, Lin
+//! et al. 2021).
 
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -13,12 +13,12 @@ use crate::train::setup::near_plane::sample;
 use crate::train::{Objective, TrainConfig, Trainer, TrainerOptions};
 use std::sync::Arc;
 
-/// Steps of each view.
+/// Steps per view.
 const STEPS_PER_VIEW: usize = 100;
-/// Most Gaussians that stand for the points of the scene.
+/// Most Gaussians that represent the scene's points.
 const POINTS_MAX: usize = 10_000;
 
-/// Returns the views with poses refined by a model, which is rendered from `near` on `background`.
+/// Returns the views with poses aligned with a model, which is rendered with `near` and `background`.
 pub fn aligned(
     gpu: &Arc<Gpu>,
     model: &Gaussians,

@@ -1,4 +1,4 @@
-//! What the steps of a training use, and the work between them.
+//! State shared by training steps and the jobs between them.
 
 use crate::engine::{Engine, EngineSize, InFlight, ListKey, TrainInput};
 use crate::error::Result;
@@ -17,7 +17,7 @@ use crate::train::shared::poses;
 use crate::train::strategy::{StepContext, Strategy};
 use std::sync::Arc;
 
-/// The model on the device, and what it is trained by.
+/// The model on the device, and everything it is trained with.
 pub(super) struct Context {
     pub(super) engine: Engine,
     pub(super) config: TrainConfig,
@@ -25,23 +25,23 @@ pub(super) struct Context {
     pub(super) strategy: Box<dyn Strategy>,
     pub(super) shared: SharedSet,
     pub(super) views: Views,
-    /// The photos show objects alone.
+    /// True if the photos show objects alone.
     pub(super) objects_only: bool,
     scale: SceneScale,
-    /// Where Gaussians grow; `None`: everywhere.
+    /// Zone in which Gaussians grow; `None` for everywhere.
     grow_zone: Option<Zone>,
-    /// Size of the largest part of a photo, px. The image of the engine may be larger, because it grows.
+    /// Size of the largest photo part, px. The engine's image may be larger, because it can grow.
     image: (u32, u32),
     /// 1 if every step has passes of shared parameters or of the objective.
     always_passes: u32,
-    /// The blend passes count the pairs with a weight.
+    /// True if blend passes count contributing pairs.
     pub(super) counts_pairs: bool,
     /// Input of the newest step.
     pub(super) newest: Option<StepInput>,
 }
 
 impl Context {
-    /// Opens an engine for the training of a data set. The model is not on the device yet.
+    /// Opens an engine for training on a data set. The model is not uploaded yet.
     pub(super) fn new(
         gpu: Arc<Gpu>,
         config: TrainConfig,
@@ -83,7 +83,7 @@ impl Context {
         })
     }
 
-    /// Returns a step as strategies and shared parameters see it.
+    /// Returns a step's context for strategies and shared parameters.
     pub(super) fn step_context(&self, step: u32) -> StepContext<'_> {
         StepContext { step, config: &self.config, extent: self.scale.extent }
     }
@@ -136,7 +136,7 @@ impl Context {
         }
     }
 
-    /// Returns the lists that the steps of this training may need, in the order of their first steps.
+    /// Returns the lists that this training may need, ordered by their first steps.
     pub(super) fn lists_ahead(&self) -> Vec<ListKey> {
         let mut keys = Vec::new();
         for step in 1..=self.config.iterations {
@@ -161,8 +161,7 @@ impl Context {
         keys
     }
 
-    /// Returns the rows of each photo that belong to an owner of shared parameters; none without the owner. Nothing may
-    /// be in flight.
+    /// Returns an owner's rows of each photo; `None` without this owner. Nothing may be in flight.
     pub(super) fn photo_rows(&mut self, owner: &str) -> Result<Vec<Vec<[f32; 4]>>> {
         let Some(range) = self.shared.photo_rows(owner) else { return Ok(Vec::new()) };
         let rows = self.engine.shared()?;
@@ -170,7 +169,7 @@ impl Context {
         Ok((0..self.views.len()).map(of).collect())
     }
 
-    /// Takes over the refined poses, for work between steps. Nothing may be in flight.
+    /// Applies the refined poses to jobs between steps. Nothing may be in flight.
     pub(super) fn refresh_poses(&mut self) -> Result<()> {
         let rows = self.photo_rows(poses::POSES_NAME)?;
         self.views.refine(&rows);

@@ -1,9 +1,9 @@
-//! The passes that a training adds to its steps: those of the strategy, of shared parameters and of the objective.
+//! The passes that a training adds to its steps, from the strategy, shared parameters and objective.
 
 use crate::pass::{Builder, Extension, Hook};
 use std::sync::Arc;
 
-/// The passes of a strategy, under a number that is one higher, and passes of every step.
+/// The strategy's passes, with variant numbers shifted by one, and the passes of every step.
 #[derive(Debug)]
 pub(super) struct JoinedExtension {
     pub(super) strategy: Arc<dyn Extension>,

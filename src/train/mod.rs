@@ -1,18 +1,19 @@
-//! Training: the loop over steps, and the work between steps.
+//! Training: the loop over steps, and the jobs between steps.
 //!
-//! [`run::train`](crate::run::train()) trains a folder of photos. This module is for changes of the training itself. A
-//! [`Trainer`] is a model in training; [`TrainConfig`] has every hyper-parameter, [`TrainerOptions`] what is below.
+//! [`run::train`](crate::run::train()) trains a folder of photos. This module is for changing the training itself. A
+//! [`Trainer`] is a model in training; [`TrainConfig`] has every hyper-parameter, [`TrainerOptions`] the customisation
+//! points below.
 //!
 //! | to change | set or implement | example |
 //! | --- | --- | --- |
 //! | what is trained, by which losses | [`Objective`] | |
-//! | when Gaussians are added and removed | [`Strategy`], by a [`Population`] | `tools/examples/strategy.rs` |
+//! | how Gaussians are added and removed | [`Strategy`], by a [`Population`] | `tools/examples/strategy.rs` |
 //! | passes of a step | [`Extension`], at a [`Hook`] | `tools/examples/strategy.rs` |
 //! | parameters of the scene or of photos | [`SharedParameters`] | `tools/examples/shared.rs` |
 //!
 //! The files, in the order of a training: `settings` and `objective`; `setup` with the first model; `trainer`, the
-//! loop, with `context`, what a step uses; `input`, photos and masks of a step; `strategy` and `shared`; `between`, the
-//! work between steps; `report` and `state`. `refit` and `alignment` are trainings of their own.
+//! loop, with `context`, the state that steps use; `input`, photos and masks of a step; `strategy` and `shared`;
+//! `between`, the jobs between steps; `report` and `state`. `refit` and `alignment` are separate trainings.
 
 pub mod alignment;
 pub(crate) mod between;

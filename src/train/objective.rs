@@ -1,4 +1,4 @@
-//! What a training trains, and by which losses.
+//! The parameters that a training optimises, and its losses.
 
 use super::strategy::{self, Strategy};
 use super::{LabelRule, StrategyKind, TrainConfig};
@@ -7,11 +7,11 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use std::sync::Arc;
 
-/// Something of the Gaussians that a training may change. [`SharedParameters`](super::shared::SharedParameters) have
+/// A property of the Gaussians that a training may change. [`SharedParameters`](super::shared::SharedParameters) have
 /// learning rates of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// How many there are, by the [`Strategy`].
+    /// The number of Gaussians, by the [`Strategy`].
     Number,
     /// Positions.
     Positions,
@@ -23,27 +23,27 @@ pub enum Parameter {
     Opacities,
     /// Spherical harmonics of all degrees.
     Colours,
-    /// Labels, by votes or the rule of the paper.
+    /// Labels, by votes or the paper's rule.
     Labels,
 }
 
-/// A loss. The configuration has its weight and its steps.
+/// A loss. The configuration has its weight and schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
     /// The picture of the scene against the photo.
     Photo,
-    /// Pictures of single objects against photo and mask.
+    /// Renders of single objects against photo and mask.
     Layers,
-    /// Labels in the picture of the scene against the mask.
+    /// Labels in the scene's picture against the mask.
     Disagreement,
     /// Depths against known ones.
     Depth,
 }
 
-/// What a training trains, and by which losses.
+/// The parameters that a training optimises, and its losses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Objective {
-    /// What changes of the Gaussians.
+    /// Properties of the Gaussians that change.
     pub parameters: &'static [Parameter],
     /// The losses.
     pub losses: &'static [Loss],
@@ -56,7 +56,7 @@ impl Default for Objective {
 }
 
 impl Objective {
-    /// A scene: all of its Gaussians, by all losses.
+    /// A scene: all properties of its Gaussians, with all losses.
     pub const SCENE: Self = {
         use Parameter::{Colours, Labels, Number, Opacities, Positions, Rotations, Scales};
         Self {
@@ -64,12 +64,12 @@ impl Objective {
             losses: &[Loss::Photo, Loss::Layers, Loss::Disagreement, Loss::Depth],
         }
     };
-    /// Opacities of objects, by pictures of these alone.
+    /// Opacities of objects, with renders of these objects alone.
     pub const OBJECT_OPACITIES: Self = Self { parameters: &[Parameter::Opacities], losses: &[Loss::Layers] };
     /// Shared parameters of a finished model, such as the poses of photos.
     pub const SHARED: Self = Self { parameters: &[], losses: &[Loss::Photo] };
 
-    /// Returns true if the training changes a parameter of the Gaussians.
+    /// Returns true if the training changes this property.
     pub fn trains(&self, parameter: Parameter) -> bool {
         self.parameters.contains(&parameter)
     }
@@ -79,15 +79,15 @@ impl Objective {
         self.losses.contains(&loss)
     }
 
-    /// Returns the configuration without what the training has not: weights of losses that only they decide, and the
-    /// rule of the paper, by which steps set labels.
+    /// Returns the configuration without unused parts: sets the weights of unused losses to 0, and disables the paper's
+    /// label rule if labels do not change.
     pub(super) fn limit_config(&self, config: TrainConfig) -> TrainConfig {
         let depth_weight = if self.has(Loss::Depth) { config.depth_weight } else { Some(0.0) };
         let label_rule = if self.trains(Parameter::Labels) { config.label_rule } else { LabelRule::Votes };
         TrainConfig { depth_weight, label_rule, ..config }
     }
 
-    /// Sets the learning rates of a step to 0 for what the training does not change.
+    /// Sets the learning rates of unchanged properties to 0.
     pub(super) fn limit_rates(&self, to: &mut StepUniforms) {
         let [x, y, z, opacity] = &mut to.rate_means;
         let (sh0, sh_rest) = (&mut to.rate_sh0, &mut to.rate_sh_rest);
@@ -109,13 +109,13 @@ impl Objective {
         if self.trains(Parameter::Number) { strategy::make(kind) } else { Box::new(()) }
     }
 
-    /// Returns the passes that it adds to steps.
+    /// Returns the passes that the objective adds to steps.
     pub(super) fn extension(&self) -> Option<Arc<dyn Extension>> {
         (!self.has(Loss::Photo)).then(|| Arc::new(WithoutPhotoLoss) as Arc<dyn Extension>)
     }
 }
 
-/// The photo loss is measured, and has no gradient.
+/// Measures the photo loss without a gradient.
 #[derive(Debug)]
 struct WithoutPhotoLoss;
 

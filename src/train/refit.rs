@@ -1,9 +1,8 @@
-//! Opacities of objects outside of their scene.
+//! Refits the opacities of objects that are extracted from their scene.
 //!
-//! In its scene, an object shares opacities with what is around it: haze behind other things and Gaussians across a
-//! contour cost little there, and show when the object stands alone. A copy has opacities of its own. The object layers
-//! of LabelGS fit them: its colours and opacity alone against photos and masks, without the pixels in which something
-//! hides it.
+//! In its scene, haze behind other things and Gaussians across a contour cost little, but they show when the object
+//! stands alone. A copy of the object can have its own opacities. LabelGS' object layers fit them: colours and opacity
+//! of the object alone are compared with photos and masks, except where something hides the object.
 
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
@@ -13,17 +12,16 @@ use crate::train::{Objective, Occlusion, TrainConfig, Trainer, TrainerOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Steps of [`refitted`], each of one view.
+/// Steps of [`refitted`], one view each.
 pub const REFIT_STEPS: u32 = 600;
-/// Weight of the alpha term. It is higher than in a scene, because a copy need not look right in the picture of the
-/// scene.
+/// Weight of the alpha term. It is higher than in a scene, because a copy need not look right within the scene.
 const ALPHA_WEIGHT: f32 = 3.0;
 
-/// Returns labelled Gaussians, those of whole objects, with opacities for a picture of these objects alone.
+/// Returns the Gaussians of whole objects with opacities for rendering these objects alone.
 ///
-/// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are those of
-/// the scene, by name of the view ([`occluders_by_contour`](crate::label::occlusion::occluders_by_contour)). `watch` is
-/// told the number of each step. Labels that no mask has are an error.
+/// `views` are training views with photos, and masks with the labels of the Gaussians as ids. `occluders` are the
+/// scene's occluders, by name of the view ([`occluders_by_contour`](crate::label::occlusion::occluders_by_contour)).
+/// `watch` receives the number of each step. Fails if a label is in no mask.
 pub fn refitted(
     gpu: &Arc<Gpu>,
     objects: &Gaussians,
@@ -39,7 +37,7 @@ pub fn refitted(
         views.iter().filter(|view| shown(view).iter().any(is_chosen)).map(|&view| view.clone()).collect();
     let known: BTreeSet<u32> = train.iter().flat_map(shown).map(u32::from).collect();
     if let Some(label) = labels.difference(&known).next() {
-        let problem = format!("label {label} is in no mask of a training view, so nothing tells its opacity");
+        let problem = format!("label {label} is in no mask of a training view, so its opacity cannot be fitted");
         return Err(Error::usage(Setting("masks"), problem));
     }
     let config = TrainConfig {

@@ -1,10 +1,10 @@
-//! What a step did, and its numbers.
+//! The report of a step: its work and losses.
 
 use crate::engine::Report;
 use crate::train::TrainConfig;
 use crate::train::input::step_input::{self, StepInput, StepView};
 
-/// The numbers of a finished step.
+/// The results of a finished step.
 #[derive(Clone, Copy, Debug)]
 pub struct StepReport {
     /// Step, from 1.
@@ -17,7 +17,7 @@ pub struct StepReport {
     pub ssim: f64,
     /// Weighted label loss.
     pub label_loss: f64,
-    /// What it worked on.
+    /// Work of the step.
     pub kind: StepKind,
     /// Counters of the device.
     pub report: Report,
@@ -36,26 +36,26 @@ impl StepReport {
     }
 }
 
-/// What a step does for labels.
+/// Label work of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LabelWork {
-    /// Nothing: before labels start, between two steps with labels, or without masks.
+    /// None: before labels start, between two steps with labels, or without masks.
     #[default]
     None,
-    /// The disagreement of labels in the walk of the scene.
+    /// Label disagreement, in the scene's blend pass.
     Disagreement,
-    /// Layers of sampled objects.
+    /// Object layers of sampled objects.
     Layers,
 }
 
-/// What a step worked on: its cost depends on these.
+/// The properties of a step that determine its cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepKind {
     /// Width and height of its photo, px.
     pub size: (u32, u32),
     /// Degree of the spherical harmonics.
     pub sh_degree: u32,
-    /// Work for labels.
+    /// Label work.
     pub labels: LabelWork,
 }
 

@@ -1,7 +1,7 @@
-//! The complete state of a training, and its file.
+//! The complete state of a training, and its checkpoint file.
 //!
-//! The file leaves out derived values: learning rates and degrees follow from the step, the order of views and the
-//! sampled objects from seed and step, gradients and votes from the passes of the next step.
+//! The file omits derived values: learning rates and degrees depend on the step, view order and sampled objects on seed
+//! and step, and gradients and votes are recomputed.
 
 use super::shared::SharedState;
 use super::strategy::StrategyState;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub struct TrainState {
     /// Version of labelgs that wrote it.
     pub labelgs: String,
-    /// Device, driver and subgroups. Others round differently.
+    /// Device, driver and subgroups, which affect rounding.
     pub device: String,
     /// Number of finished steps.
     pub step: u32,
@@ -35,11 +35,11 @@ pub struct TrainState {
     pub frozen: u32,
     /// World position of the origin of the positions.
     pub origin: [f64; 3],
-    /// Votes were counted at least once.
+    /// True if votes were counted at least once.
     pub labelled_once: bool,
-    /// Memory has limited the number of Gaussians.
+    /// True if memory has limited the number of Gaussians.
     pub memory_bounds: bool,
-    /// Number of Gaussians before the first change of the strategy.
+    /// Number of Gaussians before the strategy's first change.
     pub first_count: Option<u32>,
     /// Sizes that the buffers had grown to.
     pub sizes: GrownSizes,
@@ -51,7 +51,7 @@ pub struct TrainState {
     pub views: Vec<ViewFingerprint>,
     /// Occluders of the objects of each view, by name of the view.
     pub occluders: BTreeMap<String, Occluders>,
-    /// Data of the caller; null for none.
+    /// Data of the caller, or null.
     pub run: serde_json::Value,
     /// State of the strategy.
     pub strategy: StrategyState,
@@ -121,7 +121,7 @@ impl TrainState {
         if state.near_planes.len() != state.views.len() {
             return Err(odd(format!("{} near planes of {} views", state.near_planes.len(), state.views.len())));
         }
-        // Masks may be given and show no object.
+        // Masks may be given without showing any object.
         let labels = state.planes.iter().any(|plane| plane.name == TABLE[Buf::LABELS.index()].name);
         let shared = state.shared.as_ref().map_or(0, |kept| kept.layout.count(state.views.len()));
         let half_moments = state.config.moments == Moments::Half;
@@ -130,25 +130,26 @@ impl TrainState {
         Ok(state)
     }
 
-    /// Refuses a scene that differs from that of the checkpoint; the error names the first difference.
+    /// Refuses a scene that differs from the checkpoint's; the error names the first difference.
     pub(super) fn check_scene(&self, scene: &Path, views: &[ViewFingerprint]) -> Result<()> {
         let masks = |views: &[ViewFingerprint]| views.iter().any(|view| view.mask.is_some());
         let (then, now) = (masks(&self.views), masks(views));
         if then != now {
             let had = |masks| if masks { "masks" } else { "no masks" };
-            let problem = format!("{} was made with {}, now there are {}", self.path.display(), had(then), had(now));
+            let problem =
+                format!("{} was made with {}, but now there are {}", self.path.display(), had(then), had(now));
             return Err(Error::usage(Setting("masks"), problem));
         }
         let refuse = |view: &str, what: &str| {
-            let cure = "go on with the scene as it was, or start a new run";
+            let cure = "resume with the original scene, or start a new run";
             Err(Error::data(scene, view, format!("{what} {}; {cure}", self.path.display())))
         };
         if self.views.len() != views.len() {
-            return refuse("", &format!("has {} training views, {} are in", views.len(), self.views.len()));
+            return refuse("", &format!("has {} training views, but {} are in", views.len(), self.views.len()));
         }
         for (then, now) in self.views.iter().zip(views) {
             let what = match () {
-                () if then.name != now.name => &format!("is in the place of {} in", then.name),
+                () if then.name != now.name => &format!("replaces {} of", then.name),
                 () if then.size != now.size || then.camera != now.camera => "has another camera than in",
                 () if then.photo != now.photo => "has another photo than in",
                 () if then.mask != now.mask => "has another mask than in",

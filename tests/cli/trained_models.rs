@@ -36,7 +36,7 @@ fn a_training_goes_on_from_a_model_of_any_format() {
 
     let scene = place.text("scene");
     let plain = place.labelgs(&["train", &scene, "-o", &place.text("plain"), "--init", &file, "--iterations", "2"]);
-    assert!(succeeded(&plain).contains("labels of the first model are lost"), "{}", stderr(&plain));
+    assert!(succeeded(&plain).contains("initial model's labels are dropped"), "{}", stderr(&plain));
 
     let missing = place.trained("missing", &["--init", &place.text("nothing.ply"), "--iterations", "2"]);
     assert_eq!(missing.status.code(), Some(3));

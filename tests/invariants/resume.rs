@@ -162,7 +162,7 @@ fn another_scene_is_refused_with_what_differs() {
     };
     refusal(&|dataset| *dataset = plain(), 2, &["masks: ", "no masks"]);
     refusal(&|dataset| drop(dataset.train.pop()), 3, &["4 training views, 5"]);
-    refusal(&|dataset| dataset.train[1].name = "other.png".into(), 3, &["other.png", "in the place of"]);
+    refusal(&|dataset| dataset.train[1].name = "other.png".into(), 3, &["other.png", "replaces"]);
     refusal(&|dataset| dataset.train[2].camera.fx += 1e-9, 3, &["another camera"]);
     refusal(
         &|dataset| {

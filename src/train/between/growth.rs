@@ -1,4 +1,4 @@
-//! Changes of the set of Gaussians after a step, by the strategy.
+//! Changes the set of Gaussians after a step, by the strategy.
 
 use super::StepJob;
 use crate::error::{Error, Result};
@@ -12,9 +12,9 @@ use crate::train::strategy::{DensifyCounts, GaussianLimit, Population, StepConte
 pub(in crate::train) struct Growth {
     /// Limit on the number of Gaussians.
     pub(in crate::train) bound: GaussianLimit,
-    /// Counts of the latest densification, cleared when the caller takes them.
+    /// Counts of the latest densification; cleared when the caller takes them.
     pub(in crate::train) densified: Option<DensifyCounts>,
-    /// Number of Gaussians before the first change.
+    /// Number of Gaussians before the strategy's first change.
     pub(in crate::train) first_count: Option<u32>,
 }
 

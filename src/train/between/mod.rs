@@ -1,7 +1,7 @@
 //! Work between two steps: when it is due, and what it does.
 //!
-//! A new job is a file that implements [`StepJob`], and its place in [`TrainingJobs`]. [`crate::run`] has jobs too:
-//! they write files.
+//! To add a job, implement [`StepJob`] in a new file and add it to [`TrainingJobs`]. [`crate::run`] has further jobs,
+//! which write files.
 
 mod growth;
 mod occluders;
@@ -17,21 +17,22 @@ use super::context::Context;
 use super::settings::TrainConfig;
 use crate::error::Result;
 
-/// Work between two steps, with what it works on.
+/// A job between two steps; `C` is the state it works on.
 pub(crate) trait StepJob<C: ?Sized> {
-    /// Returns true if it is due at a step. Whether it comes before or after the step is up to the list that has it.
+    /// Returns true if the job is due at a step. The list that contains it decides whether it runs before or after the
+    /// step.
     fn is_due(&self, step: u32, context: &C) -> bool;
 
-    /// Does it. Nothing is in flight.
+    /// Runs the job. Nothing is in flight.
     fn run(&mut self, step: u32, context: &mut C) -> Result<()>;
 }
 
-/// The place of work at a step.
+/// When a job runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum JobTime {
-    /// Before it.
+    /// Before the step.
     Before,
-    /// After it.
+    /// After the step.
     After,
 }
 

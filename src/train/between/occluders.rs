@@ -8,7 +8,7 @@ use crate::render::{RenderOptions, render};
 use crate::train::Occlusion;
 use crate::train::context::Context;
 
-/// Finds the occluders by the rendered depth of every view with masks.
+/// Finds occluders from the rendered depth of every view with masks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::train) struct OccluderJob;
 

@@ -1,4 +1,4 @@
-//! Poses of the photos by a comparison of these with each other.
+//! Adjusts the photos' poses by comparing the photos with each other.
 
 use super::StepJob;
 use crate::bundle_adjustment::{Frame, PHOTOS_MAX, adjusted};
@@ -8,13 +8,13 @@ use crate::train::context::Context;
 use crate::train::objective::Parameter;
 use crate::train::shared::poses;
 
-/// Settles the poses of all photos that others show enough of.
+/// Settles the poses of all photos that overlap enough with others.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::train) struct PoseAdjustment;
 
 impl StepJob<Context> for PoseAdjustment {
     fn is_due(&self, step: u32, context: &Context) -> bool {
-        // A finished model tells the poses itself.
+        // With a finished model, poses follow from the model alone.
         context.objective.trains(Parameter::Positions)
             && context.shared.photo_rows(poses::POSES_NAME).is_some()
             && poses::are_compared_before(context.step_context(step))
@@ -24,7 +24,7 @@ impl StepJob<Context> for PoseAdjustment {
     fn run(&mut self, _step: u32, context: &mut Context) -> Result<()> {
         let Some(range) = context.shared.photo_rows(poses::POSES_NAME) else { return Ok(()) };
         if context.views.len() > PHOTOS_MAX {
-            tracing::warn!("the model alone tells the poses of more than {PHOTOS_MAX} photos");
+            tracing::warn!("with more than {PHOTOS_MAX} photos, poses are refined by the model only");
             return Ok(());
         }
         context.refresh_poses()?;
@@ -39,9 +39,9 @@ impl StepJob<Context> for PoseAdjustment {
             }
         }
         let (count, all) = (found.len() - unknown.len(), found.len());
-        tracing::info!("poses of {count} of {all} photos adjusted by a comparison of the photos");
+        tracing::info!("poses of {count} of {all} photos adjusted by comparing the photos");
         if !unknown.is_empty() {
-            tracing::debug!("poses by the model alone: {}", unknown.join(", "));
+            tracing::debug!("poses refined by the model only: {}", unknown.join(", "));
         }
         if count > 0 {
             context.engine.set_shared(&rows)?;
@@ -51,7 +51,7 @@ impl StepJob<Context> for PoseAdjustment {
     }
 }
 
-/// Returns the photo of each view with the depths of the model.
+/// Returns the photo of each view with model depths.
 fn frames(context: &mut Context) -> Result<Vec<Frame>> {
     let Context { engine, config, views, .. } = context;
     let options = RenderOptions::for_depth(config.near);

@@ -1,4 +1,4 @@
-//! Labels by votes, counted over all training views at intervals and at the end.
+//! Labels Gaussians by votes, counted over all training views at intervals and at the end.
 
 use super::StepJob;
 use crate::error::Result;
@@ -11,7 +11,7 @@ use crate::train::{LabelRule, TrainConfig};
 /// Counts votes and labels the Gaussians.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::train) struct VoteJob {
-    /// The Gaussians have labels of votes, with which masks can be compared.
+    /// True if the Gaussians already have voted labels, with which masks can be compared.
     pub(in crate::train) have_labelled: bool,
 }
 
@@ -22,7 +22,7 @@ impl VoteJob {
         context.has_labels() && context.objective.trains(Parameter::Labels) && label_rule == LabelRule::Votes
     }
 
-    /// Counts the votes of all views; `None` where no votes decide labels. Nothing may be in flight.
+    /// Counts the votes of all views; `None` if labels are not decided by votes. Nothing may be in flight.
     pub(in crate::train) fn count(&self, context: &mut Context) -> Result<Option<Decision>> {
         if !Self::decide(context) {
             return Ok(None);
@@ -31,12 +31,12 @@ impl VoteJob {
         let Context { engine, config, views, objects_only, .. } = context;
         let how = Sweep { labelled_only: *objects_only, ..Sweep::new(config.near, config.mask_border) };
         let (means, voters) = (engine.means()?, views.voters());
-        // Masks that disagree with the labels of the model have less weight.
+        // Masks that disagree with the model's labels have less weight.
         let is_judged = self.have_labelled;
         let mut decision = decide::count(engine, &voters, is_judged, &means, how)?;
         let trained = engine.trained_count() as usize;
         if trained < decision.labels.len() {
-            // The views of a part of a scene know little of what is frozen.
+            // The views of a region know little about frozen Gaussians.
             decision.labels[trained..].copy_from_slice(&engine.labels()?[trained..]);
         }
         Ok(Some(decision))

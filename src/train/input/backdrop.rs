@@ -1,4 +1,4 @@
-//! What is behind the scene in a step.
+//! The background of a step.
 
 use super::sampler::stream;
 use crate::scene::Photo;
@@ -6,10 +6,10 @@ use crate::train::TrainConfig;
 use rand::Rng;
 use std::borrow::Cow;
 
-/// First stream of the colours; the step is added.
+/// First random stream for colours; the step is added.
 const COLOUR_STREAM: u64 = 5 << 32;
 
-/// Returns the colour behind the scene in a step: r, g, b, 0 to 1.
+/// Returns the background colour of a step: r, g, b, 0 to 1.
 pub(in crate::train) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
     if !config.random_background {
         return config.background;
@@ -18,9 +18,9 @@ pub(in crate::train) fn colour(config: &TrainConfig, step: u32) -> [f32; 3] {
     [(); 3].map(|()| random.random_range(0.0..1.0))
 }
 
-/// Returns the photo over that colour, as the device compares it.
+/// Returns the photo over that colour, as the loss compares it.
 pub(in crate::train) fn photo<'a>(photo: &'a Photo, config: &TrainConfig, step: u32) -> Cow<'a, [[u8; 4]]> {
-    // Photos have their opacity with random colours only.
+    // Photos keep their opacity only with random colours.
     let over = config.random_background.then(|| photo.over(colour(config, step))).flatten();
     over.map_or(Cow::Borrowed(&photo.rgba), Cow::Owned)
 }

@@ -1,7 +1,7 @@
-//! Space without Gaussians: before the training cameras, and before all cameras between two of them.
+//! Free space without Gaussians: in front of the training cameras, and in front of cameras between two of them.
 //!
-//! Gaussians there stand for nothing that was photographed. Training cannot tell when they are before no training
-//! camera, but they fog views between those cameras.
+//! Gaussians there represent nothing in the photos. If no training camera sees them, training cannot remove them, but
+//! they fog views between the cameras.
 
 use super::sampler::stream;
 use crate::scene::{Camera, Dataset, Gaussians};
@@ -10,18 +10,19 @@ use crate::train::setup::near_plane::{sample, seen_depths};
 use glam::DVec3;
 use rand::Rng;
 
-/// Most Gaussians to take depths from, evenly chosen.
+/// Most Gaussians to take depths from, evenly sampled.
 const SAMPLE_GAUSSIANS_MAX: usize = 65_536;
-/// Near plane of a camera in the depths of the Gaussians that it sees: this share of this quantile.
+/// Near plane of a camera, as a share of a quantile of the visible Gaussians' depths.
 const NEAR_SHARE: f64 = 0.25;
+/// That quantile.
 const NEAR_QUANTILE: f64 = 0.01;
-/// The quantile in a scene without points, where some of the first Gaussians are before everything.
+/// The quantile for scenes without points, where some initial Gaussians are in front of everything.
 const NEAR_QUANTILE_RANDOM: f64 = 0.1;
-/// Number of cameras whose median a camera takes, itself included.
+/// Number of nearest cameras, including itself, over which a camera takes the median.
 const MEDIAN_CAMERAS: usize = 5;
 
-/// Returns the near plane of each camera, at least `least`. Up to there space is taken as free: no Gaussian stands for
-/// anything so much nearer than all that the camera sees of the initial `model`.
+/// Returns the near plane of each camera, at least `least`. Space up to there is assumed to be free: nothing is that
+/// much nearer than everything the camera sees of the initial `model`.
 pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least: f32) -> Vec<f32> {
     let cameras = dataset.train.iter().map(|view| &view.camera);
     let quantile = if init::has_points(dataset) { NEAR_QUANTILE } else { NEAR_QUANTILE_RANDOM };
@@ -42,14 +43,15 @@ pub(in crate::train) fn view_planes(dataset: &Dataset, model: &Gaussians, least:
     found.iter().map(|&(centre, _)| plane(centre)).collect()
 }
 
-/// Number of other cameras to which the space is free, and the least cosine of the angle between the directions.
+/// Most partner cameras per camera.
 const PARTNERS_MAX: usize = 4;
+/// Smallest cosine of the angle between partners' directions.
 const AXES_COSINE_MIN: f64 = 0.85;
-/// Random stream of the partner of a step, beside those of the step numbers.
+/// Random stream for a step's partner, distinct from the step numbers.
 const PARTNER_STREAM: u64 = 1 << 40;
 
-/// Returns for each camera the nearest ones that look in a similar direction, none of them farther away than the first
-/// thing that the camera sees: nothing stands between such two.
+/// Returns for each camera the nearest cameras that look in a similar direction and are closer than the first thing it
+/// sees, so that nothing is between the two.
 pub(in crate::train) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec<usize>> {
     let places: Vec<(DVec3, DVec3)> = cameras.iter().map(|camera| (camera.centre(), camera.axis())).collect();
     let of = |index: usize| {
@@ -66,7 +68,7 @@ pub(in crate::train) fn partners(cameras: &[&Camera], planes: &[f32]) -> Vec<Vec
     (0..places.len()).map(of).collect()
 }
 
-/// Returns the partner of a step, one of `partners`.
+/// Returns the partner of a step, drawn from `partners`.
 pub(in crate::train) fn partner(seed: u64, step: u32, partners: &[usize]) -> Option<usize> {
     let index = stream(seed, PARTNER_STREAM + u64::from(step)).random_range(0..partners.len().max(1));
     partners.get(index).copied()
@@ -88,7 +90,7 @@ mod tests {
     fn partners_are_near_and_look_the_same_way() {
         let on_a_line = |x: f64, turn| camera(DVec3::new(x, 0.0, 0.0), turn);
         let cameras = [(0.0, 0.0), (1.0, 0.3), (1.5, 2.0), (2.5, 0.0), (7.0, 0.0)].map(|(x, turn)| on_a_line(x, turn));
-        // The planes are a quarter of the depth of the nearest things.
+        // Near planes are a quarter of the depth of the nearest things.
         let found = partners(&cameras.each_ref(), &[0.5, 0.75, 0.75, 1.2, 1.2]);
         assert_eq!(found, [vec![1], vec![0, 3], vec![], vec![1, 0, 4], vec![3]]);
     }

@@ -1,27 +1,27 @@
-//! Depths that photos are known to have: a prior for what is opaque.
+//! Known depths of photos: a prior for opacity.
 
 use crate::engine::Band;
 use crate::scene::{DepthMap, Photo, View};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
-/// One in this many pixels of a depth map counts, along each side.
+/// Stride at which depth-map pixels are used, along each side.
 const PIXEL_STRIDE: usize = 4;
 
-/// Known depths of a photo. Copies share them.
+/// Known depths of a photo. Clones share the data.
 #[derive(Clone, Debug, Default)]
 pub struct KnownDepths(Arc<Vec<KnownDepth>>);
 
 #[derive(Clone, Copy, Debug)]
 struct KnownDepth {
-    /// Place in the photo, px.
+    /// Position in the photo, px.
     at: [f32; 2],
     /// 1 / depth along the axis of the camera, 1 / world unit.
     inverse: f32,
 }
 
 impl KnownDepths {
-    /// Takes the depths of the points that a view shows, by their pixels.
+    /// Takes depths from points that a view shows, given their pixels.
     pub(crate) fn from_points(view: &View, points: impl Iterator<Item = (DVec2, DVec3)>) -> Self {
         let known = |(at, point): (DVec2, DVec3)| KnownDepth {
             at: at.as_vec2().to_array(),
@@ -30,7 +30,7 @@ impl KnownDepths {
         Self(Arc::new(points.map(known).filter(|known| known.inverse.is_finite() && known.inverse > 0.0).collect()))
     }
 
-    /// Takes the depths of a map of the photo's size, world units. Holes are not finite or not positive.
+    /// Takes depths from a map of the photo's size, world units. Values that are not finite or not positive are holes.
     pub(crate) fn from_map(map: &DepthMap) -> Self {
         let width = map.width as usize;
         let rows = (PIXEL_STRIDE / 2..map.height as usize).step_by(PIXEL_STRIDE);
@@ -47,8 +47,8 @@ impl KnownDepths {
         self.0.len()
     }
 
-    /// Draws the band of a photo of `full` px at the size of a step: 1 / depth, 0 where it is not known. The nearest of
-    /// a pixel counts. Pixels of `photo`, the band at that size, that are left out of the loss have none.
+    /// Draws a band of a photo of `full` px at the step's size: 1 / depth, 0 if unknown. The nearest depth of a pixel
+    /// counts. Pixels that are invalid in `photo`, the band at that size, are 0.
     pub(in crate::train) fn drawn(&self, full: (u32, u32), band: Band, photo: &Photo) -> Vec<f32> {
         let (width, height) = (photo.width, photo.height);
         let mut drawn = vec![0.0_f32; width as usize * height as usize];
@@ -66,7 +66,7 @@ impl KnownDepths {
     }
 }
 
-/// Returns the weight of a pixel with a known depth, given that of all of them.
+/// Returns the weight of a pixel with a known depth, given the total weight.
 pub(in crate::train) fn weight(inverse: &[f32], all: f64) -> f32 {
     let count = inverse.iter().filter(|&&inverse| inverse > 0.0).count();
     (all / count.max(1) as f64) as f32

@@ -1,4 +1,4 @@
-//! What a step trains on: a view or a part of it, its photo, its masks, its known depths.
+//! Inputs of a step: a view or a part of it, with photo, masks and known depths.
 
 pub(in crate::train) mod backdrop;
 pub(in crate::train) mod free_space;

@@ -1,8 +1,7 @@
-//! Parts of the photos, one for a step: whole photos, or bands of rows where the device cannot walk the tiles of a
-//! whole one.
+//! Parts of photos, one per step: whole photos, or bands of rows if a whole photo has too many tiles for the device.
 //!
-//! Only steps know parts. What a photo owns, such as its exposure, its pose and its occluders, belongs to all of it,
-//! and votes and renders between steps are those of whole photos.
+//! Only steps use parts. Exposure, pose and occluders belong to the whole photo, and jobs between steps use whole
+//! photos.
 
 use super::step_input::{self, ObjectLight};
 use crate::engine::Band;
@@ -11,18 +10,18 @@ use crate::scene::{Camera, LabelMap, Photo};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What a step trains on.
+/// The photo part that a step trains on.
 #[derive(Debug)]
 pub(in crate::train) struct PhotoPart {
     /// Index of the training view.
     pub(in crate::train) view: usize,
-    /// Its rows.
+    /// Rows of the part.
     pub(in crate::train) band: Band,
     /// Camera of these rows.
     pub(in crate::train) camera: Camera,
-    /// Camera of the photo, if the part does not have all rows.
+    /// Camera of the whole photo, if the part does not have all rows.
     pub(in crate::train) whole: Option<Camera>,
-    /// Number of its pixels that count.
+    /// Number of valid pixels of the part.
     pub(in crate::train) valid_pixels: u64,
     /// Ids of the objects in its mask, sorted.
     pub(in crate::train) objects: Vec<u16>,
@@ -31,7 +30,7 @@ pub(in crate::train) struct PhotoPart {
 }
 
 impl PhotoPart {
-    /// Returns the parts of a view, of at most `most` rows. `labels` is the mask in the layout of the device.
+    /// Splits a view into parts of at most `most` rows. `labels` is the mask in device layout.
     pub(in crate::train) fn split(
         (view, camera): (usize, &Camera),
         photo: &Photo,
@@ -69,7 +68,7 @@ pub(in crate::train) fn photo_of(band: Band, photo: Arc<Photo>) -> Arc<Photo> {
     Arc::new(Photo { width: photo.width, height: band.rows, rgba })
 }
 
-/// Returns the band's rows of the mask in the layout of the device, which is empty without a mask.
+/// Returns the band's rows of the mask in device layout, which is empty without a mask.
 pub(in crate::train) fn labels_of(band: Band, width: u32, labels: Arc<Vec<u32>>) -> Arc<Vec<u32>> {
     let pixels = band.pixels(width);
     if labels.is_empty() || pixels.len() == labels.len() {

@@ -1,7 +1,7 @@
-//! Pixels of the next steps, made on threads while the device works.
+//! Prefetches the pixels of the next steps on threads while the device works.
 //!
-//! The order of views is known ahead. What a thread makes depends on step and view alone, so that a step has the same
-//! bits whether its pixels were made ahead or are made when it begins.
+//! The order of views is known in advance. The result of a thread depends only on step and view, so that prefetching
+//! does not change any bits.
 
 use super::known_depths::KnownDepths;
 use super::part::{labels_of, photo_of};
@@ -14,14 +14,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-/// Most steps ahead: more than the device needs to take the time of one.
+/// Most steps to prefetch: enough that preparing one step never delays the device.
 const STEPS_AHEAD_MAX: usize = 8;
 
 /// The pixels of a step, with their camera.
 #[derive(Debug)]
 pub(in crate::train) struct StepPixels {
     pub(in crate::train) photo: Arc<Photo>,
-    /// The mask in the layout of the device; empty without a mask and in smaller sizes.
+    /// The mask in device layout; empty without a mask and at smaller sizes.
     pub(in crate::train) view_labels: Arc<Vec<u32>>,
     /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
     pub(in crate::train) depths: Vec<f32>,
@@ -30,18 +30,18 @@ pub(in crate::train) struct StepPixels {
     pub(in crate::train) valid_pixels: u64,
 }
 
-/// What a step asks for.
+/// The pixels that a step requests.
 pub(in crate::train) struct Request {
     pub(in crate::train) step: u32,
     /// Index of the part.
     pub(in crate::train) index: usize,
     pub(in crate::train) band: Band,
     pub(in crate::train) photo: Pixels<Photo>,
-    /// The mask in the layout of the device and the number of pixels that count, at full size.
+    /// The mask in device layout and the number of valid pixels, at full size.
     pub(in crate::train) full: Option<(Pixels<Vec<u32>>, u64)>,
-    /// Depths that the photo is known to have, in a step that compares them.
+    /// Known depths of the photo, in a step that compares them.
     pub(in crate::train) depths: Option<KnownDepths>,
-    /// Camera of the size of the step.
+    /// Camera at the step's size.
     pub(in crate::train) camera: Camera,
 }
 
@@ -67,7 +67,7 @@ impl Request {
     }
 }
 
-/// Threads that make the pixels of the next steps, by step: index of the part, and its pixels.
+/// Threads that make the pixels of the next steps. For each step: index of the part, and thread.
 #[derive(Debug)]
 pub(in crate::train) struct Prefetch {
     running: BTreeMap<u32, (usize, JoinHandle<Result<StepPixels>>)>,
@@ -76,32 +76,33 @@ pub(in crate::train) struct Prefetch {
 }
 
 impl Prefetch {
-    /// Makes one for the steps up to `last`.
+    /// Prefetches for the steps up to `last`.
     pub(in crate::train) fn new(views: &[TrainView], last: u32) -> Self {
         let waits = views.iter().map(|view| &view.photo).filter(|photo| !photo.is_held());
         let steps = waits.map(Pixels::at_once).min().map_or(0, |most| most.min(STEPS_AHEAD_MAX));
         Self { running: BTreeMap::new(), steps, last }
     }
 
-    /// Number of steps whose pixels are made ahead; 0 if all are in memory.
+    /// Returns the number of steps to prefetch; 0 if all photos are in memory.
     pub(in crate::train) fn steps(&self) -> usize {
         self.steps
     }
 
-    /// Begins to make the pixels of a step, unless that was done before.
+    /// Starts to make the pixels of a step, unless this was already done.
     pub(in crate::train) fn begin(&mut self, request: Request) {
         let is_running = self.running.get(&request.step).is_some_and(|(index, _)| *index == request.index);
         if is_running || request.step > self.last {
             return;
         }
         let (step, index) = (request.step, request.index);
-        // Without a thread, the step makes its pixels itself.
+        // If no thread can be started, the step makes its pixels itself.
         if let Ok(thread) = thread::Builder::new().name("photos".to_owned()).spawn(|| request.make()) {
             self.running.insert(step, (index, thread));
         }
     }
 
-    /// Returns the pixels of a step. Those of other steps than the next ones are dropped: a training may go back.
+    /// Returns the pixels of a step. Drops pixels of steps that are not among the next ones, because training may
+    /// restart from an earlier step.
     pub(in crate::train) fn take(&mut self, request: Request) -> Result<StepPixels> {
         let found = self.running.remove(&request.step).filter(|(index, _)| *index == request.index);
         let next = request.step..=request.step.saturating_add(self.steps as u32);

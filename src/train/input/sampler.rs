@@ -5,7 +5,7 @@ use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use std::collections::VecDeque;
 
-/// Random stream of the order of views. The other streams are the step numbers.
+/// Random stream for the view order. The other streams are the step numbers.
 const VIEW_STREAM: u64 = u64::MAX;
 
 pub(in crate::train) fn stream(seed: u64, stream: u64) -> Pcg64Mcg {
@@ -22,7 +22,7 @@ pub(in crate::train) struct ViewOrder {
     random: Pcg64Mcg,
     views: usize,
     stack: Vec<usize>,
-    /// Drawn ahead, the next one first.
+    /// Views drawn in advance, the next one first.
     next: VecDeque<usize>,
 }
 
@@ -44,7 +44,7 @@ impl ViewOrder {
         self.next.pop_front().unwrap_or_else(|| self.draw_new())
     }
 
-    /// Returns what the next `count` draws will be.
+    /// Returns the next `count` draws without consuming them.
     pub(in crate::train) fn upcoming(&mut self, count: usize) -> Vec<usize> {
         while self.next.len() < count {
             let view = self.draw_new();

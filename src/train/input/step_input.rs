@@ -33,16 +33,16 @@ pub struct TrainView {
     pub objects: Vec<u16>,
     /// The mask in the layout of the device, one word per pixel, row-major; empty without a mask.
     pub view_labels: Pixels<Vec<u32>>,
-    /// Depths that the photo is known to have.
+    /// Known depths of the photo.
     pub depths: KnownDepths,
     /// Occluders of each object in this view.
     pub occluders: Occluders,
 }
 
-/// A view as a step uses it: at the size of the step.
+/// A view at the step's size.
 #[derive(Clone, Copy, Debug)]
 pub struct StepView<'a> {
-    /// Names photo and mask of this size; `None` if they do not come again.
+    /// Key of photo and mask at this size; `None` if they will not be used again.
     pub key: Option<DataKey>,
     /// Camera.
     pub camera: &'a Camera,
@@ -50,13 +50,13 @@ pub struct StepView<'a> {
     pub whole: Option<&'a Camera>,
     /// Near plane, world units.
     pub near: f32,
-    /// Least standard deviation of Gaussians at depth 1, world units.
+    /// Smallest standard deviation of Gaussians at depth 1, world units.
     pub finest: f32,
     /// Photo.
     pub photo: &'a Photo,
-    /// Number of pixels of the photo that count.
+    /// Number of valid photo pixels.
     pub valid_pixels: u64,
-    /// The mask in the layout of the device; empty without a mask.
+    /// The mask in device layout; empty without a mask.
     pub view_labels: &'a [u32],
     /// 1 / known depth of each pixel, 0 for unknown; empty in a step without.
     pub depths: &'a [f32],
@@ -66,7 +66,7 @@ pub struct StepView<'a> {
     pub occluders: &'a Occluders,
 }
 
-/// Returns the least standard deviation of Gaussians at depth 1 that a photo can show.
+/// Returns the smallest standard deviation at depth 1 that a photo can resolve.
 pub(crate) fn finest(camera: &Camera) -> f32 {
     (f64::from(FINEST) / camera.fx.max(camera.fy)) as f32
 }
@@ -75,7 +75,7 @@ pub(crate) fn valid_pixels(photo: &[[u8; 4]]) -> u64 {
     photo.iter().filter(|pixel| pixel[3] > 127).count() as u64
 }
 
-/// The pixels of an object in a view that the label loss uses.
+/// Totals over an object's pixels that the label loss uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectLight {
     /// Sum of r + g + b over these pixels of the photo.
@@ -84,7 +84,7 @@ pub struct ObjectLight {
     pub pixels: u64,
 }
 
-/// Returns the mask in the layout of the device: ids, with [`LABEL_BORDER`] within `border` px of a contour.
+/// Returns the mask in device layout: ids, with [`LABEL_BORDER`] set within `border` px of a contour.
 pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
     let ids = mask.ids.iter().map(|&id| u32::from(id));
     if border == 0 {
@@ -93,7 +93,7 @@ pub(crate) fn view_labels(mask: &LabelMap, border: u32) -> Vec<u32> {
     ids.zip(mask.near_contour(border)).map(|(id, near)| if near { id | LABEL_BORDER } else { id }).collect()
 }
 
-/// Sums light and area of each object. The label loss of an empty layer follows from them.
+/// Sums light and area of each object, which give the label loss of an empty layer.
 pub(crate) fn shown_objects(photo: &[[u8; 4]], view_labels: &[u32]) -> BTreeMap<u16, ObjectLight> {
     let mut objects: BTreeMap<u16, ObjectLight> = BTreeMap::new();
     for (&id, &[r, g, b, valid]) in view_labels.iter().zip(photo) {
@@ -117,7 +117,7 @@ pub(crate) fn layer_weights(input: &StepInput, view: StepView, config: &TrainCon
     areas.into_iter().map(|area| weight(area) as f32).collect()
 }
 
-/// Returns the weighted label loss of a step from the sums of the device.
+/// Returns the weighted label loss of a step from the device's sums.
 pub fn label_loss(input: &StepInput, view: StepView, config: &TrainConfig, loss_label: f32) -> f64 {
     if input.layers.is_empty() {
         return f64::from(loss_label);
@@ -131,7 +131,7 @@ pub fn label_loss(input: &StepInput, view: StepView, config: &TrainConfig, loss_
     (f64::from(loss_label) + empty) / (3.0 * view.valid_pixels.max(1) as f64) * f64::from(label_weight(input, config))
 }
 
-/// Weight of the label loss of a step, which stands for all steps from one turn to the next.
+/// Returns the weight of a step's label loss. It stands for all steps until the next such step.
 fn label_weight(input: &StepInput, config: &TrainConfig) -> f32 {
     let every = if input.layers.is_empty() { config.disagreement_every() } else { config.layer_every() };
     config.label_weight * every.max(1) as f32
@@ -142,18 +142,18 @@ fn alpha_weight(config: &TrainConfig) -> f32 {
     3.0 * config.label_alpha
 }
 
-/// The input of a step, kept until the step is done because it may run again after a buffer has grown.
+/// The input of a step. It is kept until the step is done, because the step may repeat after a buffer has grown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StepInput {
     /// Step, from 1.
     pub step: u32,
-    /// Index of the part of a photo; without bands, that of the training view.
+    /// Index of the photo part; without bands, index of the training view.
     pub part: usize,
     /// Ids of the sampled objects; layer `j` of the render is `layers[j - 1]`. Empty in a step without layers.
     pub layers: Vec<u16>,
-    /// The step has the label passes.
+    /// True if the step has label passes.
     pub labels: bool,
-    /// The step updates the parameters.
+    /// True if the step updates the parameters.
     pub update: bool,
     /// Number of updates, this one included.
     pub updates: u32,
@@ -171,7 +171,7 @@ impl StepInput {
     }
 }
 
-/// Scale of the scene, constant over the training.
+/// Scale of the scene, constant during training.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneScale {
     /// Extent of the scene, world units.
@@ -213,7 +213,7 @@ pub(crate) fn uniforms(
     }
 }
 
-/// Returns the buffers of a step for the device.
+/// Returns the device inputs of a step.
 pub(crate) fn train_input<'a>(
     input: &StepInput,
     view: StepView<'a>,

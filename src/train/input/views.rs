@@ -1,4 +1,4 @@
-//! The training views, at the size of each step.
+//! The training views, at each step's size.
 
 use super::free_space;
 use super::part::PhotoPart;
@@ -15,25 +15,25 @@ use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
-/// Number of sizes below the full one.
+/// Number of sizes below full size.
 const SMALLER_SIZES: u32 = 8;
 
-/// The training views. As a slice, those at full size.
+/// The training views. Derefs to a slice of views at full size.
 #[derive(Debug)]
 pub(in crate::train) struct Views {
     whole: Vec<TrainView>,
-    /// What steps train on.
+    /// Photo parts that steps train on.
     parts: Vec<PhotoPart>,
-    /// Shrunk photos of those in memory, by size and part, until no step in flight uses the size.
+    /// Downscaled in-memory photos, by size and part, kept while steps in flight use the size.
     shrunk: BTreeMap<(u32, usize), Arc<StepPixels>>,
     /// Pixels of the steps in flight.
     ready: BTreeMap<u32, Arc<StepPixels>>,
-    /// Pixels of the next steps, if they are not in memory.
+    /// Prefetched pixels of the next steps, for photos that are not in memory.
     prefetch: Prefetch,
-    /// Other views of each view, with free space on the way; empty without pruning of fog.
+    /// Partner views of each view, with free space between them; empty without fog pruning.
     partners: Vec<Vec<usize>>,
     free_space: bool,
-    /// Refined camera of each view, for work between steps; empty without refinement.
+    /// Refined camera of each view, for jobs between steps; empty without refinement.
     refined: Vec<Camera>,
     start: f64,
     full_from: u32,
@@ -75,18 +75,18 @@ impl Views {
         }
     }
 
-    /// Sets the refined cameras by the rows of their photos.
+    /// Sets the refined cameras from their photos' rows.
     pub(in crate::train) fn refine(&mut self, rows: &[Vec<[f32; 4]>]) {
         let refined = |(view, rows): (&TrainView, &Vec<_>)| poses::corrected(&view.camera, rows);
         self.refined = self.whole.iter().zip(rows).map(refined).collect();
     }
 
-    /// Returns the refined cameras; none without refinement.
+    /// Returns the refined cameras; empty without refinement.
     pub(in crate::train) fn refined(&self) -> &[Camera] {
         &self.refined
     }
 
-    /// Returns the camera of a view for work between steps.
+    /// Returns the camera of a view for jobs between steps.
     pub(in crate::train) fn camera(&self, view: usize) -> &Camera {
         self.refined.get(view).unwrap_or(&self.whole[view].camera)
     }
@@ -100,12 +100,12 @@ impl Views {
         voters.collect()
     }
 
-    /// Returns the parts of the views, each for a step.
+    /// Returns the photo parts, one per step.
     pub(in crate::train) fn parts(&self) -> &[PhotoPart] {
         &self.parts
     }
 
-    /// Leaves only these objects to the object layers of the steps.
+    /// Restricts object layers to these objects.
     pub(in crate::train) fn show_only(&mut self, is_meant: impl Fn(&u16) -> bool) {
         self.parts.iter_mut().for_each(|part| part.objects.retain(&is_meant));
     }
@@ -114,14 +114,14 @@ impl Views {
         self.parts[input.part].view
     }
 
-    /// Returns the camera to which the space is free in a step, and the near plane of all cameras on the way.
+    /// Returns the partner camera of a step, and the near plane of all cameras between the two.
     pub(in crate::train) fn partner(&self, seed: u64, input: &StepInput) -> Option<(&Camera, f32)> {
         let view = self.index(input);
         let partner = free_space::partner(seed, input.step, self.partners.get(view)?)?;
         Some((&self.whole[partner].camera, self.whole[partner].near.min(self.whole[view].near)))
     }
 
-    /// Returns the number of the size of `step`, from 0; [`SMALLER_SIZES`] is the full one.
+    /// Returns the size index of `step`, from 0; [`SMALLER_SIZES`] is full size.
     fn size_at(&self, step: u32) -> u32 {
         if step < self.full_from {
             (u64::from(step) * u64::from(SMALLER_SIZES) / u64::from(self.full_from)) as u32
@@ -141,8 +141,7 @@ impl Views {
         (side_at(full.0, share), side_at(full.1, share))
     }
 
-    /// Gets the pixels of a step at the size of the step, and has those of `next`, the parts of the steps after it,
-    /// made meanwhile.
+    /// Prepares a step's pixels at its size, and prefetches those of `next`, the parts of the following steps.
     pub(in crate::train) fn prepare(&mut self, step: u32, part: usize, next: &[usize]) -> Result<()> {
         // Steps in flight still use their pixels and sizes.
         let oldest = step.saturating_sub(self.frames);
@@ -171,12 +170,12 @@ impl Views {
         Ok(())
     }
 
-    /// Number of steps whose pixels are made ahead.
+    /// Returns the number of steps to prefetch.
     pub(in crate::train) fn steps_ahead(&self) -> usize {
         self.prefetch.steps()
     }
 
-    /// Returns what makes the pixels of a part, the one with this index, at the size of a step.
+    /// Returns the request for the pixels of the part with this index, at a step's size.
     fn request(&self, step: u32, index: usize) -> Request {
         let part = &self.parts[index];
         let view = &self.whole[part.view];
@@ -192,7 +191,7 @@ impl Views {
         }
     }
 
-    /// Returns the part of a step at the size of the step, which [`Self::prepare`] has made.
+    /// Returns a step's view at its size, as prepared by [`Self::prepare`].
     pub(in crate::train) fn step_view(&self, input: &StepInput) -> Result<StepView<'_>> {
         let missing = || Error::Bug(format!("step {} came without its pixels", input.step));
         let (part, ready) = (&self.parts[input.part], self.ready.get(&input.step).ok_or_else(missing)?);
@@ -202,7 +201,7 @@ impl Views {
             camera: &ready.camera,
             whole: part.whole.as_ref(),
             near: view.near,
-            // Of the whole photo, whatever the size of the step.
+            // For the whole photo at full size, whatever the step's size.
             finest: step_input::finest(&view.camera),
             photo: &ready.photo,
             valid_pixels: ready.valid_pixels,

@@ -1,4 +1,4 @@
-//! Choices among a few ways of training.
+//! Enumerated training settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,31 +18,31 @@ pub enum Occlusion {
     File,
 }
 
-/// Whether gains of each photo are trained.
+/// Whether the exposure of each photo is trained.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ExposureMode {
-    /// On if the points of the reconstruction differ in brightness from photo to photo.
+    /// On if the brightness of reconstruction points varies between photos.
     #[default]
     Auto,
-    /// Gains are trained.
+    /// Exposures are trained.
     On,
-    /// All photos have one exposure, as in 3DGS of 2023.
+    /// All photos have the same exposure, as in 3DGS of 2023.
     Off,
 }
 
-/// The rule for the number of Gaussians.
+/// The strategy for the number of Gaussians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum StrategyKind {
-    /// Growth where it helps most, within a budget that rises over the run.
+    /// Growth where it helps most, within a budget that rises during the run.
     #[default]
     Budget,
-    /// Relocation of 3DGS-MCMC: dead Gaussians become copies of others, and faint ones move at random.
+    /// Relocation (3DGS-MCMC): dead Gaussians become copies of others, and faint ones move at random.
     Mcmc,
-    /// Adaptive density control of 3DGS: every large gradient grows.
+    /// Adaptive density control (3DGS): Gaussians with large gradients grow.
     Adc,
 }
 
@@ -51,23 +51,21 @@ pub enum StrategyKind {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum LabelRule {
-    /// The label of the pixels in the step's view where the Gaussian has the largest weight; the last view wins
-    /// (LabelGS).
+    /// The label of pixels in the step's view where the Gaussian has the largest weight; the last view wins (LabelGS).
     Main,
-    /// The label with the largest sum of weights over the pixels of all views, counted every `vote_every` steps and at
-    /// the end.
+    /// The label with the largest sum of weights over all views, counted every `vote_every` steps and at the end.
     #[default]
     Votes,
 }
 
-/// How both moments of Adam of a parameter are kept.
+/// How Adam's two moments of a parameter are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Moments {
-    /// As two numbers of 32 bits.
+    /// Two 32-bit numbers.
     #[default]
     Full,
-    /// As two numbers of 16 bits: their ratio, and the logarithm of the second one.
+    /// Two 16-bit numbers: their ratio, and the logarithm of the second moment.
     Half,
 }

@@ -18,260 +18,255 @@ crate::options! {
         "Training" {
             /// Number of steps, one view each.
             ///
-            /// 7000, as in the short runs of 3DGS; LabelGS has 15000. Schedules and learning rates follow the length.
+            /// Schedules and learning rates adapt to this length. 3DGS uses 7000 in short runs, LabelGS 15000.
             #[cfg_attr(feature = "cli", arg(aliases = ["steps", "iters"]))]
             iterations <"N">: u32 = 7_000, at_least(1);
 
-            /// Size of the photos in the first steps, as a share of their full size; 1 has all steps at full size
-            /// [default: 0.4, for photos above 400 px less: 160 px].
+            /// Photo size in the first steps, as a share of full size; 1 trains at full size throughout [default: 0.4,
+            /// or less for photos above 400 px: 160 px].
             ///
-            /// The size grows up to `full_size_from`. Early steps are rough anyway, and cost in proportion to the
-            /// pixels. 3DGS trains at full size.
+            /// The size grows until `full_size_from`. Early steps are coarse anyway, and smaller photos make them
+            /// cheaper. 3DGS trains at full size.
             start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0), setting;
 
-            /// First step at full size [default: 0.6 of the run, later where the run is short for such large photos].
+            /// First step at full size [default: 0.6 of the run, or later if the run is short for such large photos].
             ///
-            /// Steps before it have no labels.
+            /// Earlier steps have no labels.
             full_size_from <"STEP">: Option<u32> = None, setting;
 
-            /// Seed of all random numbers; the same seed, device and driver give the same model.
+            /// Random seed; the same seed, device and driver give the same model.
             ///
-            /// 0 (LabelGS). It decides the order of views, the sampled objects and the splits.
+            /// It determines view order, sampled objects and splits.
             seed <"S">: u64 = 0, fixed;
 
-            /// Most Gaussians, such as 500k or 2M; 0 leaves the bound to the memory of the device.
+            /// Most Gaussians, such as 500k or 2M; 0 limits them only by device memory.
             ///
-            /// 0. At the bound only the largest gradients grow. Points are thinned to half of it, else to 4 x the
-            ///    budget.
+            /// At the limit, only Gaussians with the largest gradients grow. Initial points are thinned to half of it,
+            /// or to 4 x the budget without a limit.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
 
-            /// Weight of known depths in the loss [default: 0.3 where the reconstruction says which photo shows which
-            /// point, else 0].
+            /// Weight of known depths in the loss [default: 0.3 if the reconstruction knows which photos show its
+            /// points, else 0].
             ///
-            /// Where the photo shows a point, or --depths has a value, light from Gaussians at another depth costs by
-            /// its relative error, at most 1; a mean over these pixels. It falls linearly until the first step with
-            /// labels, and moves opacities only.
+            /// At pixels with a known point or a --depths value, light from Gaussians at another depth is penalised by
+            /// its relative depth error, at most 1. The weight falls linearly until the first step with labels. Only
+            /// opacities are affected.
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed, setting;
 
-            /// Trains a model without aliasing.
+            /// Trains an antialiased model.
             ///
-            /// Smaller pictures of such a model do not shimmer, and views from nearby show no needles: blur takes
-            /// opacity, and no Gaussian is finer than the pixels of its nearest photo (Mip-Splatting). At the size of
-            /// the photos it gains nothing. Viewers that do not know the flag in the model show its fine parts too
-            /// bold.
+            /// Small renders do not shimmer, and close-ups show no needles: blur reduces opacity, and no Gaussian is
+            /// finer than the pixels of its nearest photo (Mip-Splatting). Renders at photo size do not improve.
+            /// Viewers that ignore the model's flag show fine details too bold.
             antialias <"SWITCH">: bool = false, fixed;
 
             /// Degree of the spherical harmonics, 0 to 3.
             ///
-            /// 3 (3DGS). Lower degrees save memory and lose highlights.
+            /// Lower degrees save memory but lose highlights. 3DGS uses 3.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed, setting;
 
-            /// What the optimiser remembers of each parameter: two numbers of 32 bits, or two of 16.
+            /// Precision of the optimiser state: two 32-bit or two 16-bit numbers per parameter.
             ///
-            /// With `half` a model takes 8 bytes a parameter on the device and in checkpoints, not 12, for as good a
-            /// picture; numbers are rounded at random, the same for the same seed. For scenes that do not fit
-            /// otherwise.
+            /// `half` takes 8 instead of 12 bytes per parameter on the device and in checkpoints, at the same quality.
+            /// Use it for scenes that do not fit otherwise. Rounding is random, but reproducible with the same seed.
             moments <"KIND">: Moments = Moments::Full, fixed, setting;
 
             /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
             ///
-            /// 1000 in 3DGS.
+            /// 3DGS uses 1000.
             sh_degree_interval <"STEPS">: Option<u32> = None, at_least(1), setting;
         }
 
         "Rendering" {
-            /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
+            /// Background colour: a name such as white, #rrggbb, or R,G,B from 0 to 1.
             ///
-            /// Black (LabelGS, 3DGS). The label loss always uses black.
+            /// The label loss always uses black.
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
 
-            /// Gives each step a colour of its own behind the scene.
+            /// Uses a new random background colour in every step.
             ///
-            /// What no Gaussian covers then never looks right, so that nothing is left to the background. Transparent
-            /// photos are compared over the same colour. Renders and scores have --background. Off (3DGS, which has the
-            /// choice).
+            /// No background-coloured Gaussians then survive in transparent areas. Transparent photos are composited
+            /// over the same colour. Renders and scores use --background. 3DGS has this option too.
             random_background <"SWITCH">: bool = false, fixed;
 
             /// Trains the exposure and white balance of each photo.
             ///
-            /// The colours of the picture are multiplied by a matrix of its photo; the model has the mean exposure.
+            /// The render's colours are multiplied by a matrix per photo; the model has the mean exposure.
             exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
-            /// Refines the poses of the photos: each is turned and moved while the Gaussians are trained.
+            /// Refines the photos' poses while the Gaussians are trained.
             ///
-            /// For reconstructions whose poses are off by pixels. The refined poses are written beside the model.
+            /// Use it for reconstructions whose poses are off by pixels. The refined poses are written next to the
+            /// model.
             refine_poses <"SWITCH">: bool = false, fixed;
 
             /// Near plane, world units: nearer Gaussians are not drawn.
             ///
-            /// 0 chooses by the scene: 0.2 (3DGS), or a twentieth of the median depth of the first Gaussians if that is
+            /// 0 chooses by the scene: 0.2 (as 3DGS), or a twentieth of the initial Gaussians' median depth if that is
             /// less.
             near <"Z">: f32 = 0.0, not_negative, setting;
         }
 
         "Densification" {
-            /// Rule for the number of Gaussians.
+            /// Strategy for the number of Gaussians.
             strategy <"RULE">: StrategyKind = StrategyKind::Budget, fixed, setting;
 
             /// Prunes Gaussians that fog the cameras.
             ///
-            /// They are nearer than a quarter of all that a camera sees of the first Gaussians, or their deviation is
-            /// more than half their distance from a camera. Off in 3DGS, where such Gaussians stand for the sky and
-            /// other distant things.
+            /// These are Gaussians within a quarter of the distance to the nearest initial Gaussians that a camera
+            /// sees, or with a deviation above half their distance from a camera. 3DGS keeps them, where they may
+            /// represent sky and other distant things.
             free_space <"SWITCH">: bool = true, setting;
 
-            /// Directions around the cameras in which far Gaussians are tried; 0 adds none.
+            /// Directions around the cameras in which to try far Gaussians; 0 adds none.
             ///
-            /// The first Gaussians then stand also for the sky and other distant things without points. Only directions
-            /// in which most photos look past all points get one. 3DGS has none.
+            /// Far Gaussians represent the sky and other distant things without points. Only directions in which most
+            /// photos look past all points get one. 3DGS has none.
             far_points <"N">: u32 = 800, setting;
 
             /// Box in which Gaussians grow, world units: the smaller corner first [default: everywhere].
             ///
-            /// Outside of it Gaussians still train and are pruned, but none is added. It saves time where photos show
-            /// more than what is wanted; `labelgs clean --inside` then drops the rest.
+            /// Gaussians outside still train and are pruned, but none are added. This saves time if photos show more
+            /// than you need; `labelgs clean --inside` then drops the rest.
             #[cfg_attr(feature = "cli", arg(value_parser = corners, allow_hyphen_values = true))]
             grow_box <"x0,y0,z0,x1,y1,z1">: Option<[f64; 6]> = None;
 
             /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
-            /// Gaussians that no photo supports then fade. The strategy adc has no such term.
+            /// It fades Gaussians that no photo supports. Not used by the strategy adc.
             opacity_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Weight of the mean standard deviation in the loss, by the scene extent [default: 0.01 with the strategy
             /// mcmc, else 0].
             ///
-            /// The strategy adc has no such term.
+            /// Not used by the strategy adc.
             scale_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
             ///
-            /// 0 chooses by the size of the photos and the length of the run: `detail` for each pixel of a photo, and
-            /// at most 30 for each step.
+            /// 0 chooses by photo size and run length: `detail` per photo pixel, and at most 30 per step.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
 
-            /// Share of the Gaussians that the strategy budget prunes after growth: those with the least weight in all
+            /// Share of the Gaussians that the strategy budget prunes after growth, those with the least weight in all
             /// photos.
             ///
-            /// They cost time and show little. With 0 none are pruned.
+            /// These cost time and show little. 0 prunes none.
             prune_share <"SHARE">: f64 = 0.3, up_to(0.9), setting;
 
-            /// Share of the Gaussians left by `prune_share` that split, given masks: those most across contours.
+            /// Share of the Gaussians left after `prune_share` that split, given masks, those most across contours.
             ///
-            /// As many more are pruned. Outlines get sharper. With 0, or with `prune_share` 0, none split, as in
-            /// LabelGS.
+            /// Outlines get sharper. As many additional Gaussians are pruned. With 0, or `prune_share` 0, none split,
+            /// as in LabelGS.
             contour_share <"SHARE">: f64 = 0.05, up_to(0.5), setting;
 
-            /// Gaussians for each pixel of the largest photo, for --budget 0.
+            /// Gaussians per pixel of the largest photo, for --budget 0.
             ///
-            /// More make finer detail and cost time.
+            /// Higher values give finer detail and cost time.
             detail <"NUMBER">: f64 = 0.5, positive, setting;
 
             /// Step after which densification starts [default: a twentieth of the run, at most 500].
             ///
-            /// 500 in 3DGS.
+            /// 3DGS uses 500.
             densify_from <"STEP">: Option<u32> = None, setting;
 
             /// Step at which densification stops [default: half of the run].
             ///
-            /// With the strategy adc, the default is at least 1000 steps after `densify_from`.
-            /// Pruning and opacity resets end there too. 3DGS also stops at half of the run (15000 of 30000). LabelGS
-            /// has 40000, the end of its runs: that makes 75 % more Gaussians and slower steps for the same PSNR.
+            /// With the strategy adc, the default is at least 1000 steps after `densify_from`. Pruning and opacity
+            /// resets also end there. 3DGS stops at half of the run too (15000 of 30000). LabelGS continues to the end
+            /// of its runs, which gives 75 % more Gaussians and slower steps at the same PSNR.
             densify_until <"STEP">: Option<u32> = None, setting;
 
             /// Steps between two densifications [default: a thirtieth of the run, from 20 to 100].
             ///
-            /// 100 in 3DGS.
+            /// 3DGS uses 100.
             densify_interval <"STEPS">: Option<u32> = None, at_least(1), setting;
 
             /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
             ///
-            /// 2e-4 (3DGS), in normalised device coordinates. Lower values make more Gaussians.
+            /// In normalised device coordinates, as in 3DGS. Lower values give more Gaussians.
             densify_grad_threshold <"GRADIENT">: f32 = 2e-4, positive, setting;
 
-            /// Steps between two opacity resets; 0 makes none.
+            /// Steps between two opacity resets; 0 for none.
             ///
-            /// 0: after resets (3DGS: every 3000 steps) Gaussians next to the cameras replace the sky and other distant
-            /// things, and views between those cameras look foggy.
+            /// 3DGS resets every 3000 steps. After resets, Gaussians next to the cameras replace sky and other distant
+            /// things, and views between the cameras look foggy.
             opacity_reset_interval <"STEPS">: u32 = 0, setting;
 
             /// Steps without an opacity reset at the end of the run.
             ///
-            /// 1500 (LabelGS).
+            /// LabelGS uses 1500.
             opacity_reset_margin <"STEPS">: u32 = 1500, setting;
         }
 
         "Labels" {
             /// First step with labels [default: 0.6 of the run].
             ///
-            /// From this step on Gaussians get labels, and labels have a loss. LabelGS has 1000; labels from the end of
-            /// densification on cost the picture nothing, and objects are as good.
+            /// From then on, Gaussians get labels and the label loss is active. LabelGS starts at 1000; starting after
+            /// densification does not cost picture quality, and objects are as good.
             label_from <"STEP">: Option<u32> = None, setting;
 
             /// Rule that gives a Gaussian its label.
             ///
-            /// Votes; the rule of the paper is `main`, which uses `label_threshold` and `gpf`.
+            /// The paper's rule is `main`, which uses `label_threshold` and `gpf`.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed, setting;
 
             /// Steps between two counts of votes [default: half of the run].
             vote_every <"STEPS">: Option<u32> = None, at_least(1), setting;
 
-            /// Width of the band along mask contours that is left out, px.
+            /// Width of the band along mask contours to ignore, px.
             ///
-            /// 0: masks count as exact. 2 suits masks of trackers, which work on shrunk photos. Pixels in the band have
-            /// neither votes nor label loss.
+            /// 0 treats masks as exact. Use 2 for tracker masks, which are made on downscaled photos. Pixels in the
+            /// band have neither votes nor label loss.
             mask_border <"PX">: u32 = 0;
 
-            /// Least blending weight with which a pixel gives its label to a Gaussian.
+            /// Smallest blending weight at which a pixel gives its label to a Gaussian.
             ///
-            /// 0.6 (LabelGS). Higher values label fewer Gaussians with more certainty.
+            /// Higher values label fewer Gaussians with more certainty. LabelGS uses 0.6.
             label_threshold <"WEIGHT">: f32 = 0.6, positive_up_to(1.0), setting;
 
             /// Gaussian projection filter: the projected centre must lie in the mask too.
             ///
-            /// On (LabelGS).
+            /// LabelGS uses it.
             gpf <"SWITCH">: bool = true, setting;
 
-            /// Steps between two with object layers; 0 makes none [default: 8; 1 with the label rule main].
+            /// Steps between two steps with object layers; 0 for none [default: 8; 1 with the label rule main].
             ///
-            /// Such a step renders each sampled object alone on black, and compares it with its pixels of the photo,
-            /// without occluders; its label loss counts this many times. 1 is LabelGS, which takes up to twice the
-            /// time. The other steps with labels reduce the weight of wrong labels in the scene's own picture, by
-            /// opacity only.
+            /// Such a step renders each sampled object alone on black, and compares it with its photo pixels, without
+            /// occluders. Its label loss is multiplied by this number. LabelGS uses 1, which takes up to twice the
+            /// time. Other steps with labels penalise wrong labels in the scene's picture, through opacity only.
             layer_every <"STEPS">: Option<u32> = None, fixed, setting;
 
             /// Objects per step.
             ///
-            /// 10 (LabelGS, to bound memory). Each step samples them anew, for labels and label loss.
+            /// Each step samples them anew, for labels and label loss. LabelGS uses 10, to limit memory.
             #[cfg_attr(feature = "cli", arg(value_parser = samples))]
             label_samples <"N|all">: u32 = 10, at_least(1), setting;
 
             /// Weight of the label loss.
             ///
-            /// 0.15 for the sum over the objects of a step. LabelGS's code has 1.0 (the paper gives no value for lambda
-            /// 2); that lowers the quality of the picture and does not improve the objects.
+            /// It weights the sum over a step's objects. LabelGS's code uses 1.0 (the paper gives no value for lambda
+            /// 2), which lowers picture quality without improving objects.
             label_weight <"WEIGHT">: f32 = 0.15, not_negative, setting;
 
-            /// Weighs small objects more per pixel than large ones.
+            /// Weights small objects more per pixel than large ones.
             ///
-            /// Off (LabelGS). On: the weight is proportional to 1 / sqrt(area in the view). With votes, small objects
-            /// survive without it, and it lowers the quality of the picture.
+            /// The weight is proportional to 1 / sqrt(area in the view). With votes, small objects survive without it,
+            /// and it lowers picture quality. LabelGS does not use it.
             label_balance <"SWITCH">: bool = false, setting;
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// 1; LabelGS has none. The term compares the opacity of an object alone with its mask, where that is off
-            /// by more than a half, and not in pixels of other objects. Without it what hides behind other things turns
-            /// black rather than clear, and shows when the object is taken out. Higher weights lower the quality of the
-            /// picture.
+            /// The term compares an object's own opacity with its mask where they differ by more than one half, except
+            /// in pixels of other objects. Without it, hidden parts become black instead of clear, and show when the
+            /// object is extracted. Higher weights lower picture quality. LabelGS has no such term.
             label_alpha <"WEIGHT">: f32 = 1.0, not_negative, setting;
 
             /// Source of the occluders.
             ///
-            /// Rendered depth. The label loss leaves out the pixels of objects in front.
+            /// The label loss ignores pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed, setting;
 
             /// Steps between two updates of the occluders [default: half of the run].
@@ -282,42 +277,43 @@ crate::options! {
             /// Factor of the learning rates of positions, scales, rotations and colours [default: (30000 /
             /// iterations)^0.3, from 1 to 3].
             ///
-            /// The rates are those of 3DGS for 30000 steps; a shorter run has to travel as far in fewer steps.
+            /// The base rates are those of 3DGS for 30000 steps; a shorter run must cover the same distance in fewer
+            /// steps.
             rate_factor <"FACTOR">: Option<f64> = None, positive, setting;
 
-            /// Learning rates at the last step, as a share of those before 0.6 of the run.
+            /// Learning rates at the last step, as a share of the rates before 0.6 of the run.
             ///
-            /// The rates of all parameters fall log-linearly. 3DGS lowers that of positions only.
+            /// All rates fall log-linearly. 3DGS lowers only the position rate.
             rate_final <"SHARE">: f64 = 0.1, positive_up_to(1.0), setting;
 
             /// Initial learning rate of positions, scene extents.
             ///
-            /// 1.6e-4 (3DGS).
+            /// 3DGS uses 1.6e-4.
             position_lr_init <"RATE">: f64 = 1.6e-4, positive, setting;
 
             /// Final learning rate of positions, scene extents.
             ///
-            /// 1.6e-6 (3DGS), at step 30000; log-linear in between.
+            /// Reached at step 30000, log-linearly. 3DGS uses 1.6e-6.
             position_lr_final <"RATE">: f64 = 1.6e-6, positive, setting;
 
             /// Learning rate of the colour of degree 0.
             ///
-            /// 2.5e-3 (3DGS).
+            /// 3DGS uses 2.5e-3.
             feature_lr <"RATE">: f64 = 2.5e-3, not_negative, setting;
 
             /// Learning rate of opacity logits.
             ///
-            /// 0.05 (3DGS of 2023).
+            /// 3DGS of 2023 uses 0.05.
             opacity_lr <"RATE">: f64 = 0.05, not_negative, setting;
 
             /// Learning rate of log-scales.
             ///
-            /// 0.005 (3DGS).
+            /// 3DGS uses 0.005.
             scaling_lr <"RATE">: f64 = 0.005, not_negative, setting;
 
             /// Learning rate of quaternions.
             ///
-            /// 0.001 (3DGS).
+            /// 3DGS uses 0.001.
             rotation_lr <"RATE">: f64 = 0.001, not_negative, setting;
         }
     }

@@ -1,4 +1,4 @@
-//! The settings of a training, and what they say about a step.
+//! Training settings, and their values per step.
 
 mod choices;
 mod config;

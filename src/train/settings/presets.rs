@@ -1,9 +1,9 @@
-//! Whole sets of settings: presets for a newcomer, the schedule of 3DGS, the paper.
+//! Sets of settings: presets, the 3DGS schedule, the paper.
 
 use crate::scene::Gaussians;
 use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
-/// How long and how fine a training is.
+/// Length and quality of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Preset {
@@ -41,7 +41,7 @@ impl TrainConfig {
         }
     }
 
-    /// Returns the settings for what is trained beside a finished model, which is drawn from `near`.
+    /// Returns the settings for trainings that use a finished model, with near plane `near`.
     pub(in crate::train) fn for_finished(model: &Gaussians, near: f32) -> Self {
         Self {
             near,
@@ -54,7 +54,7 @@ impl TrainConfig {
         }
     }
 
-    /// Returns the schedule and the rates of 3DGS, in steps whatever the length of the run.
+    /// Returns the 3DGS schedule and rates, in absolute steps.
     pub fn adc() -> Self {
         Self {
             iterations: 15_000,

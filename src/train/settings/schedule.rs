@@ -1,44 +1,51 @@
-//! The settings of a step: schedules in steps, given or as fractions of the run, and learning rates.
+//! The settings of a step: schedules and learning rates.
 
 use crate::train::{ExposureMode, LabelRule, StrategyKind, TrainConfig};
 
-/// Length of the runs that the learning rates of 3DGS are made for, steps.
+/// Run length that the 3DGS learning rates are meant for, steps.
 const LONG_RUN_STEPS: f64 = 30_000.0;
-/// Rates of a run of N steps are multiplied by (LONG_RUN / N)^RATE_POWER, at most by RATE_MAX.
+/// Exponent of the rate factor. Rates of a run of N steps are multiplied by (LONG_RUN_STEPS / N)^RATE_POWER, at most by
+/// RATE_MAX.
 const RATE_POWER: f64 = 0.3;
+/// Largest rate factor.
 const RATE_MAX: f64 = 3.0;
 /// Share of the run after which the rates fall.
 const RATE_FALL_FROM_SHARE: f64 = 0.6;
-/// Step with the final learning rate of positions: LabelGS keeps that of 3DGS for its 15000 steps.
+/// Step at which the position learning rate is final; LabelGS keeps the 3DGS value for its 15000 steps.
 const POSITION_LR_STEPS: f64 = 30_000.0;
-/// Learning rate of the colours of higher degrees, by that of degree 0 (3DGS).
+/// Divisor of the degree-0 colour rate that gives the rate of higher degrees (3DGS).
 const FEATURE_REST_DIVISOR: f64 = 20.0;
-/// Fewest steps of densification with the strategy of 3DGS.
+/// Fewest densification steps with the 3DGS strategy.
 const ADC_STEPS_MIN: u32 = 1000;
-/// Gaussians of a run by default: at most for each step.
+/// Default budget: most Gaussians per step of the run.
 const GAUSSIANS_PER_STEP_MAX: f64 = 30.0;
-/// Size of the photos in the first steps: share of the full one, and longest side at most, px.
+/// Photo size in the first steps, as a share of full size.
 const START_SIZE_SHARE: f32 = 0.4;
+/// Longest photo side in the first steps, px.
 const START_SIDE_MAX_PX: f32 = 160.0;
-/// Share of the run after which photos have their full size, and that for a run too short to resolve it.
+/// Share of the run after which photos have full size.
 const FULL_SIZE_FROM_SHARE: f64 = 0.6;
+/// The same for a run that is too short to resolve full size.
 const FULL_SIZE_FROM_SHARE_MAX: f64 = 0.9;
-/// Weights of opacity and size in the loss, and the share of the run in which Gaussians relocate (3DGS-MCMC).
+/// Weights of opacity and size in the loss (3DGS-MCMC).
 const REGULARISER_WEIGHT: f64 = 0.01;
+/// Share of the run in which Gaussians relocate (3DGS-MCMC).
 const RELOCATE_UNTIL_SHARE: f64 = 25.0 / 30.0;
-/// Share of the run after which Gaussians with little weight are pruned, and those across contours split: soon after
-/// growth, so that the others adapt.
+/// Share of the run after which Gaussians with little weight are pruned, and those across contours split. It is soon
+/// after growth, so that the others can adapt.
 const EXCHANGE_AT_SHARE: f64 = 0.55;
 
-/// Steps between two with object layers. Only these see the hidden parts of objects, and they cost up to twice as much.
+/// Interval between steps with object layers. Only these steps see hidden parts of objects, and they cost up to twice
+/// as much.
 const LAYER_STEP_INTERVAL: u32 = 8;
-/// Steps between two with the disagreement of labels, which counts for those between.
+/// Interval between steps with label disagreement, which is weighted accordingly.
 const DISAGREEMENT_STEP_INTERVAL: u32 = 2;
-/// Shares of the run between two counts of votes, and between two searches for occluders. Both walk all views, so a run
-/// of default settings has one of each when labels start, and votes at the end.
+/// Interval between vote counts, as a share of the run. Counting visits all views, so by default it happens when labels
+/// start and at the end.
 const VOTE_INTERVAL_SHARE: f64 = 0.5;
+/// Interval between searches for occluders, as a share of the run, for the same reason.
 const OCCLUSION_INTERVAL_SHARE: f64 = 0.5;
-/// Share of a run after which known depths have no weight.
+/// Share of the run after which known depths have no weight.
 const DEPTHS_UNTIL_SHARE: f64 = 0.6;
 
 /// Learning rates of a step.
@@ -59,7 +66,7 @@ pub struct Rates {
 }
 
 impl TrainConfig {
-    /// Returns a share of the run, steps.
+    /// Returns a share of the run in steps.
     fn share(&self, share: f64) -> u32 {
         (share * f64::from(self.iterations)).round() as u32
     }
@@ -69,7 +76,7 @@ impl TrainConfig {
         self.rate_factor.unwrap_or(derived)
     }
 
-    /// Returns the factor by which all rates have fallen at `step`.
+    /// Returns the decay factor of all rates at `step`.
     pub(in crate::train) fn rate_fall(&self, step: u32) -> f64 {
         let from = self.share(RATE_FALL_FROM_SHARE);
         let late = f64::from(step.saturating_sub(from)) / f64::from((self.iterations - from).max(1));
@@ -123,29 +130,29 @@ impl TrainConfig {
         step >= self.labels_from()
     }
 
-    /// Returns the first step with labels; steps on small photos have none.
+    /// Returns the first step with labels; steps on downscaled photos have none.
     pub fn labels_from(&self) -> u32 {
         self.label_from.unwrap_or(self.share(0.6)).max(self.full_size_from())
     }
 
-    /// Returns the steps between two with object layers; 0 without any.
+    /// Returns the interval of steps with object layers; 0 for none.
     pub fn layer_every(&self) -> u32 {
         self.layer_every.unwrap_or(if self.label_rule == LabelRule::Main { 1 } else { LAYER_STEP_INTERVAL })
     }
 
-    /// Returns true for steps with labels that render objects alone.
+    /// Returns true for steps with labels that also render objects alone.
     pub fn has_layers_at(&self, step: u32) -> bool {
         self.layer_every() > 0 && self.is_label_turn(step, self.layer_every())
     }
 
-    /// Returns the steps between two with the disagreement of labels; the paper's rule lifts labels in each step.
+    /// Returns the interval of steps with label disagreement; the paper's rule lifts labels in every step.
     pub fn disagreement_every(&self) -> u32 {
         if self.label_rule == LabelRule::Main { 1 } else { DISAGREEMENT_STEP_INTERVAL }
     }
 
-    /// Returns true for steps with labels that have their disagreement, if they have no object layers.
+    /// Returns true for steps with label disagreement, if they have no object layers.
     pub fn has_disagreement_at(&self, step: u32) -> bool {
-        // From the second one on, because the first has layers.
+        // Starts with the second step with labels, because the first has layers.
         self.labels_at(step) && self.is_label_turn(step + 1, self.disagreement_every())
     }
 
@@ -181,26 +188,26 @@ impl TrainConfig {
         self.densify_from.unwrap_or(self.share(0.05).min(500))
     }
 
-    /// Returns the Gaussians that photos of a size ask for, however long the run is.
+    /// Returns the number of Gaussians suitable for a photo size, regardless of run length.
     fn pixel_budget(&self, (width, height): (u32, u32)) -> f64 {
         self.detail * f64::from(width) * f64::from(height)
     }
 
-    /// Returns the budget for photos of a size of a run that is long enough; none with a strategy that has no budget.
+    /// Returns the budget for a photo size in a run that is long enough; `None` for strategies without a budget.
     pub(in crate::train) fn full_budget(&self, size: (u32, u32)) -> Option<u64> {
         let budget = if self.budget > 0 { self.budget } else { self.pixel_budget(size).max(1.0) as u64 };
         (self.strategy != StrategyKind::Adc).then_some(budget)
     }
 
-    /// Returns the settings with what they leave open: by the size of the photos budget, first size and first step at
-    /// full size; and the steps between two with object layers.
+    /// Decides open settings: budget, first photo size and first step at full size by the photo size, and the interval
+    /// of object layers.
     pub fn for_size(&self, (width, height): (u32, u32)) -> Self {
         let by_pixels = self.pixel_budget((width, height));
         let by_steps = GAUSSIANS_PER_STEP_MAX * f64::from(self.iterations);
         let budget = if self.budget > 0 { self.budget } else { by_pixels.min(by_steps).max(1.0) as u64 };
         let start_size =
             self.start_size.unwrap_or(START_SIZE_SHARE.min(START_SIDE_MAX_PX / width.max(height).max(1) as f32));
-        // Side of the size that as many Gaussians can resolve as the steps allow, as a share of the full one.
+        // Photo side that the number of Gaussians allowed by the steps can resolve, as a share of full size.
         let resolved = (by_steps / by_pixels).min(1.0).sqrt();
         let derived = self.share(resolved * FULL_SIZE_FROM_SHARE + (1.0 - resolved) * FULL_SIZE_FROM_SHARE_MAX);
         let full_size_from = Some(self.full_size_from.unwrap_or(derived));
@@ -208,7 +215,7 @@ impl TrainConfig {
         Self { budget, start_size: Some(start_size), full_size_from, layer_every, ..self.clone() }
     }
 
-    /// Takes over what the beginning of a run has decided, where the settings leave it open.
+    /// Takes over what the start of the run decided, where the settings are open.
     pub(crate) fn keep_decided(&mut self, then: &Self) {
         self.near = if self.near == 0.0 { then.near } else { self.near };
         self.budget = if self.budget == 0 { then.budget } else { self.budget };
@@ -233,7 +240,7 @@ impl TrainConfig {
 
     /// Returns the step at which densification stops.
     pub fn densify_until(&self) -> u32 {
-        // The schedule of 3DGS starts late, whatever the length of the run.
+        // The 3DGS schedule starts late, whatever the run length.
         let least =
             if self.strategy == StrategyKind::Adc { self.densify_from().saturating_add(ADC_STEPS_MIN) } else { 0 };
         self.densify_until.unwrap_or(self.share(0.5).max(least))
@@ -262,7 +269,7 @@ impl TrainConfig {
         step >= self.densify_until() && step.is_multiple_of(2 * self.densify_interval())
     }
 
-    /// Returns true for the step after which Gaussians with little weight make room for others.
+    /// Returns true for the step after which Gaussians with little weight are replaced.
     pub fn exchanges_at(&self, step: u32) -> bool {
         step == self.share(EXCHANGE_AT_SHARE) && self.prune_share > 0.0
     }

@@ -1,4 +1,4 @@
-//! The model that a training starts from.
+//! The initial model of a training.
 
 use super::{engine_size, for_photos};
 use crate::error::{Result, Setting};
@@ -7,20 +7,19 @@ use crate::scenes::init;
 use crate::train::{StrategyKind, TrainConfig};
 use std::borrow::Cow;
 
-/// Random Gaussians for a scene without points: at most this many, and this share of the budget, so that growth chooses
-/// the places of the others.
+/// Most random Gaussians in a scene without points.
 const RANDOM_GAUSSIANS_MAX: u64 = 50_000;
+/// Largest share of the budget for them, so that growth chooses the positions of the others.
 const RANDOM_BUDGET_SHARE_MAX: f64 = 0.25;
-/// Most points, in budgets: more Gaussians than that show little more and cost as much time each.
+/// Most initial points, in multiples of the budget: more Gaussians add little but cost time.
 const POINT_BUDGETS_MAX: u64 = 4;
-/// First opacity with the strategy mcmc, and factor of the first deviations. 3DGS-MCMC has 0.5 and 0.1; its long runs
-/// have the time to grow.
+/// Initial opacity with the strategy mcmc, as in 3DGS-MCMC.
 const MCMC_OPACITY: f32 = 0.5;
+/// Factor of the initial deviations. 3DGS-MCMC has 0.1, but its long runs have time to grow.
 const MCMC_SIZE_FACTOR: f32 = 0.3;
 
-/// Makes the initial Gaussians of a training: at the points of the scene or at random places, and far ones. Points
-/// beyond `max_gaussians`, or far beyond the budget without it, are thinned evenly; half of `max_gaussians` is left for
-/// growth.
+/// Makes the initial Gaussians: at the scene's points or at random positions, plus far ones. Points are thinned evenly
+/// to half of `max_gaussians`, which leaves room for growth, or else to a multiple of the budget.
 pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians> {
     let random = match config.strategy {
         StrategyKind::Adc => RANDOM_GAUSSIANS_MAX,
@@ -38,8 +37,8 @@ pub fn first_model(dataset: &Dataset, config: &TrainConfig) -> Result<Gaussians>
     Ok(model)
 }
 
-/// Returns the points of the scene for the first Gaussians: all, or as many as their number may be. More would cost
-/// time and memory, and the photos have too few pixels to tell them apart.
+/// Returns the scene's points for the initial Gaussians: all, or as many as allowed. More would cost time and memory,
+/// and the photos have too few pixels to resolve them.
 fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Point]>> {
     let (all, far) = (dataset.points.len() as u64, u64::from(config.far_points));
     let (width, height) = engine_size(dataset, config, 0)?.image;
@@ -50,12 +49,12 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
             (budget.saturating_mul(POINT_BUDGETS_MAX), format!("{} is {budget}", Setting("budget")))
         }
         (0, Some(budget)) => {
-            let why = format!("photos of {width} x {height} px ask for {budget} Gaussians");
+            let why = format!("photos of {width} x {height} px need {budget} Gaussians");
             (budget.saturating_mul(POINT_BUDGETS_MAX), why)
         }
         (bound, _) if all <= bound => return Ok(Cow::Borrowed(&dataset.points)),
         (bound, budget) => {
-            // Without growth, far ones alone need room.
+            // Without growth, only far Gaussians need room.
             let room = if budget.is_some_and(|budget| budget < bound) { far.min(bound / 2) } else { bound / 2 };
             (bound - room, format!("{} is {bound}", Setting("max_gaussians")))
         }
@@ -65,17 +64,17 @@ fn points<'a>(dataset: &'a Dataset, config: &TrainConfig) -> Result<Cow<'a, [Poi
     }
     let enough = all + far;
     tracing::warn!(
-        "{all} points, and {why}: {most} of them are used, spread evenly; {} uses all",
+        "{all} points, but {why}; using {most} of them, evenly spread; {} uses all",
         Setting("max_gaussians").to(enough)
     );
     Ok(Cow::Owned(init::thinned(&dataset.points, most as usize)))
 }
 
-/// Fits a trained model and the settings to each other: the training goes on with all that the model has. The schedules
-/// of a new model, which begin with small pictures and one band of colour, would first spoil it.
+/// Adapts a trained model and the settings to each other, so that training continues with the full model. The schedules
+/// for new models, which start with small photos and degree 0, would degrade it first.
 pub(crate) fn go_on_from(mut model: Gaussians, dataset: &Dataset, config: &TrainConfig) -> (Gaussians, TrainConfig) {
     if model.labels.is_some() && dataset.train.iter().all(|view| view.mask.is_none()) {
-        tracing::warn!("the labels of the first model are lost, because the scene has no masks");
+        tracing::warn!("the initial model's labels are dropped, because the scene has no masks");
         (model.labels, model.label_confidence) = (None, None);
     }
     thin(&mut model, config.max_gaussians);
@@ -92,11 +91,11 @@ fn thin(model: &mut Gaussians, bound: u64) {
     let count = model.len() as u64;
     if bound > 0 && count > bound {
         tracing::warn!(
-            "{count} initial Gaussians, and {} is {bound}: every {:.1}-th is used",
+            "{count} initial Gaussians, but {} is {bound}; using every {:.1}-th",
             Setting("max_gaussians"),
             count as f64 / bound as f64
         );
-        // Keep row i if `i * bound / count` steps up there.
+        // Keep row i if `i * bound / count` increases there.
         *model = model.filtered(|row| row as u64 * bound / count != (row as u64 + 1) * bound / count);
     }
 }

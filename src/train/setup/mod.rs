@@ -1,4 +1,4 @@
-//! The inputs of a training: options, sizes, views.
+//! Sets up a training: options, sizes, views.
 
 pub(in crate::train) mod first_model;
 pub(crate) mod near_plane;
@@ -25,19 +25,19 @@ use std::sync::Arc;
 /// Options of a trainer besides its configuration.
 #[derive(Debug, Default)]
 pub struct TrainerOptions {
-    /// Shape of the kernels; none takes the default of the device.
+    /// Shape of the kernels; `None` takes the device's default.
     pub shape: Option<KernelShape>,
     /// Options of the engine.
     pub scheduler: SchedulerOptions,
-    /// What is trained, by which losses.
+    /// Trained parameters and losses.
     pub objective: Objective,
-    /// The strategy for the number of Gaussians; none takes that of the objective and the configuration.
+    /// The strategy for the number of Gaussians; `None` takes that of objective and configuration.
     pub strategy: Option<Box<dyn Strategy>>,
     /// Parameters of the scene or of photos.
     pub shared: SharedSet,
-    /// The part of the scene that is trained; none for all of it.
+    /// The region of the scene to train; `None` for the whole scene.
     pub region: Option<Region>,
-    /// Depths that each training photo is known to have; none with a weight of 0.
+    /// Known depths of each training photo; empty with a weight of 0.
     pub depths: Vec<KnownDepths>,
 }
 
@@ -51,7 +51,7 @@ impl From<SchedulerOptions> for TrainerOptions {
 pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> Result<EngineSize> {
     let sizes = dataset.train.iter().chain(&dataset.test).map(|view| (view.camera.width, view.camera.height));
     let image = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
-    let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no view to train on"))?;
+    let image = image.ok_or_else(|| Error::data(&dataset.root, "", "the scene has no training views"))?;
     let of_views: Vec<Vec<u16>> =
         dataset.train.iter().filter_map(|view| view.mask.as_ref().map(Pixels::objects)).collect();
     let most = of_views.iter().map(Vec::len).max();
@@ -68,13 +68,12 @@ pub fn engine_size(dataset: &Dataset, config: &TrainConfig, gaussians: u64) -> R
     Ok(size.with_half_moments(config.moments == Moments::Half))
 }
 
-/// Sets what the settings leave to the photos.
+/// Decides settings that depend on the photos.
 pub(in crate::train) fn for_photos(config: &TrainConfig, dataset: &Dataset) -> Result<TrainConfig> {
     Ok(config.for_size(engine_size(dataset, config, 0)?.image))
 }
 
-/// Makes the initial sizes: for twice the number of Gaussians of the first model, or for that number if memory is
-/// short.
+/// Returns the initial sizes: for twice the initial Gaussians, or for exactly that number if memory is short.
 pub(crate) fn start_size(
     gpu: &Gpu,
     dataset: &Dataset,
@@ -96,7 +95,7 @@ pub(crate) fn start_size(
     }
 }
 
-/// Returns the error of sizes that do not fit, if they do with packed moments.
+/// Improves the error of sizes that do not fit, if they fit with packed moments.
 fn propose_half(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Option<Error> {
     let error = Engine::predict(gpu, size, options).err()?;
     let fits = !size.half_moments && Engine::predict(gpu, &size.with_half_moments(true), options).is_ok();
@@ -109,8 +108,8 @@ fn propose_half(gpu: &Gpu, size: &EngineSize, options: SchedulerOptions) -> Opti
     }
 }
 
-/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` are known depths of each
-/// view, or none.
+/// Makes the training views of a data set, and their parts of at most `most` rows. `depths` has the known depths of
+/// each view, or is empty.
 pub(in crate::train) fn train_views(
     dataset: &Dataset,
     depths: Vec<KnownDepths>,
@@ -155,7 +154,7 @@ fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> 
     Ok((view, parts))
 }
 
-/// The layout of the device of a mask that is not in memory.
+/// Device layout of a mask that is not in memory, made on demand.
 #[derive(Debug)]
 struct LazyViewLabels {
     mask: Pixels<LabelMap>,

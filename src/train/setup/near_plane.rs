@@ -1,22 +1,23 @@
-//! The near plane of a scene.
+//! Chooses the near plane of a scene.
 
 use crate::scene::{Camera, Gaussians};
 use glam::DVec3;
 
 pub(crate) use crate::render::NEAR_DEFAULT;
 
-/// The near plane of a small scene, in median depths of its Gaussians.
+/// Near plane of a small scene, as a share of the median depth of its Gaussians.
 const NEAR_DEPTH_SHARE: f64 = 0.05;
-/// Number of cameras and of Gaussians in the sample, evenly chosen.
+/// Most cameras in the sample, evenly chosen.
 const SAMPLE_CAMERAS_MAX: usize = 64;
+/// Most Gaussians in the sample, evenly chosen.
 const SAMPLE_GAUSSIANS_MAX: usize = 4096;
 
-/// Returns the places of at most `most` Gaussians, evenly chosen.
+/// Returns the positions of at most `most` Gaussians, evenly chosen.
 pub(in crate::train) fn sample(model: &Gaussians, most: usize) -> Vec<DVec3> {
     (0..model.len()).step_by(model.len().div_ceil(most).max(1)).map(|row| model.world(row)).collect()
 }
 
-/// Returns the depths of the places that are in the picture of a camera.
+/// Returns the depths of the positions that a camera sees.
 pub(in crate::train) fn seen_depths(camera: &Camera, places: &[DVec3]) -> Vec<f64> {
     let is_seen = |place: &DVec3| {
         let at = camera.project(*place);
@@ -26,7 +27,7 @@ pub(in crate::train) fn seen_depths(camera: &Camera, places: &[DVec3]) -> Vec<f6
     places.iter().map(|&world| camera.to_camera(world)).filter(is_seen).map(|place| place.z).collect()
 }
 
-/// Returns [`NEAR_DEFAULT`], or [`NEAR_DEPTH_SHARE`] times the median depth of the first Gaussians in the training
+/// Returns [`NEAR_DEFAULT`], or [`NEAR_DEPTH_SHARE`] times the median depth of the initial Gaussians in the training
 /// cameras if that is less.
 pub(crate) fn near_plane<'a>(cameras: impl ExactSizeIterator<Item = &'a Camera>, model: &Gaussians) -> f32 {
     let (rows, every) = (sample(model, SAMPLE_GAUSSIANS_MAX), cameras.len().div_ceil(SAMPLE_CAMERAS_MAX).max(1));

@@ -1,25 +1,26 @@
-//! A part of a scene that is trained alone, in the light of the rest.
+//! A region of a scene that is trained alone, with the rest frozen.
 
 use crate::error::{Error, Result};
 use crate::scene::{Gaussians, Zone};
 use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
-/// A part of a larger scene. Its first model has the Gaussians of the part, then others that are drawn and not trained.
+/// A region of a larger scene. Its first model has the region's Gaussians, followed by frozen Gaussians that are drawn
+/// but not trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// Number of Gaussians at the end of the model that stay as they are.
+    /// Number of frozen Gaussians at the end of the model.
     pub frozen: u32,
     /// Where Gaussians grow.
     pub zone: Zone,
-    /// Extent of the whole scene, world units: learning rates and limits of size follow from it.
+    /// Extent of the whole scene, world units, on which learning rates and size limits depend.
     pub extent: f64,
-    /// Exposures of photos, by name, that stay as they are; empty for none.
+    /// Fixed exposures of photos, by name; may be empty.
     pub exposures: BTreeMap<String, exposure::Rows>,
 }
 
 impl Region {
-    /// Returns the frozen Gaussians of a training.
+    /// Returns the number of frozen Gaussians of a training.
     pub(in crate::train) fn frozen(region: Option<&Self>) -> u32 {
         region.map_or(0, |region| region.frozen)
     }
@@ -30,6 +31,9 @@ impl Region {
         if (frozen as usize) < all {
             return Ok(());
         }
-        Err(Error::usage("frozen", format!("is {frozen}, and the first model has {all} Gaussians: none is trained")))
+        Err(Error::usage(
+            "frozen",
+            format!("is {frozen}, but the first model has only {all} Gaussians, so none would be trained"),
+        ))
     }
 }

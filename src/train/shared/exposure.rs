@@ -1,10 +1,9 @@
-//! Exposure and white balance of each photo: a matrix of colours, trained beside the Gaussians.
+//! Exposure and white balance of each photo: a colour matrix, trained together with the Gaussians.
 //!
-//! A camera that chooses its exposure shows the same surface brighter in one photo than in another, and other light
-//! gives it other colours. Without a matrix, Gaussians near the cameras make up for it, which spoils other views. The
-//! colours of the picture of a step are multiplied by the matrix of its photo before the loss: gains of red, green and
-//! blue, after each has taken a share of the other two. The mean of all numbers over the photos stays near 0, so that
-//! the model has the mean exposure.
+//! With automatic exposure, the same surface is brighter in some photos than in others, and its colour varies with the
+//! light. Without a matrix, Gaussians near the cameras compensate for this, which degrades other views. Before the
+//! loss, the picture's colours are multiplied by the photo's matrix: each channel takes a share of the other two, then
+//! gets a gain. The mean of all values over the photos stays near 0, so that the model has the mean exposure.
 
 use super::{RowOffsets, SharedLayout, SharedParameters};
 use crate::Setting;
@@ -15,10 +14,10 @@ use crate::train::strategy::StepContext;
 use crate::train::{ExposureMode, TrainConfig};
 use std::sync::Arc;
 
-/// Learning rate of ln gain and of shares. A photo has one update for each of its turns, some dozens in a short run.
+/// Learning rate of ln gain and of shares. A photo gets only some dozens of updates in a short run.
 const LEARNING_RATE: f64 = 0.01;
-/// Root mean square of ln gain over the photos from which their exposures differ. Captures with a fixed exposure have
-/// up to 0.04, by what shines and by noise.
+/// Smallest root mean square of ln gain at which exposures count as different. Captures with fixed exposure have up to
+/// 0.04, because of reflections and noise.
 const SPREAD_MIN: f64 = 0.07;
 /// Share of the photos whose gains must be known for a decision.
 const KNOWN_SHARE_MIN: f64 = 0.5;
@@ -26,13 +25,13 @@ const KNOWN_SHARE_MIN: f64 = 0.5;
 /// Name of the parameters.
 pub(in crate::train) const EXPOSURE_NAME: &str = "exposure";
 
-/// Gains of a photo, r, g, b; `None` where nothing tells them.
+/// Gains of a photo, r, g, b; `None` if unknown.
 pub(crate) type Gains = Option<[f64; 3]>;
 
 /// Rows of a photo (glsl/include/exposure.glsl).
 pub(crate) type Rows = [[f32; 4]; EXPOSURE_ROWS as usize];
 
-/// Returns the matrix of the rows of a photo.
+/// Converts a photo's rows to a matrix.
 pub(in crate::train) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
     let mut matrix = [[0.0; 3]; 3];
     for (k, of) in matrix.iter_mut().enumerate() {
@@ -48,8 +47,8 @@ pub(in crate::train) fn matrix_of(rows: &[[f32; 4]]) -> ColourMatrix {
     matrix
 }
 
-/// Returns the rows of a photo that have a matrix; `None` for one that no training writes: each channel takes less than
-/// [`EXPOSURE_SHARE`] of each other one, and its numbers have a positive sum.
+/// Converts a matrix to a photo's rows; `None` for matrices that no training can produce: each channel takes less than
+/// [`EXPOSURE_SHARE`] of each other channel, and its values have a positive sum.
 pub(crate) fn rows_of(matrix: &ColourMatrix) -> Option<Rows> {
     let mut rows = Rows::default();
     for (k, of) in matrix.iter().enumerate() {
@@ -86,7 +85,7 @@ impl Exposure {
         Self { start: logs.iter().map(row).collect(), is_fixed: false }
     }
 
-    /// Makes rows that stay as they are; a photo without them has the colours of the scene.
+    /// Makes fixed rows; photos without rows have the scene's colours.
     pub fn fixed<'a>(rows: impl Iterator<Item = Option<&'a Rows>>) -> Self {
         Self { start: rows.map(|rows| rows.copied().unwrap_or_default()).collect(), is_fixed: true }
     }
@@ -99,7 +98,7 @@ fn spread(gains: &[Gains]) -> Option<f64> {
     enough.then(|| (known.iter().sum::<f64>() / known.len() as f64).sqrt())
 }
 
-/// Returns the settings with `auto` decided by the gains of the photos, and says why.
+/// Decides `auto` by the gains of the photos, and logs the reason.
 pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
     if config.exposure != ExposureMode::Auto {
         return config.clone();
@@ -108,7 +107,7 @@ pub fn decided(config: &TrainConfig, gains: &[Gains]) -> TrainConfig {
         _ if config.random_background => ExposureMode::Off,
         Some(spread) if spread >= SPREAD_MIN => {
             tracing::info!(
-                "exposure: on, because the photos' brightness differs by {:.0} %; set {} to train without",
+                "exposure: on, because brightness differs between photos by {:.0} %; set {} to train without it",
                 100.0 * spread,
                 Setting("exposure").to("off")
             );

@@ -1,10 +1,10 @@
 //! Parameters that belong to no Gaussian: of the whole scene, such as a background, or of each photo, such as its
-//! exposure. They are rows of four numbers. Steps train them beside the Gaussians, with the same optimiser, and
+//! exposure. They are rows of four numbers. Steps train them together with the Gaussians, with the same optimiser, and
 //! checkpoints store them.
 //!
 //! A step uses the rows of the scene and of its photo. All other rows keep their values and moments. The bias
-//! correction of a row counts its own updates, so that the first update of a photo has the right length however late it
-//! comes.
+//! correction of a row counts the row's own updates, so that a photo's first update has the right length, however late
+//! it happens.
 
 pub mod exposure;
 pub mod poses;
@@ -24,7 +24,7 @@ use std::fmt::Debug;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Number of rows: first those of the scene, then those of each training view in turn.
+/// Numbers of rows: first the scene's rows, then those of each training view in turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SharedLayout {
@@ -55,19 +55,19 @@ impl SharedLayout {
     }
 }
 
-/// Where the rows of one owner are.
+/// Offsets of one owner's rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RowOffsets {
-    /// The first of its rows of the scene among those of a step.
+    /// Offset of its scene rows among a step's rows.
     pub scene: u32,
-    /// The first of its rows of the photo among those of a step.
+    /// Offset of its photo rows among a step's rows.
     pub photo: u32,
-    /// Rows of all owners.
+    /// Layout of all owners' rows.
     pub all: SharedLayout,
 }
 
-/// Parameters to train besides the Gaussians. All results must be functions of the arguments: a step is repeated after
-/// a buffer has grown, and a resumed training calls again.
+/// Parameters to train besides the Gaussians. All results must be functions of the arguments, because steps are
+/// repeated after a buffer has grown, and a resumed training calls these functions again.
 pub trait SharedParameters: Debug + Send {
     /// Returns the name for checkpoints.
     fn name(&self) -> &'static str;
@@ -78,16 +78,16 @@ pub trait SharedParameters: Debug + Send {
     /// Returns the initial rows of a view, or of the scene for `None`.
     fn start(&self, view: Option<usize>) -> Vec<[f32; 4]>;
 
-    /// Returns the learning rates of the rows of a step: those of the scene, then those of its photo. A row with rates
+    /// Returns the learning rates of a step's rows: first the scene's, then the photo's. A row with rates
     /// of 0 keeps its values and moments in this step.
     fn rates(&self, at: StepContext) -> Vec<[f32; 4]>;
 
-    /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the rows of the step and `Buf::SHARED` their
-    /// values. The passes write the gradients to the same rows of `Buf::V_SHARED`, which are 0 before.
+    /// Returns the passes of every step; called once. `Buf::STEP_ROWS` has the step's rows and `Buf::SHARED` their
+    /// values. The passes write gradients to the same rows of `Buf::V_SHARED`, which are 0 initially.
     fn extension(&self, place: RowOffsets) -> Arc<dyn Extension>;
 }
 
-/// The shared parameters of a training. The default has none and costs nothing.
+/// The shared parameters of a training; none by default.
 #[derive(Debug, Default)]
 pub struct SharedSet(Vec<Box<dyn SharedParameters>>);
 
@@ -98,8 +98,8 @@ impl<P: SharedParameters + 'static> From<P> for SharedSet {
 }
 
 impl SharedSet {
-    /// Returns the parameters that the configuration asks for. `gains` are the first gains of each photo.
-    /// Those of a region stay.
+    /// Returns the parameters that the configuration asks for. `gains` are the initial gains of each photo. Exposures
+    /// of a region are fixed.
     pub(crate) fn from_config(
         config: &TrainConfig,
         gains: &[Gains],
@@ -119,7 +119,7 @@ impl SharedSet {
         Self(all)
     }
 
-    /// Returns the parameters, or those that the configuration asks for.
+    /// Returns these parameters, or else those that the configuration asks for.
     pub(in crate::train) fn or_of(self, config: &TrainConfig, dataset: &Dataset, region: Option<&Region>) -> Self {
         if self.0.is_empty() { Self::from_config(config, &[], dataset, region) } else { self }
     }
@@ -128,7 +128,7 @@ impl SharedSet {
         self.0.iter().fold(SharedLayout::default(), |all, of| all.and(of.layout()))
     }
 
-    /// Returns each owner with the place of its rows.
+    /// Returns each owner with the offsets of its rows.
     fn placed(&self) -> impl Iterator<Item = (&dyn SharedParameters, RowOffsets)> {
         let all = self.layout();
         let mut before = SharedLayout::default();
@@ -139,7 +139,7 @@ impl SharedSet {
         })
     }
 
-    /// Returns the rows of an owner among those of a photo.
+    /// Returns the range of an owner's rows among a photo's rows.
     pub(in crate::train) fn photo_rows(&self, name: &str) -> Option<Range<usize>> {
         let (of, place) = self.placed().find(|(of, _)| of.name() == name)?;
         let first = (place.photo - place.all.scene) as usize;

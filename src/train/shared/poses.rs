@@ -1,9 +1,9 @@
-//! Poses of the photos: a correction of each, trained beside the Gaussians.
+//! Pose correction of each photo, trained together with the Gaussians.
 //!
-//! Poses of a reconstruction may be off by pixels, which blurs the model. The camera of a step is turned and moved by
-//! the correction of its photo. Photos together leave place and turn of the whole open, and hardly tell slow bends of a
-//! path of cameras; a weak pull to 0 holds both. Trained are six numbers of each photo; its preconditioner makes a pose
-//! of them.
+//! Poses of a reconstruction may be off by pixels, which blurs the model. The step's camera is rotated and translated
+//! by the photo's correction. The photos do not determine position and rotation of the whole, and hardly constrain slow
+//! bends of a camera path; a weak pull to 0 stabilises both. Each photo has six trained numbers, which its
+//! preconditioner converts to a pose.
 
 use super::preconditioner::{self, Matrix};
 use super::{RowOffsets, SharedLayout, SharedParameters};
@@ -16,19 +16,19 @@ use std::sync::Arc;
 
 /// Name of the parameters.
 pub(in crate::train) const POSES_NAME: &str = "poses";
-/// Rows of a photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
+/// Rows per photo (glsl/include/pose.glsl): two of trained numbers, twelve of the preconditioner.
 pub(crate) const ROWS_PER_PHOTO: usize = 14;
-/// Learning rate in the beginning, focal lengths that points move in the photo. The updates of a short run, some dozens
-/// a photo, reach a degree and a fiftieth of the depth. The rate falls to the share [`LEARNING_RATE_FALL`] of itself.
+/// Initial learning rate: movement of points in the photo, in focal lengths. The some dozens of updates per photo in a
+/// short run can reach a degree and a fiftieth of the depth. The rate falls to the share [`LEARNING_RATE_FALL`] of
+/// itself.
 const LEARNING_RATE_START: f64 = 2e-3;
 const LEARNING_RATE_FALL: f64 = 0.02;
-/// Share of the run before the first update: Gaussians have no colours of their own yet.
+/// Share of the run before the first update: earlier, Gaussians have no useful colours.
 const FIRST_UPDATE_SHARE: f64 = 0.08;
-/// Shares of the run after which photos are compared with each other. A pose that this settles has no gradient any
-/// more.
+/// Shares of the run after which photos are compared with each other. Poses settled this way get no more gradients.
 const COMPARISON_SHARES: [f64; 3] = [0.2, 0.35, 0.5];
 
-/// Corrections of the poses, 0 in the beginning.
+/// Pose corrections, initially 0.
 #[derive(Clone, Debug, Default)]
 pub struct Poses {
     /// Depth of the scene and preconditioner of each view.
@@ -59,7 +59,7 @@ pub(in crate::train) fn are_compared_before(at: StepContext) -> bool {
     COMPARISON_SHARES.iter().any(|&share| at.step == after(share))
 }
 
-/// Returns a camera with the correction of its rows (glsl/include/pose.glsl).
+/// Returns a camera corrected by its rows (glsl/include/pose.glsl).
 pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
     let three = |row: usize| DVec3::new(rows[row][0].into(), rows[row][1].into(), rows[row][2].into());
     let of = |k: usize| three(2 * k + 2).dot(three(0)) + three(2 * k + 3).dot(three(1));
@@ -67,7 +67,7 @@ pub(crate) fn corrected(camera: &Camera, rows: &[[f32; 4]]) -> Camera {
     camera.corrected(turn, camera.rotation.transpose() * (f64::from(rows[1][3]) * shift))
 }
 
-/// Settles the pose of a photo: sets its rows so that the corrected camera is `to`. `None` if no rows do that.
+/// Settles a photo's pose: sets its rows so that the corrected camera is `to`. `None` if no rows give this camera.
 pub(in crate::train) fn settle(rows: &mut [[f32; 4]], from: &Camera, to: &Camera) -> Option<()> {
     let turn = DQuat::from_mat3(&(to.rotation * from.rotation.transpose()));
     let turn = 2.0 / turn.w * turn.xyz();
@@ -133,7 +133,7 @@ mod tests {
     use crate::train::shared::SharedParameters;
     use glam::{DMat3, DVec3};
 
-    /// A settled pose is the one that was found, with a preconditioner that mixes all numbers.
+    /// A settled pose equals the given one, with a preconditioner that mixes all numbers.
     #[test]
     fn a_settled_pose_is_the_one_found() {
         let (rotation, translation) = (DMat3::from_rotation_y(0.3), DVec3::new(0.1, -0.2, 5.0));
@@ -149,6 +149,6 @@ mod tests {
         let found = corrected(&camera, &rows);
         assert!(found.centre().distance(to.centre()) < 1e-5, "{} and {}", found.centre(), to.centre());
         assert!(found.axis().distance(to.axis()) < 1e-5 && found.rotation.row(0).distance(to.rotation.row(0)) < 1e-5);
-        assert_eq!(rows[0][3], 1.0, "has no gradient any more");
+        assert_eq!(rows[0][3], 1.0, "gets no more gradients");
     }
 }

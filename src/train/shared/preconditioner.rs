@@ -1,21 +1,21 @@
 //! Preconditioner of a photo's pose (CamP, Park et al. 2023).
 //!
-//! A turn and a move look alike in a photo, and a move along the axis hardly shows. Adam takes steps of one length in
-//! each number that it trains. The pose is therefore the product of a matrix and six such numbers, each of which moves
-//! the points of the scene equally far in the photo, and none of them like another one.
+//! Rotation and translation look similar in a photo, and translation along the axis hardly shows. Adam takes equal
+//! steps in every trained number. The pose is therefore the product of a matrix and six trained numbers, each of which
+//! moves the scene's points equally far in the photo, in independent ways.
 
 use crate::scene::{Camera, Point};
 use glam::DVec3;
 
-/// A matrix of the six numbers of a pose: the turn, then the move.
+/// A matrix over the six numbers of a pose: rotation, then translation.
 pub(in crate::train) type Matrix = [[f64; 6]; 6];
 
-/// Share of its diagonal that is added to the second moments: a number that hardly shows takes steps up to its inverse
-/// root longer.
+/// Share of the diagonal that is added to the second moments. Steps of a number that hardly shows are at most its
+/// inverse root longer.
 const DAMPING_SHARE: f64 = 0.01;
-/// Fewest points that tell the moments.
+/// Fewest points needed for the moments.
 const POINTS_MIN: usize = 10;
-/// Iterations of the root; each one doubles the digits once the root is near.
+/// Iterations of the root; each doubles the correct digits close to the solution.
 const ROOT_ITERATIONS: usize = 40;
 
 const IDENTITY: Matrix = {
@@ -28,8 +28,8 @@ const IDENTITY: Matrix = {
     one
 };
 
-/// Returns the preconditioner of a view: the inverse root of the second moments of the derivatives of points in the
-/// photo, focal lengths. Moves are in units of `unit`, world units. A view of few points has the identity.
+/// Returns the preconditioner of a view: the inverse root of the second moments of point derivatives in the photo, in
+/// focal lengths. `unit` is the unit of translation, world units. Views with few points get the identity.
 pub(in crate::train) fn view_preconditioner(camera: &Camera, points: &[Point], unit: f64) -> Matrix {
     let seen: Vec<DVec3> =
         points.iter().filter(|point| camera.sees(point.position).is_some()).map(|p| p.position).collect();
@@ -39,7 +39,7 @@ pub(in crate::train) fn view_preconditioner(camera: &Camera, points: &[Point], u
     let mut moments = [[0.0; 6]; 6];
     for &place in &seen {
         let p = camera.to_camera(place);
-        // Derivatives of x / z and y / z by each number; a small turn w carries p to p + w x p.
+        // Derivatives of x / z and y / z by each number; a small rotation w moves p to p + w x p.
         let derivatives = [0, 1, 2, 3, 4, 5].map(|k| {
             let axis = DVec3::AXES[k % 3];
             let d = if k < 3 { axis.cross(p) } else { -unit * axis };
@@ -59,8 +59,8 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     a.map(|row| [0, 1, 2, 3, 4, 5].map(|column| (0..6).map(|k| row[k] * b[k][column]).sum()))
 }
 
-/// Returns the symmetric inverse root of a symmetric positive matrix, by the coupled iteration of Newton and Schulz;
-/// `None` if it has none.
+/// Returns the symmetric inverse root of a symmetric positive matrix, by coupled Newton-Schulz iteration; `None` if it
+/// does not exist.
 fn inverse_root(matrix: &Matrix) -> Option<Matrix> {
     let size = matrix.as_flattened().iter().map(|value| value * value).sum::<f64>().sqrt();
     let (mut root, mut inverse) = (matrix.map(|row| row.map(|value| value / size)), IDENTITY);
@@ -95,7 +95,7 @@ mod tests {
         let mut matrix: Matrix = [[0.0; 6]; 6];
         for (i, row) in matrix.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
-                // Scales apart by a factor of a thousand, and correlated.
+                // Scales differ by a factor of a thousand, and are correlated.
                 *value = 10_f64.powf(-0.3 * (i + j) as f64) * if i == j { 1.0 } else { 0.6 };
             }
         }
@@ -107,8 +107,7 @@ mod tests {
         assert!(inverse_root(&[[f64::NAN; 6]; 6]).is_none());
     }
 
-    /// Each number moves the points equally far in the photo, and all directions of the six are alike but for the
-    /// damping.
+    /// Each number moves the points equally far in the photo, and all six directions are equivalent except for damping.
     #[test]
     fn numbers_move_the_points_equally_far() {
         let (camera, points) = (camera(), points());

@@ -1,5 +1,5 @@
 //! The strategy of 3DGS, adaptive density control: clones and splits Gaussians with large screen-space gradients,
-//! prunes faint or too large ones, and resets opacities if the settings say so.
+//! prunes faint or too large ones, and resets opacities if the settings ask for it.
 
 use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;
@@ -7,12 +7,12 @@ use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 use crate::train::TrainConfig;
 
-/// Largest Gaussian that is cloned instead of split, a standard deviation, scene extents (3DGS).
+/// Largest standard deviation of Gaussians that are cloned instead of split, scene extents (3DGS).
 pub(crate) const CLONED_MAX: f32 = 0.01;
 /// Largest standard deviation, scene extents; larger Gaussians are pruned after the first opacity reset (3DGS).
 pub(crate) const SCALE_MAX: f32 = 0.1;
 
-/// The strategy of 3DGS. It has no state: all decisions follow from the step and the configuration.
+/// The strategy of 3DGS. It has no state: all decisions depend only on step and configuration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AdcStrategy;
 
@@ -37,7 +37,7 @@ impl Strategy for AdcStrategy {
         Ok(())
     }
 
-    /// A densification replaces the parameters of the gradients, so that no update follows (3DGS).
+    /// Densification replaces the parameters that the gradients belong to, so no update follows (3DGS).
     fn updates(&self, at: StepContext) -> bool {
         at.is_last() || !at.config.densifies_at(at.step)
     }

@@ -1,8 +1,8 @@
 //! Growth within a budget: the Gaussians with the largest gradients split along their longest axis (Improved-GS).
 //!
-//! The statistic adds absolute gradients of tiles, because those of a Gaussian's two sides cancel (AbsGS, by pixel).
-//! The budget rises linearly to its end. After it, densifications go on without growth, to prune; once, Gaussians that
-//! show little make room for parts of those across contours of masks. A pass of its own marks Gaussians that fog the
+//! The statistic sums absolute gradients of tiles, because gradients of a Gaussian's two sides cancel (AbsGS, by
+//! pixel). The budget rises linearly during growth. Afterwards densifications only prune. Once, Gaussians that show
+//! little are replaced by splitting Gaussians across mask contours. A separate pass marks Gaussians that fog the
 //! cameras.
 
 use super::exchange::exchange;
@@ -30,7 +30,7 @@ impl Strategy for BudgetStrategy {
         let grows = config.densifies_at(at.step);
         let uniforms = StepUniforms {
             densify_threshold: if grows { config.densify_grad_threshold } else { 0.0 },
-            // All that grow split.
+            // All growing Gaussians split.
             densify_scale: 0.0,
             split_long: 1,
             prune_opacity: OPACITY_MIN,

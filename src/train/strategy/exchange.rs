@@ -1,5 +1,5 @@
-//! Soon after growth, Gaussians that show little go, so that steps cost less, and some of them for parts of others: of
-//! those across contours of the masks, which blur two things.
+//! Soon after growth, prunes Gaussians that show little, so that steps cost less. Some are replaced by splitting
+//! Gaussians across mask contours, which blur two objects.
 
 use super::weights::weights;
 use super::{DensifyCounts, Population};
@@ -9,8 +9,8 @@ use crate::label::vote::decide::EVIDENCE_MIN_PX;
 use crate::train::TrainConfig;
 
 /// Prunes the [share](TrainConfig::prune_share) of the Gaussians with the least blending weight over all training
-/// views. Given masks, it splits up to a [share](TrainConfig::contour_share) of the others, and prunes as many more.
-/// Statistics start over.
+/// views. Given masks, splits up to a [share](TrainConfig::contour_share) of the others, and prunes as many more.
+/// Resets statistics.
 pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Result<DensifyCounts> {
     let ballot = ballot(population, config)?;
     let weights = match &ballot {
@@ -29,7 +29,7 @@ pub(super) fn exchange(population: &mut Population, config: &TrainConfig) -> Res
     population.replace(&order, &across)
 }
 
-/// Returns the votes of all masks; none without any, or if they are not asked for.
+/// Returns the votes of all masks; `None` without masks, or if they are not needed.
 fn ballot(population: &mut Population, config: &TrainConfig) -> Result<Option<Ballot>> {
     let voters = population.views.voters();
     if config.contour_share <= 0.0 || voters.is_empty() || population.engine().vote_columns() == 0 {
@@ -44,9 +44,9 @@ fn weights_of_all(population: &mut Population) -> Result<Vec<f64>> {
     Ok(weights(population.engine(), cameras)?.into_iter().map(f64::from).collect())
 }
 
-/// Returns up to `most` of the first `count` Gaussians, sorted: those with the most weight on other labels than their
-/// main one, at least [`EVIDENCE_MIN_PX`], times its share of all their weight. Without the share, large Gaussians
-/// behind an object would come first, of which a little shows beside its contour.
+/// Returns up to `most` of the first `count` Gaussians, sorted by row: those with the most weight on labels other than
+/// their main label, at least [`EVIDENCE_MIN_PX`], times that weight's share of their total. Without the share, large
+/// Gaussians that show slightly beside an object's contour would come first.
 fn across(ballot: &Ballot, count: usize, most: usize) -> Vec<usize> {
     let score = |row: usize| {
         let (all, astray) = ballot.spread(row);
@@ -75,12 +75,12 @@ mod tests {
     #[test]
     fn those_with_the_largest_share_and_weight_astray_are_across() {
         let votes = [
-            // 30 of 100 px astray: 9.
+            // 30 of 100 px on another label: 9.
             (0, 0, 70),
             (0, 1, 30),
             // All on one label.
             (1, 1, 500),
-            // 40 of 2000 px astray, a little beside the contour of a large thing: 0.8.
+            // 40 of 2000 px on another label, slightly beside a large object's contour: 0.8.
             (2, 0, 1960),
             (2, 1, 40),
             // Half of 20 px: 5.
@@ -93,7 +93,7 @@ mod tests {
         let ballot = ballot(&votes);
         assert_eq!(across(&ballot, 6, 3), [0, 3, 5]);
         assert_eq!(across(&ballot, 6, 2), [0, 5]);
-        assert_eq!(across(&ballot, 5, 2), [0, 3], "the last one is not trained");
+        assert_eq!(across(&ballot, 5, 2), [0, 3], "the last one is frozen");
         assert_eq!(across(&ballot, 6, 9), [0, 2, 3, 5], "neither without votes nor with one label");
     }
 

@@ -1,16 +1,16 @@
 //! A fixed number of Gaussians that explore the scene (3DGS-MCMC, Kheradmand et al. 2024): faint ones move at random;
 //! dead ones become copies of others, drawn by their opacity. The loss keeps opacities and sizes small.
 //!
-//! Three things differ from the paper. The number rises linearly to the budget, because a twentieth more at each event
-//! takes as many events as only long runs have. A stack of copies keeps the light of the one in a picture, not along a
-//! line. The factor of the learning rates for short runs does not apply to the moves.
+//! Three things differ from the paper. The number of Gaussians rises linearly to the budget, because growing by a
+//! twentieth per event needs long runs. A stack of copies preserves the Gaussian's light in a picture, not along a
+//! line. The learning-rate factor for short runs does not apply to the moves.
 
 use super::{OPACITY_MIN, Population, StepContext, Strategy, passes};
 use crate::error::Result;
 use crate::scheduler::plan::Buf;
 use crate::shaders::structs::StepUniforms;
 
-/// Random moves by the learning rate of positions, both in scene extents (3DGS-MCMC).
+/// Random movement per position learning rate, both in scene extents (3DGS-MCMC).
 const NOISE_PER_RATE: f64 = 5e5;
 
 /// Relocation.

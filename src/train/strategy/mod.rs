@@ -1,5 +1,5 @@
-//! Strategies that change the set of Gaussians between steps: [`StrategyKind`] names them. Another one implements
-//! [`Strategy`] and goes into [`TrainerOptions`](super::TrainerOptions).
+//! Strategies that change the set of Gaussians between steps: [`StrategyKind`] names them. To add one, implement
+//! [`Strategy`] and pass it in [`TrainerOptions`](super::TrainerOptions).
 
 pub mod adc;
 pub(crate) mod budget;
@@ -26,10 +26,10 @@ use serde_json::Value;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// Least opacity: fainter Gaussians are pruned, or relocated (3DGS, 3DGS-MCMC).
+/// Smallest opacity: fainter Gaussians are pruned or relocated (3DGS, 3DGS-MCMC).
 pub(crate) const OPACITY_MIN: f32 = 0.005;
 
-/// Makes the strategy of a configuration.
+/// Makes a built-in strategy.
 pub fn make(kind: StrategyKind) -> Box<dyn Strategy> {
     match kind {
         StrategyKind::Budget => Box::new(BudgetStrategy),
@@ -38,7 +38,7 @@ pub fn make(kind: StrategyKind) -> Box<dyn Strategy> {
     }
 }
 
-/// The step that a strategy decides about.
+/// The step for which a strategy decides.
 #[derive(Clone, Copy, Debug)]
 pub struct StepContext<'a> {
     /// Step, from 1.
@@ -57,17 +57,17 @@ impl StepContext<'_> {
 }
 
 /// Rules for the set of Gaussians. All results must be functions of the arguments and of the [kept](Strategy::keep)
-/// state: a step is repeated after a buffer has grown, and a resumed training calls again.
+/// state, because steps are repeated after a buffer has grown, and a resumed training calls these functions again.
 pub trait Strategy: Debug + Send {
     /// Returns the name for checkpoints.
     fn name(&self) -> &'static str;
 
-    /// Returns true if it acts after this step. The trainer then waits for the steps in flight.
+    /// Returns true if the strategy acts after this step. The trainer then waits for the steps in flight.
     fn acts_after(&self, _at: StepContext) -> bool {
         false
     }
 
-    /// Acts after such a step.
+    /// Acts after the step.
     fn act(&mut self, _at: StepContext, _population: &mut Population) -> Result<()> {
         Ok(())
     }
@@ -77,8 +77,8 @@ pub trait Strategy: Debug + Send {
         true
     }
 
-    /// Returns true if the depth of the model is unreliable right after this step. Votes and occluders then wait for
-    /// their next turn.
+    /// Returns true if the depth of the model is unreliable right after this step. Votes and occluders are then skipped
+    /// until their next turn.
     fn blurs_depth_after(&self, _at: StepContext) -> bool {
         false
     }
@@ -86,22 +86,22 @@ pub trait Strategy: Debug + Send {
     /// Sets uniforms of a step.
     fn uniforms(&self, _at: StepContext, _to: &mut StepUniforms) {}
 
-    /// Returns the passes to add to steps; called once. The default has those of the built-in strategies.
+    /// Returns the passes to add to steps; called once. By default, those of the built-in strategies.
     fn extension(&self) -> Arc<dyn Extension> {
         Arc::new(passes::StrategyPasses)
     }
 
-    /// Returns the number of its pass list for a step, for [`Extension::extend`]. 0: the step has none of its passes.
+    /// Returns the variant of its passes for a step, for [`Extension::extend`]; 0 for a step without its passes.
     fn passes(&self, _at: StepContext) -> u32 {
         0
     }
 
-    /// Returns the buffers to store in checkpoints besides parameters, moments and labels. Their words are floats.
+    /// Returns the float buffers to store in checkpoints besides parameters, moments and labels.
     fn planes(&self) -> &'static [Buf] {
         &[]
     }
 
-    /// Returns other state to store in checkpoints.
+    /// Returns further state to store in checkpoints.
     fn keep(&self) -> Value {
         Value::Null
     }
@@ -125,7 +125,7 @@ impl Strategy for () {
 pub struct StrategyState {
     /// Name of the strategy.
     pub name: String,
-    /// Names of its planes.
+    /// Names of the strategy's planes.
     pub planes: Vec<String>,
     /// Other state.
     pub value: Value,

@@ -1,4 +1,4 @@
-//! The passes that strategies add to training steps. The number of a variant has a bit for each.
+//! The passes that strategies add to training steps. A variant number has one bit per pass.
 
 use super::StepContext;
 use crate::pass::{Builder, Extension, Hook, densify, optimize};
@@ -13,7 +13,7 @@ pub(crate) const EXPLORE_BIT: u32 = 4;
 /// Keeps Gaussians from becoming finer than the photos can show.
 pub(crate) const SMOOTH_BIT: u32 = 8;
 
-/// The passes by their bits.
+/// The passes, selected by their bits.
 #[derive(Debug)]
 pub(super) struct StrategyPasses;
 
@@ -39,14 +39,14 @@ impl Extension for StrategyPasses {
     }
 }
 
-/// Returns the bits of the passes that the configuration asks for.
+/// Returns the bits of the passes that the configuration needs.
 pub(super) fn pass_bits(at: StepContext) -> u32 {
     let config = at.config;
     let regularises = config.opacity_weight() > 0.0 || config.scale_weight() > 0.0;
     (u32::from(config.free_space) * FREE_SPACE_BIT) | (u32::from(regularises) * REGULARISE_BIT) | smooth(at)
 }
 
-/// Returns the bit of [`SMOOTH_BIT`] if the configuration asks for it.
+/// Returns the bit of [`SMOOTH_BIT`] if the configuration needs it.
 pub(super) fn smooth(at: StepContext) -> u32 {
     u32::from(at.config.antialias) * SMOOTH_BIT
 }

@@ -1,4 +1,4 @@
-//! The Gaussians between two steps, as a strategy changes them, with a limit on their number.
+//! The Gaussians between two steps, for strategies to change, with a limit on their number.
 
 use crate::engine::{Engine, ListKey};
 use crate::error::{Error, Result, Setting};
@@ -19,13 +19,13 @@ pub struct DensifyCounts {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GaussianLimit {
-    /// Limit of the user or of the device.
+    /// Limit set by the user or the device.
     pub most: u64,
-    /// Memory has limited the number, and the log says so.
+    /// True if memory has limited the number, which was logged.
     pub by_memory: bool,
 }
 
-/// The Gaussians on the device, with nothing in flight.
+/// The Gaussians on the device; nothing is in flight.
 pub struct Population<'a> {
     pub(in crate::train) engine: &'a mut Engine,
     pub(in crate::train) bound: &'a mut GaussianLimit,
@@ -43,17 +43,17 @@ impl Population<'_> {
         self.engine.gaussian_count()
     }
 
-    /// Returns the number of Gaussians before the first change of a strategy, from which a budget rises.
+    /// Returns the number of Gaussians before the strategy's first change, from which a budget rises.
     pub fn first_count(&self) -> u64 {
         self.first_count.into()
     }
 
-    /// Returns the number of Gaussians that are trained, the first ones.
+    /// Returns the number of trained Gaussians, which come first.
     pub(crate) fn trained_count(&self) -> usize {
         self.engine.trained_count() as usize
     }
 
-    /// Returns the uniforms of the step, with a seed of its own.
+    /// Returns the uniforms of the step, with a separate seed.
     pub fn uniforms(&self) -> StepUniforms {
         self.uniforms
     }
@@ -64,7 +64,7 @@ impl Population<'_> {
     }
 
     /// Clones, splits and prunes by the thresholds in `uniforms`, up to `budget` Gaussians and within the limit.
-    /// Statistics start over.
+    /// Resets statistics.
     pub fn densify(&mut self, uniforms: StepUniforms, budget: u64) -> Result<DensifyCounts> {
         let wanted = self.count_densified(uniforms)?.densified_count;
         let mut most = self.most(wanted)?.min(budget);
@@ -87,7 +87,7 @@ impl Population<'_> {
         Ok(done)
     }
 
-    /// Removes some of the trained Gaussians and splits some others. Statistics start over.
+    /// Removes some of the trained Gaussians and splits some others. Resets statistics.
     pub fn replace(&mut self, remove: &[usize], split: &[usize]) -> Result<DensifyCounts> {
         let mut marks = vec![[0.0; 2]; self.trained_count()];
         remove.iter().for_each(|&row| marks[row][1] = STAT_NEAR);
@@ -106,7 +106,7 @@ impl Population<'_> {
     }
 
     /// Removes faint and marked Gaussians, and draws others in proportion to their opacity until there are `wanted`,
-    /// within the limit. Each one drawn becomes a stack of copies that look like it. Statistics start over.
+    /// within the limit. Each drawn Gaussian becomes a stack of copies that looks the same. Resets statistics.
     pub fn relocate(&mut self, uniforms: StepUniforms, wanted: u64) -> Result<DensifyCounts> {
         let counted = self.engine.run(ListKey::RelocateCount, &uniforms)?.counters;
         let (alive, weight) = (u64::from(self.count() - counted.pruned_count), counted.densified_count);
@@ -126,8 +126,8 @@ impl Population<'_> {
         Ok(done)
     }
 
-    /// Makes room for a number of Gaussians. If memory is short, the room of now becomes the limit, which it returns,
-    /// unless `most` is no more than that.
+    /// Makes room for a number of Gaussians. If memory is short, the current room becomes the limit and is returned,
+    /// unless `most` is not larger.
     fn make_room(&mut self, count: u64, most: u64) -> Result<Option<u64>> {
         let room = self.engine.size().gaussians;
         match self.engine.make_room_for_gaussians(count) {
@@ -141,7 +141,7 @@ impl Population<'_> {
         }
     }
 
-    /// Returns what to do for more Gaussians, if anything.
+    /// Returns advice on how to fit more Gaussians, if any.
     fn hint(&self) -> String {
         let half = Setting("moments").to("half");
         if self.engine.size().half_moments { String::new() } else { format!("; a run with {half} has room for more") }
@@ -164,14 +164,14 @@ impl Population<'_> {
             self.bound.by_memory = true;
             let hint = self.hint();
             tracing::warn!(
-                "memory holds {fits} Gaussians, {wanted} are wanted; from here on only the best may grow{hint}"
+                "memory is sufficient for {fits} of {wanted} wanted Gaussians; from here, only the best may grow{hint}"
             );
         }
         Ok(fits.min(self.bound.most))
     }
 
-    /// Raises the gradient threshold until the result is within the limit, so that Gaussians with the largest gradients
-    /// grow.
+    /// Raises the gradient threshold until the result is within the limit, so that only Gaussians with the largest
+    /// gradients grow.
     fn bounded(&mut self, uniforms: StepUniforms, count: u32, most: u64) -> Result<StepUniforms> {
         // Without growth there is nothing to limit.
         if u64::from(count) <= most || uniforms.densify_threshold <= 0.0 {

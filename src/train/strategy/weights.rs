@@ -1,11 +1,11 @@
-//! How much of the pictures each Gaussian makes.
+//! The total blending weight of each Gaussian.
 
 use crate::engine::{Engine, ListKey};
 use crate::error::Result;
 use crate::scene::Camera;
 
-/// Returns the blending weight of each trained Gaussian over all pixels of some views, given with their near planes,
-/// px. The densification statistic becomes that weight. Nothing may be in flight.
+/// Returns the blending weight of each trained Gaussian over all pixels of views, given with their near planes, px.
+/// Overwrites the densification statistic with it. Nothing may be in flight.
 pub fn weights<'a>(engine: &mut Engine, views: impl Iterator<Item = (&'a Camera, f32)>) -> Result<Vec<f32>> {
     engine.set_densify_stats(&vec![[0.0; 2]; engine.trained_count() as usize])?;
     for (camera, near) in views {

@@ -15,15 +15,15 @@ use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The state of a training on its way from the device, for any thread.
+/// A copy of the training state that any thread can read.
 pub struct PendingState {
-    /// All but the planes.
+    /// Everything except the planes.
     pub state: TrainState,
     planes: StateCopy,
 }
 
 impl PendingState {
-    /// Returns the whole state, read from the device if need be.
+    /// Returns the complete state, read from the device if necessary.
     pub fn whole(self) -> Result<TrainState> {
         Ok(TrainState { planes: self.planes.planes()?, ..self.state })
     }
@@ -35,8 +35,8 @@ impl Trainer {
         self.copied_state()?.whole()
     }
 
-    /// Waits for the steps in flight and copies the state of the training: on a card in its memory, so that steps go on
-    /// before it is read.
+    /// Waits for the steps in flight and copies the training state. On a GPU, the copy stays in device memory, so that
+    /// steps continue before it is read.
     pub fn copied_state(&mut self) -> Result<PendingState> {
         self.drain()?;
         self.check_finite()?;
@@ -70,8 +70,8 @@ impl Trainer {
         Ok(PendingState { state, planes: self.context.engine.copy_state(self.context.strategy.planes())? })
     }
 
-    /// Looks for a NaN or infinity in the planes of the state: the checkpoint would be useless. No pass has checked the
-    /// result of the last step yet.
+    /// Searches the state for NaN and infinity, which would make the checkpoint useless. No pass has checked the result
+    /// of the last step yet.
     fn check_finite(&mut self) -> Result<()> {
         let found = self.context.engine.nonfinite(self.context.strategy.planes())?;
         let Some((name, row, is_shared)) = found else { return Ok(()) };
@@ -79,12 +79,12 @@ impl Trainer {
         Err(Error::Numeric {
             quantity: format!("{name} of {of} {row} is not finite, so there is no checkpoint"),
             step: u64::from(self.step),
-            view: "of this step or one before".to_owned(),
+            view: "of this step or an earlier one".to_owned(),
         })
     }
 
     /// Resumes a training from `state`, with the same bits on the same device as without the interruption. `dataset`
-    /// must be the data set of the state.
+    /// must be the state's data set.
     pub fn resume(
         gpu: Arc<Gpu>,
         dataset: &Dataset,
@@ -99,25 +99,24 @@ impl Trainer {
         let (now, version) = (device(&gpu), env!("CARGO_PKG_VERSION"));
         for (then, now) in [(&state.device, now.as_str()), (&state.labelgs, version)] {
             if then != now {
-                tracing::warn!("{} was made with {then}, this is {now}: bits may differ", state.path.display());
+                tracing::warn!(
+                    "{} was made with {then}, but this is {now}; results may not be bit-identical",
+                    state.path.display()
+                );
             }
         }
         let options = options.into();
         let frozen = Region::frozen(options.region.as_ref());
         if frozen != state.frozen {
-            let problem = format!("{frozen} frozen Gaussians, {} are in {}", state.frozen, state.path.display());
-            return Err(Error::data(
-                &dataset.root,
-                "",
-                format!("the part of the scene has {problem}; start a new run"),
-            ));
+            let problem = format!("{frozen} frozen Gaussians, but {} are in {}", state.frozen, state.path.display());
+            return Err(Error::data(&dataset.root, "", format!("the region has {problem}; start a new run")));
         }
         let size = engine_size(dataset, &state.config, u64::from(state.gaussians))?.with_frozen(frozen);
         if let Some(labels) = size.labels
             && let Some(plane) = state.planes.iter().find(|plane| plane.name == "labels")
             && let Some(label) = plane.data.iter().find(|&&label| label > labels.max_label)
         {
-            let problem = format!("is {label}, the masks have ids up to {}", labels.max_label);
+            let problem = format!("is {label}, but the masks have ids up to {}", labels.max_label);
             return Err(Error::data(&state.path, "a label", problem));
         }
         let mut trainer = Self::without_model(gpu, state.config.clone(), dataset, size, options)?;

@@ -36,7 +36,7 @@ pub struct Trainer {
     context: Context,
     jobs: TrainingJobs,
     order: ViewOrder,
-    /// Submitted steps that are not retired yet, at most one per frame.
+    /// Submitted steps that are not yet retired, at most one per frame.
     in_flight: VecDeque<(StepInput, InFlight)>,
     step: u32,
     updates: u32,
@@ -48,7 +48,7 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// Puts the initial model on the device.
+    /// Uploads the initial model.
     pub fn new(
         gpu: Arc<Gpu>,
         config: TrainConfig,
@@ -86,7 +86,7 @@ impl Trainer {
         options: TrainerOptions,
     ) -> Result<Self> {
         let mut context = Context::new(gpu, config, dataset, size, options)?;
-        // On a processor, compiling would take time from the steps.
+        // On a CPU device, compiling would slow down the steps.
         if context.engine.runs_ahead() {
             let lists = context.lists_ahead();
             context.engine.compile_ahead(lists);
@@ -131,7 +131,7 @@ impl Trainer {
         self.newest
     }
 
-    /// Takes the counts of the last densification; none if they were taken before.
+    /// Takes the counts of the last densification; `None` if they were already taken.
     pub fn take_densified(&mut self) -> Option<DensifyCounts> {
         self.jobs.growth.densified.take()
     }
@@ -141,7 +141,7 @@ impl Trainer {
         self.context.engine.gaussian_count()
     }
 
-    /// Returns the options of the steps, for previews.
+    /// Returns the render options of the steps, for previews.
     pub fn render_options(&self) -> RenderOptions {
         let config @ &TrainConfig { near, background, .. } = self.config();
         let (sh_degree, clear_labels) = (Some(config.sh_degree_at(self.step)), self.context.objects_only);
@@ -158,8 +158,8 @@ impl Trainer {
         self.context.views.show_only(is_meant);
     }
 
-    /// Submits a step, with the work that is due before and after it. Returns the reports of finished steps; they lag
-    /// behind, because some steps are in flight.
+    /// Submits a step, and runs the jobs that are due before and after it. Returns the reports of finished steps, which
+    /// lag behind because some steps are in flight.
     pub fn step(&mut self) -> Result<Vec<StepReport>> {
         let step = self.step + 1;
         let mut done = self.work(JobTime::Before, step)?;
@@ -173,7 +173,7 @@ impl Trainer {
         Ok(done)
     }
 
-    /// Does what is due before or after a step, after the steps in flight. Returns the reports of these.
+    /// Runs the jobs that are due before or after a step, after waiting for the steps in flight. Returns their reports.
     fn work(&mut self, when: JobTime, step: u32) -> Result<Vec<StepReport>> {
         let due: Vec<bool> = self.jobs.list(when).iter().map(|job| job.is_due(step, &self.context)).collect();
         let done = if due.contains(&true) { self.drain()? } else { Vec::new() };
@@ -192,14 +192,14 @@ impl Trainer {
         Ok(done)
     }
 
-    /// Draws the view of a step and the objects of its layers.
+    /// Draws the view of a step, and the objects of its layers.
     fn input(&mut self, step: u32) -> Result<StepInput> {
         let Context { config, objective, views, .. } = &mut self.context;
         let part = self.order.draw();
         let next = self.order.upcoming(views.steps_ahead());
         views.prepare(step, part, &next)?;
         let objects = &views.parts()[part].objects;
-        // A view without a mask, or with an empty one, costs as much as in a scene without masks.
+        // A view without a mask, or with an empty mask, costs no more than in a scene without masks.
         let labels = config.labels_at(step) && !objects.is_empty();
         let layers = if labels && objective.has(Loss::Layers) && config.has_layers_at(step) {
             sampler::sample_objects(config.seed, step, objects, config.label_samples as usize)
@@ -226,15 +226,15 @@ impl Trainer {
         Ok(())
     }
 
-    /// Waits for the oldest step in flight. If a buffer was too small, this step and those after it have changed
-    /// nothing: the buffer grows and they run again.
+    /// Waits for the oldest step in flight. If a buffer was too small, this step and all later ones had no effect: the
+    /// buffer grows and they run again.
     fn retire(&mut self) -> Result<Option<StepReport>> {
         let Some((input, flight)) = self.in_flight.front().cloned() else { return Ok(None) };
         let engine = &mut self.context.engine;
         let report = engine.retire(&flight)?;
         let recovered = engine.recover(&report);
         if recovered.is_err() {
-            // These steps have no result and will get none.
+            // These steps have no result and never will.
             self.in_flight.clear();
             self.step = input.step - 1;
         }
@@ -256,29 +256,29 @@ impl Trainer {
         Ok(self.newest)
     }
 
-    /// Collects the times of steps from now on. The scheduler needs timestamps.
+    /// Starts collecting step times. The scheduler must have timestamps.
     pub fn keep_times(&mut self) {
         self.timing.get_or_insert_default();
     }
 
-    /// Ends the collection of times: the next steps run as in a training, without timestamps. Nothing may be in flight.
+    /// Stops collecting step times: the next steps run without timestamps. Nothing may be in flight.
     pub(crate) fn stop_times(&mut self) -> Result<()> {
         self.timing = None;
         self.context.engine.time_items(false, false)
     }
 
-    /// Sets whether the next steps count the (pixel, splat) pairs with a weight. Counting slows them down.
+    /// Sets whether the next steps count contributing (pixel, splat) pairs, which slows them down.
     pub fn count_pairs(&mut self, on: bool) {
         self.context.counts_pairs = on;
     }
 
-    /// Takes the times of the steps that ended since the last call.
+    /// Takes the times of the steps that finished since the last call.
     pub fn take_times(&mut self) -> Vec<StepTimes> {
         self.timing.as_mut().map(Timing::take).unwrap_or_default()
     }
 
-    /// Runs the last `count` steps again on `model` and returns their times, each with a barrier before every pass. All
-    /// steps are done; the engine's model and the trainer are of no use after this.
+    /// Repeats the last `count` steps on `model` with a barrier before every pass, and returns their times. Call this
+    /// only after all steps: the trainer and its model are unusable afterwards.
     pub(crate) fn times_of_last(&mut self, count: u32, model: &Gaussians) -> Result<Vec<StepTimes>> {
         self.drain()?;
         self.context.engine.upload_model(model)?;

@@ -1,4 +1,4 @@
-//! What a training has found so far: the model, labels, occluders, exposures and poses.
+//! The current results of a training: model, labels, occluders, exposures and poses.
 
 use super::Trainer;
 use crate::error::Result;
@@ -9,7 +9,7 @@ use crate::train::shared::exposure;
 use std::collections::BTreeMap;
 
 impl Trainer {
-    /// Reads the model back. Steps that failed for lack of memory have not changed it.
+    /// Reads the model back. Steps that failed for lack of memory did not change it.
     pub fn model(&mut self) -> Result<Gaussians> {
         if let Err(error) = self.drain() {
             if !error.is_out_of_memory() {
@@ -22,7 +22,7 @@ impl Trainer {
     }
 
     /// Returns the model with its final labels. With [`LabelRule::Votes`](crate::train::LabelRule::Votes) it counts
-    /// them again and sets the confidence.
+    /// votes again and sets the confidence.
     pub fn labelled_model(&mut self) -> Result<Gaussians> {
         self.drain()?;
         let decision = self.jobs.votes.count(&mut self.context)?;
@@ -49,7 +49,7 @@ impl Trainer {
     }
 
     /// Sets the occluders by name of the view. Drops ids without pixels in the mask of the view. Returns the names of
-    /// views with masks that `found` lacks; their objects count as not hidden.
+    /// views with masks that `found` lacks; their objects are assumed not to be hidden.
     pub fn set_occluders(&mut self, found: &BTreeMap<String, Occluders>) -> Vec<String> {
         let mut without = Vec::new();
         for view in self.context.views.iter_mut().filter(|view| view.mask.is_some()) {
@@ -76,14 +76,14 @@ impl Trainer {
         lists.collect()
     }
 
-    /// Returns the matrix of colours of each training photo, by name; none without exposure. Nothing may be in flight.
+    /// Returns the exposure matrix of each training photo, by name; empty without exposure. Nothing may be in flight.
     pub fn exposures(&mut self) -> Result<BTreeMap<String, ColourMatrix>> {
         let rows = self.context.photo_rows(exposure::EXPOSURE_NAME)?;
         let matrices = rows.iter().map(|of| exposure::matrix_of(of));
         Ok(self.names().zip(matrices).collect())
     }
 
-    /// Returns the refined camera of each training view, by name; none without refinement. Nothing may be in flight.
+    /// Returns the refined camera of each training view, by name; empty without refinement. Nothing may be in flight.
     pub fn poses(&mut self) -> Result<BTreeMap<String, Camera>> {
         self.context.refresh_poses()?;
         let refined = self.context.views.refined().iter().cloned();

@@ -1,11 +1,11 @@
 //! Watches for NaNs and infinities through the counters of the device.
 //!
-//! * A *gradient* that is not finite, or above 1e18 so that its square overflows, counts as 0 in that step
-//!   (project_backward). The log counts them. The training ends after three steps in a row in which more than
+//! * A *gradient* that is not finite, or above 1e18 so that its square overflows, is set to 0 in that step
+//!   (project_backward). The log counts them. Training ends after three consecutive steps in which more than
 //!   [`DROPPED_SHARE_MAX`] of the splats have such gradients.
-//! * A *parameter* that is not finite, or so large that its projection is not, is the fault of the device or of its
-//!   input, not of such a step. The first one that cull or project_forward finds ends the training, and so does a loss
-//!   of NaN. The caller can go back to a saved state ([`Trainer::restore`](crate::train::Trainer::restore)).
+//! * A *parameter* that is not finite, or so large that its projection is not, comes from the device or its
+//!   input, not from such a step. The first one that cull or project_forward finds ends the training, as does a NaN
+//!   loss. The caller can restore a saved state ([`Trainer::restore`](crate::train::Trainer::restore)).
 
 use crate::error::{Error, Result};
 use crate::train::report::StepReport;
@@ -13,21 +13,21 @@ use crate::train::report::StepReport;
 /// Share of the splats whose gradients may be dropped; [`DROPPED_COUNT_MAX`] are always accepted.
 const DROPPED_SHARE_MAX: f64 = 1e-3;
 const DROPPED_COUNT_MAX: u32 = 10;
-/// Number of successive steps above that share which ends a training.
+/// Number of consecutive steps above that share that ends a training.
 const BAD_STEPS_MAX: u32 = 3;
 
-/// Gradients that were dropped.
+/// Watches for dropped gradients.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sentinel {
     /// Number of dropped gradients so far, and the number for the next log message.
     dropped: u64,
     next_word: u64,
-    /// Successive steps with too many dropped gradients.
+    /// Consecutive steps with too many dropped gradients.
     bad_steps: u32,
 }
 
 impl Sentinel {
-    /// Refuses a finished step on a view that has broken the model.
+    /// Fails if a finished step on a view has broken the model.
     pub(super) fn check(&mut self, of: &StepReport, view: &str) -> Result<()> {
         let (counters, losses) = (&of.report.counters, [of.loss, of.label_loss]);
         let failure = |quantity| Error::Numeric { quantity, step: u64::from(of.step), view: view.to_owned() };

@@ -1,22 +1,22 @@
-//! Times of the passes of each step, for `labelgs profile` and the report of a run.
+//! Pass times of each step, for `labelgs profile` and run reports.
 
 use crate::engine::{Engine, Recording};
 use crate::error::Result;
 use crate::pass::Stage;
 use std::collections::HashSet;
 
-/// Times of the passes of a step.
+/// Pass times of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepTimes {
     /// Step, from 1.
     pub step: u32,
-    /// The first run of a recording, in which drivers compile.
+    /// True for the first run of a recording, in which drivers compile.
     pub is_first: bool,
     /// Stage, name and nanoseconds of each item, in order.
     pub items: Vec<(Stage, String, u64)>,
 }
 
-/// Times that nobody has taken yet.
+/// Times that have not been taken yet.
 #[derive(Debug, Default)]
 pub(super) struct Timing {
     seen: HashSet<Recording>,
