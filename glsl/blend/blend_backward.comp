@@ -4,21 +4,21 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "record.glsl"
-// blend_backward — walk one tile of one layer back to front; write one gradient record per (splat, tile) pair.
+// blend_backward — process one tile of one layer back to front; write one gradient record per (splat, tile) pair.
 // Work:    one subgroup (= workgroup) per tile, jobs as in blend_forward.
-// Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w = transmittance),
-//          last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
-//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V]
-//          variant depth: depths [P]
+// Reads:   step; tile_starts [layers * T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; image [P] (w =
+//          transmittance), last [P]; v_image [P]; variant labels: counters, layer_tiles, layer_state, layer_weights
+//          variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V] variant depth: depths
+//          [P]
 // Writes:  v_instances_a, _b, _c [I] by instance: v_mean2d (px), v_conic xy; v_conic z, v_log_opacity, v_colour rg;
 //          v_colour b, stamp of the step
-//          (records without the current stamp were not walked; they count as 0)
+//          (records without the current stamp were not written; they count as 0)
 //          variant disagreement: disagreement [T], the weighted sum of a tile's disagreement
 // Math:    p = dL/d ln alpha = w (u - s), where u = colour . g, and s is the colour behind, times g; geometry and
-//          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p = 0.
-//          Disagreement of pixel v with label L: E = sum of w d + T_end [L != 0], with d = [the splat's label is not L].
-//          It is one more channel with the colour d, a background of [L != 0], and gradients of opacities only.
-//          A known depth D has the same sum, with d = min(|z / D - 1|, 1) and a background of 1.
+//          opacity gradients are linear in six moments of p about the tile's centre. T by division. Clamped alpha: p =
+//          0. Disagreement of pixel v with label L: E = sum of w d + T_end [L != 0], with d = [the splat's label is not
+//          L]. It is an additional channel with the colour d, a background of [L != 0], and gradients of opacities
+//          only. A known depth D has the same sum, with d = min(|z / D - 1|, 1) and a background of 1.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
 

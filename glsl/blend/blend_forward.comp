@@ -6,15 +6,15 @@
 layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
 // blend_forward — alpha-blend one tile of one layer front to back.
 // Work:    one subgroup (= workgroup) per tile: the scene's tiles, then (variant labels) the occupied layer tiles.
-// Reads:   step, counters; tile_starts, tile_ends [layers * T]; instance_from_sorted [I]; splat_from_instance [I]; splats [V,3]
-//          variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders; label_from_layer;
-//          layer_weights; gaussian_from_splat [V]
+// Reads:   step, counters; tile_starts, tile_ends [layers * T]; instance_from_sorted [I]; splat_from_instance [I];
+//          splats [V,3] variant labels: layer_tiles; target [P] RGBA8; view_labels [P]; layer_occluders;
+//          label_from_layer; layer_weights; gaussian_from_splat [V]
 // Writes:  image [P] linear RGB over the background, w = final transmittance; last [P] = 1 + index of the last splat
 //          that contributed, in the tile's list (0: none); variant main: main_gaussian [P] (NO_SPLAT: none) and
-//          main_weight_depth [P] (weight, weighted sum of z);
-//          variant labels: layer_state [layer tiles, pixels of a tile] (transmittance, last and signs of the loss gradient),
-//          layer_loss [layer tiles] (label loss minus that of an empty picture; the host adds the loss of empty tiles,
-//          which no pass walks), label_keys [N] (integer maximum, any order)
+//          main_weight_depth [P] (weight, weighted sum of z); variant labels: layer_state [layer tiles, pixels of a
+//          tile] (transmittance, last and signs of the loss gradient), layer_loss [layer tiles] (label loss minus the
+//          loss of an empty picture; the host adds the loss of empty tiles, which no pass processes), label_keys [N]
+//          (integer maximum, any order)
 // Math:    LabelGS eq. 5; alpha <= ALPHA_MAX; a pair counts where alpha >= ALPHA_MIN, tested on the exponent; a pixel
 //          stops before a splat that would take its transmittance below TRANSMITTANCE_MIN (3DGS).
 //          Layers: eq. 8 and 9, black background, and an L1 term of alpha against the mask; the L1 gradient of a layer

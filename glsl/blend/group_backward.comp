@@ -4,13 +4,14 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "record.glsl"
-// group_backward — blend_backward on cards: walk one chunk of a tile's list back to front; write a gradient record per (splat, tile) pair.
+// group_backward — blend_backward on GPUs: process one chunk of a tile's list back to front; write a gradient record
+//                  per (splat, tile) pair.
 // Work:    one workgroup per chunk, a slot of chunk_jobs; a lane has TILE_PIXELS / GROUP_LANES pixels.
 // Reads:   as blend_backward; counters; chunk_jobs [slots]; chunk_states [states, pixels of a tile];
 //          variants disagreement, depth: chunk_channel [slots, pixels of a tile]
 // Writes:  v_instances_a, _b, _c [I] as blend_backward; pairs that touch no pixel have no record
 // Math:    as blend_backward; a chunk starts with the transmittance and the light behind it.
-// Order:   fixed, bitwise reproducible: a subgroup's sums by a butterfly, those of subgroups in their order.
+// Order:   fixed, bitwise reproducible: sums of a subgroup by a butterfly, then over subgroups in order.
 // Mirror:  src/reference/blend.rs::blend_backward, disagreement.rs::disagreement, disagreement.rs::depth_error
 
 READ1(0, StepUniforms, step);

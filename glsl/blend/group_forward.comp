@@ -3,23 +3,25 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// group_forward — blend_forward on cards: alpha-blend one tile of one layer front to back.
-// Work:    one workgroup per tile, jobs as in blend_forward; a lane has TILE_PIXELS / GROUP_LANES pixels. Of the scene's lists of more
-//          than LONG_LIST splats, one per chunk, and these come first; the last one that is here finishes the tile. Object layers,
-//          pictures (main) and steps that remember main splats (LIFT) have no such lists.
+// group_forward — blend_forward on GPUs: alpha-blend one tile of one layer front to back.
+// Work:    one workgroup per tile, jobs as in blend_forward; a lane has TILE_PIXELS / GROUP_LANES pixels. The scene's
+//          lists of more than LONG_LIST splats get one workgroup per chunk, which come first; the last to finish
+//          completes the tile. Object layers, pictures (main) and steps that record main splats (LIFT) have no such
+//          lists.
 // Reads:   as blend_forward; variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V];
-//          variant depth: depths [P]; but for variant main: long_chunks [counters.long_chunk_count], first_lists
+//          variant depth: depths [P]; except in variant main: long_chunks [counters.long_chunk_count], first_lists
 //          [counters.first_list_count]; chunk_states, w, what a chunk of a long list lets through (group_products)
-// Writes:  as blend_forward; but for variant main: chunk_jobs [slots], the job of each chunk with work for group_backward;
-//          chunk_states [states, pixels of a tile] at the end of each chunk but the last: the light from behind and the
-//          transmittance; variants disagreement, depth: chunk_channel [slots, pixels of a tile], the channel from behind;
-//          variant disagreement: disagreement [T]
-// Math:    as blend_forward. The light behind a chunk is a sum of all that is behind it, over the transmittance there: no
-//          term is negative, so nothing cancels, as in differences between the front and the whole.
-//          T = (T at the chunk's start) (product within the chunk); a pixel stops where that would go below TRANSMITTANCE_MIN. Both
-//          are products in a fixed order that fall from splat to splat, so a pixel stops in the one chunk that starts above and
-//          ends below.
-// Order:   fixed, bitwise reproducible, whatever is skipped, whichever workgroup is first, and however many walk a list.
+// Writes:  as blend_forward; except in variant main: chunk_jobs [slots], the job of each chunk with work for
+//          group_backward; chunk_states [states, pixels of a tile] at the end of each chunk but the last: the light
+//          from behind and the transmittance; variants disagreement, depth: chunk_channel [slots, pixels of a tile],
+//          the channel from behind; variant disagreement: disagreement [T]
+// Math:    as blend_forward. The light behind a chunk is the sum of everything behind it, over the transmittance there:
+//          no term is negative, so nothing cancels, unlike differences between the front and the whole. T = (T at the
+//          chunk's start) (product within the chunk); a pixel stops where that would go below TRANSMITTANCE_MIN. Both
+//          are products in a fixed order that fall from splat to splat, so a pixel stops in the one chunk that starts
+//          above and ends below.
+// Order:   fixed, bitwise reproducible, regardless of what is skipped, which workgroup is first, and how many process a
+//          list.
 // Mirror:  src/reference/blend.rs::blend_forward, disagreement.rs::disagreement
 
 READ1(0, StepUniforms, step);

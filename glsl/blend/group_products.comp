@@ -3,13 +3,15 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// group_products — find what each chunk of a long list lets through, for the walk of its parts by group_forward.
-// Work:    one workgroup per chunk, as in group_forward; none for the last chunk of a list, which has nothing behind it.
+// group_products — find the transmittance of each chunk of a long list, for its processing in parts by group_forward.
+// Work:    one workgroup per chunk, as in group_forward; none for the last chunk of a list, which has nothing behind
+//          it.
 // Reads:   step; counters; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3];
 //          long_chunks [counters.long_chunk_count]
 // Writes:  chunk_states [states, pixels of a tile], w: the product of (1 - alpha) over a chunk, or any number below
-//          TRANSMITTANCE_MIN in the place of a smaller one; last [P], chunk_jobs [slots]: 0 in the tiles and first chunks of long lists
-// Math:    alpha and the product as in group_forward, to the bit: the walk of a part goes on where this one ends.
+//          TRANSMITTANCE_MIN instead of a smaller product; last [P], chunk_jobs [slots]: 0 in the tiles and first
+//          chunks of long lists
+// Math:    alpha and the product as in group_forward, bit for bit: a part continues where this pass ends.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/blend.rs::blend_forward
 

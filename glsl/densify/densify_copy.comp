@@ -7,8 +7,8 @@
 // densify_copy — copy one attribute, or one moment, to the densified model.
 // Work:    one vec4 of one old Gaussian per invocation; STRIDE vec4 per Gaussian.
 // Reads:   step; old_values [N,STRIDE]; densify_actions [N]; child_offsets [N]
-// Writes:  values [new N,STRIDE]. MOMENTS: those of all Gaussians start at 0, except of kept ones and of cloned
-//          parents; frozen ones have none. HALF: words of packed moments (moments_store.glsl), which no float may stand for.
+// Writes:  values [new N,STRIDE]. MOMENTS: 0, except for kept Gaussians and cloned parents; frozen Gaussians have none.
+//          HALF: words of packed moments (moments_store.glsl), which must not be treated as floats.
 // Mirror:  src/reference/densify.rs::densify
 
 layout(constant_id = 14) const uint STRIDE = 1;

@@ -7,11 +7,11 @@
 #include "densify_rules.glsl"
 #include "random.glsl"
 // densify_geometry — write positions, scales and rotations of the densified model.
-// Work:    64 old Gaussians per workgroup; the children of a parent are neighbours and take its place in the order.
+// Work:    64 old Gaussians per workgroup; the children of a parent are adjacent and replace it in the order.
 // Reads:   step; old_means, old_scales, old_quats [N]; densify_actions [N]; child_offsets [N]
 // Writes:  means, scales, quats [new N]
-// Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS); stack: r copies at one place with
-//          1 - (1 - o')^r = o and the light of the one (3DGS-MCMC, see stack).
+// Math:    clone: exact copy; split: mean + R (s * normal), ln s - ln 1.6 (3DGS); stack: r copies at one position with
+//          1 - (1 - o')^r = o and the same light (3DGS-MCMC, see stack).
 // Mirror:  src/reference/densify.rs::densify
 
 layout(local_size_x = 64) in;
@@ -25,8 +25,8 @@ WRITE(6, vec4, means);
 WRITE(7, vec4, scales);
 WRITE(8, vec4, quats);
 
-// Opacity and size of r copies that together look like one Gaussian. In a picture, the copies take the light
-// 2 pi s'^2 sum_j (1 - (1 - o')^j) / j, and the one 2 pi s^2 o.
+// Opacity and size of r copies that together look like one Gaussian. In a picture, the copies absorb the light 2 pi
+// s'^2 sum_j (1 - (1 - o')^j) / j, the original 2 pi s^2 o.
 void stack(uint r, float opacity_min, inout float logit, inout vec3 log_scale) {
     float opacity = sigmoid(logit);
     float sum = logit > 0.0 ? logit + log(1.0 + exp(-logit)) : minus_log1m(opacity); // -ln(1 - o)

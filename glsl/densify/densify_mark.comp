@@ -4,7 +4,8 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "densify_rules.glsl"
-// densify_mark — decide how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split. Frozen ones are kept.
+// densify_mark — decide how many Gaussians each one becomes: 0 pruned, 1 kept, 2 cloned or split. Frozen Gaussians are
+//                kept.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means, scales [N]; densify_stats [trained] (sum, count)
 // Writes:  densify_actions [N]; children_counts [N]; counters.cloned_count, split_count, pruned_count (integer add)

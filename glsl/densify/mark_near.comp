@@ -5,14 +5,14 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 #include "moments_store.glsl"
-// mark_near — mark the Gaussians that fog the camera of the step or one on the way to another camera: before its near
-//             plane, or so large that they engulf the camera of the step. The next densification prunes them.
+// mark_near — mark the Gaussians that fog the step's camera or a camera on the way to another one: in front of its near
+//             plane, or so large that they contain the step's camera. The next densification prunes them.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step, counters; means, scales [N]; variant lazy: moments of both, touched_at [N], missed
 // Writes:  densify_stats [N]: (0, STAT_NEAR) for a marked Gaussian
 // Math:    0 <= z <= near and the slopes of the centre within the limits of the Jacobian, which are the image and a
-//          margin; or max(s) > FREE_SIZE |p|, whatever the direction. Views between the training cameras would show them.
-//          On the way the camera keeps its direction, so that each condition is linear in the share t of the way.
+//          margin; or max(s) > FREE_SIZE |p|, in any direction. Views between the training cameras would show them. The
+//          camera keeps its direction on the way, so each condition is linear in the share t of the way.
 // Mirror:  src/reference/densify.rs::is_near
 
 layout(local_size_x = 64) in;
@@ -40,7 +40,7 @@ float[6] conditions(StepUniforms u, vec3 p, float near) {
         u.clamp_y_max * p.z - p.y);
 }
 
-// Whether all conditions hold somewhere between a camera that sees the centre at `from` and one that sees it at `to`.
+// True if all conditions hold somewhere between a camera that sees the centre at `from` and one that sees it at `to`.
 bool fogs(StepUniforms u, vec3 from, vec3 to, float near) {
     float first[6] = conditions(u, from, near), last[6] = conditions(u, to, near);
     float low = 0.0, high = 1.0;

@@ -9,8 +9,9 @@
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N]; child_offsets [N]: sums of the weights before each Gaussian
 // Writes:  densify_actions [N]; children_counts [N]: from weights to numbers of copies; counters.cloned_count
-// Math:    systematic sampling: even steps through the sum of the weights, from a random start. With the Gaussian itself
-//          a stack has at most RELOCATE_MOST copies (3DGS-MCMC). Draws where nothing grows and of frozen ones are void.
+// Math:    systematic sampling: even steps through the sum of the weights, from a random start. A stack has at most
+//          RELOCATE_MOST copies, including the Gaussian itself (3DGS-MCMC). Draws outside the growth box and of frozen
+//          Gaussians are ignored.
 // Mirror:  src/reference/relocate.rs::copies
 
 layout(local_size_x = 64) in;
@@ -29,7 +30,7 @@ void main() {
     }
     uint weight = children_counts[i], before = child_offsets[i];
     float phase = uniform_draw(u.seed, NO_SPLAT, 0u);
-    // Rounded the same way for the end of one Gaussian and the start of the next, so that none is drawn twice.
+    // The end of one Gaussian and the start of the next are rounded in the same way, so that no draw counts twice.
     precise float from = float(before) * u.draws_per_weight + phase;
     precise float to = float(before + weight) * u.draws_per_weight + phase;
     uint drawn = min(uint(floor(to)), u.draws) - min(uint(floor(from)), u.draws);

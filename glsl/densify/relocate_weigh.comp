@@ -5,13 +5,13 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 #include "densify_rules.glsl"
-// relocate_weigh — the weight of each Gaussian in the draw of relocate_draw: its opacity; 0 for those to be removed.
+// relocate_weigh — the weight of each Gaussian for relocate_draw: its opacity; 0 for Gaussians to be removed.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N]; densify_stats [N]
-// Writes:  children_counts [N]: the weight in steps of 1 / RELOCATE_ONE, at least 1 step, and
-//          no more where nothing grows and for frozen ones; counters.pruned_count
+// Writes:  children_counts [N]: the weight in steps of 1 / RELOCATE_ONE, at least 1 step; exactly 1 outside the growth
+//          box and for frozen Gaussians; counters.pruned_count
 // Math:    3DGS-MCMC: an opacity below prune_opacity is dead, the others are drawn in proportion to their opacity.
-//          Whole weights have an exact prefix sum.
+//          Integer weights have an exact prefix sum.
 // Mirror:  src/reference/relocate.rs::weights
 
 layout(local_size_x = 64) in;

@@ -5,7 +5,7 @@
 // find_nonfinite — find the first row of a plane with a NaN or infinity.
 // Work:    64 invocations per workgroup, FINITE_GROUPS workgroups; each takes every such word.
 // Reads:   step; plane [rows, ROW_WORDS] as words
-// Writes:  nonfinite_rows [PLANE], the least row (integer minimum, any order); unchanged without one
+// Writes:  nonfinite_rows [PLANE], the lowest row (integer minimum, any order); unchanged if all are finite
 // Mirror:  src/reference/finite.rs::first_nonfinite
 
 layout(local_size_x = 64) in;

@@ -8,7 +8,8 @@
 // step_begin — clear the counters and size the dispatches over all Gaussians or all layers.
 // Work:    one invocation; variant look: many workgroups, to clear.
 // Reads:   step
-// Writes:  counters, but for the failure; dispatch_args (all entries; 0 for later stages); variants look, sweep: look_back, sweep = 0
+// Writes:  counters, except the failure; dispatch_args (all entries; 0 for later stages); variants look, sweep:
+//          look_back, sweep = 0
 // Mirror:  none (bookkeeping; every later pass fails without it)
 
 #ifdef LOOK

@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 // gather — sum the gradient records of each splat, in the order of instances; update the densification statistic.
-// Work:    64 splats per workgroup; variant group: a splat with many records by all of them, in a tree.
+// Work:    64 splats per workgroup; variant group: a splat with many records is summed by all invocations, in a tree.
 // Reads:   step, counters; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          gaussian_from_splat [V]; variant labels: labels [N], layer_from_label
 // Writes:  v_splats [V,3]: v_mean2d (px), v_conic xy..; v_conic z, v_log_opacity, v_colour rg; v_colour b

@@ -3,13 +3,13 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// weigh — add the blending weight of each splat in the view, summed over all pixels, to that of its Gaussian.
+// weigh — add each splat's blending weight in the view, summed over all pixels, to its Gaussian's weight.
 // Work:    64 splats per workgroup.
 // Reads:   counters; tiles_touched, instance_offsets [V]; gaussian_from_splat [V]; v_instances_b, _c [I] for a
 //          gradient of 1 of the red of every pixel; step (its stamp)
 // Writes:  densify_stats [N].x += weight, px
-// Math:    the picture is linear in the colours of the splats, and the factors are the blending weights: the gradient of
-//          the sum of all pixels with respect to a splat's red is the sum of its weights.
+// Math:    the picture is linear in the colours of the splats, and the factors are the blending weights: the gradient
+//          of the sum of all pixels with respect to a splat's red is the sum of its weights.
 // Order:   fixed, bitwise reproducible; no atomics.
 // Mirror:  src/reference/lift.rs::vote
 

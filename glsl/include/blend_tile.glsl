@@ -6,8 +6,8 @@ layout(constant_id = 1) const uint TILE_WIDTH = 8;
 layout(constant_id = 2) const uint TILE_HEIGHT = 8;
 layout(local_size_x_id = 0) in;
 
-// lavapipe ends all loops of an invocation after 65,535 rounds in total. Several dispatches (SEGMENTED) walk a list
-// longer than a segment, and pass on the state of the pixels through memory.
+// lavapipe ends all loops of an invocation after 65,535 rounds in total. Lists longer than a segment take several
+// dispatches (SEGMENTED), which pass the pixels' state through memory.
 #ifdef SEGMENTED
 layout(constant_id = 14) const uint SEGMENT_LENGTH = 40960;
 #endif
@@ -20,7 +20,7 @@ uvec2 lane_corner() {
 
 #include "tile_job.glsl"
 
-// Where memory keeps a pixel of the lane, within its tile.
+// Index of a pixel of the lane within its tile, in memory.
 uint tile_pixel(TileJob t, uint k) {
     return k * SUBGROUP_SIZE + gl_LocalInvocationID.x;
 }

@@ -1,14 +1,14 @@
-// Parameters of a Gaussian with the updates that it has missed: those of the steps since its last one, in which its gradient
-// was 0. The includer declares touched_at and missed, and the planes that it names to CAUGHT_UP with their moments
-// (moments_store.glsl); plane4 is an element of one of them. LAZY: else nothing is missed.
+// Applies the updates that a Gaussian has missed: the steps since its last update, in which its gradient was 0. The
+// includer declares touched_at and missed, and the planes that it names to CAUGHT_UP with their moments
+// (moments_store.glsl); plane4 is an element of one of them. Without LAZY, nothing is missed.
 //
-// Without a gradient the moments shrink by beta1 and beta2, so that the k-th missed update moves a parameter by
-// r^k m / sqrt(v) times w, with r = beta1 / sqrt(beta2) and w the rate of that update with its corrections. The sums of r^k w
-// are the same for all Gaussians that missed as many updates: the host adds them up in f64.
+// Without a gradient the moments shrink by beta1 and beta2, so that the k-th missed update moves a parameter by r^k m /
+// sqrt(v) times w, with r = beta1 / sqrt(beta2) and w the bias-corrected rate of that update. The sums of r^k w are the
+// same for all Gaussians that missed the same number of updates; the host computes them in f64.
 //
-// missed: rows of MISSED_VECTORS. Row 0: the number of updates before this step, and the last one that no Gaussian missed; the
-// w of this step's update. Row 1 + age: after so many missed updates, the sums for means and opacities; those for scales,
-// rotations, colours of degree 0 and of higher ones; beta1^age, beta2^age, r^age.
+// missed: rows of MISSED_VECTORS. Row 0: the number of updates before this step, and the last one that no Gaussian
+// missed; the w of this step's update. Row 1 + age: after this many missed updates, the sums for means and opacities;
+// for scales, rotations, colours of degree 0 and of higher degrees; beta1^age, beta2^age, r^age.
 
 #ifdef LAZY
 
@@ -37,12 +37,12 @@ void look_up(uint age) {
     late_shrink = missed_row(1u + age, 2u).xy;
 }
 
-// Looks up what a Gaussian has missed before this step, if it is trained.
+// Looks up the updates that a Gaussian has missed before this step, if it is trained.
 void look_up_trained(StepUniforms u, uint i) {
     look_up(i < u.trained_count ? missed_updates(i) : 0u);
 }
 
-// The same after this step's update, which the Gaussian may have missed too.
+// The same after this step's update, which the Gaussian may also have missed.
 void look_up_after(uint i) {
     uvec4 now = missed[0];
     uint last = max(touched(i), now.y);
@@ -61,7 +61,7 @@ vec4 late_direction(vec4 m, vec4 v) {
     return m / (sqrt(v) + ADAM_EPSILON);
 }
 
-// Declares value4 of a plane: an element with the updates that look_up has found missing.
+// Declares value4 of a plane: an element after the missed updates that look_up found.
 #define CAUGHT_UP(name, sums) \
     vec4 name##_now(uint e) { \
         vec4 value = plane4(name, e); \

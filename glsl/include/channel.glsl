@@ -1,4 +1,4 @@
-// One more channel of the backward walk, of opacities only: what each splat carries differs from what the pixel has.
+// An additional channel of the backward pass, for opacities only: the difference between splat and pixel values.
 
 #ifdef DISAGREEMENT
 #include "view_label.glsl"
@@ -33,7 +33,7 @@ void write_sum(uint tile, float wrong[ROWS]) {
 }
 #endif
 #else
-// Depths: 1 / known depth of the pixel, 0 for unknown, against the splat's; behind all splats nothing is right.
+// Depths: 1 / known depth of the pixel, 0 for unknown, against the splat's; the background never matches.
 uint channel_of_pixel(uint p, bool inside, StepUniforms u, out float weight, out float behind) {
     float inverse = inside ? depths[p] : 0.0;
     weight = inverse > 0.0 ? u.depth_weight : 0.0;

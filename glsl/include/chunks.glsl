@@ -1,5 +1,5 @@
-// What the forward walk of group_tile.glsl keeps of the chunks of a list, for the backward walk, and for the last of the workgroups
-// that walk its parts. Nothing in variant main.
+// State that the forward pass of group_tile.glsl stores per list chunk, for the backward pass and for the last
+// workgroup of a list in parts. Nothing in variant main.
 
 #ifndef MAIN
 shared uint parts_here, deepest;
@@ -10,7 +10,7 @@ shared uint parts_here, deepest;
 shared uint staged_channel[BATCH];
 #endif
 
-// The channel (channel.glsl) as far as the walk is, and what it ends with where nothing is behind.
+// The channel (channel.glsl) so far, and its final value if nothing is behind.
 struct Channel {
 #ifdef CHANNEL
     uint own[ROWS];
@@ -27,7 +27,7 @@ void begin_channel(uint p, bool inside, StepUniforms u, uint k, inout Channel ch
 #endif
 }
 
-// Place of the state of pixel k at the end of a chunk; channels have one in each slot.
+// Index of pixel k's state at the end of a chunk; channels have one in each slot.
 uint state_of(Work work, uint chunk, uint k) {
     return (work.start / CHUNK_LENGTH + chunk) * TILE_PIXELS + tile_pixel(work.t, k);
 }
@@ -36,8 +36,8 @@ uint channel_state_of(Work work, uint chunk, uint k) {
     return state_of(work, chunk, k) + work.job * TILE_PIXELS;
 }
 
-// Ends a chunk for pixel k: sums over the transmittance at its start become sums, and the next chunk starts with what this one lets
-// through. The products round here alone, whoever walks the next one.
+// Ends a chunk for pixel k: sums over the transmittance at its start become sums, and the next chunk starts with this
+// one's transmittance. Products are rounded only here, whichever workgroup processes the next chunk.
 void close_chunk(uint k, inout float p, inout float transmittance, inout vec3 light, inout Channel channel) {
     precise vec3 of_chunk = transmittance * light;
     light = of_chunk;
@@ -62,8 +62,8 @@ void keep(Work work, uint chunk, uint k, inout vec3 light, float transmittance, 
     light = vec3(0.0);
 }
 
-// Turns the light of each of the `kept` chunks into the light behind it, given that of the last one and of the background; and the
-// channel likewise, whose sum is then that of the whole list.
+// Converts the light of each `kept` chunk to the light behind it, given the light of the last chunk and the background;
+// the same for the channel, whose sum is then that of the whole list.
 void look_behind(Work work, uint kept, uint k, vec3 light, float transmittance, inout Channel channel) {
 #ifdef CHANNEL
     precise float back = transmittance * channel.behind[k], sum = channel.sum[k] + back;
@@ -86,9 +86,9 @@ void look_behind(Work work, uint kept, uint k, vec3 light, float transmittance, 
 }
 
 #ifndef MAIN
-// Leaves pixel k of a part. What has no state, because nothing is behind, waits in the picture: the light of the last chunk, and the
-// transmittance at the end from the one chunk that knows it, in which the pixel stops or the list ends. By components, because
-// other workgroups write the others, or read them.
+// Stores pixel k of a part. Values without a state slot are stored in the picture: the light of the last chunk, and the
+// final transmittance from the chunk in which the pixel stops or the list ends. Components are written separately,
+// because other workgroups access the others.
 void put_part(Work work, uint k, vec3 light, float transmittance, bool stops, uint final_, StepUniforms u, Channel channel) {
     TileJob t = work.t;
     uint at = state_of(work, work.chunk, k), pixel = (t.y0 + k) * u.width + t.x;
@@ -113,7 +113,7 @@ void put_part(Work work, uint k, vec3 light, float transmittance, bool stops, ui
 #endif
 }
 
-// True in the last workgroup of a list that asks, which then sees what all wrote.
+// True in the last workgroup of a list that calls this, which then sees all writes.
 bool all_are_here(uint first_slot, uint chunks) {
     memoryBarrierBuffer();
     barrier();
@@ -125,8 +125,8 @@ bool all_are_here(uint first_slot, uint chunks) {
     return parts_here == chunks;
 }
 
-// Takes what the parts left of pixel k, as if this workgroup had walked them all: the states between them, the light before the last
-// chunk and that of it, the transmittance at the end, the last splat.
+// Loads what the parts stored for pixel k, as if this workgroup had processed them all: the states between them, the
+// light before the last chunk and of that chunk, the final transmittance, the last splat.
 void take_parts(Work work, uint kept, uint k, inout vec3 before, inout vec3 light, inout float at_end, inout uint final_,
     StepUniforms u, inout Channel channel) {
     TileJob t = work.t;
@@ -151,8 +151,8 @@ void take_parts(Work work, uint kept, uint k, inout vec3 before, inout vec3 ligh
 }
 #endif
 
-// Gives pixel k of a part the transmittance at its start: the product of those that the chunks before it let through
-// (group_products.comp). It falls from chunk to chunk, so the pixel has stopped before if it is too low.
+// Sets pixel k's transmittance at the start of a part: the product of the transmittances of all earlier chunks
+// (group_products.comp). It decreases from chunk to chunk, so if it is too low, the pixel has stopped before.
 void start_part(Work work, uint k, inout float p, inout float transmittance) {
 #ifndef MAIN
     for (uint e = 0u; e < work.chunk; e++) {
@@ -163,8 +163,8 @@ void start_part(Work work, uint k, inout float p, inout float transmittance) {
 #endif
 }
 
-// Ends the last chunk of a walk. A part is left to the last workgroup of its list; there, as for a whole list, returns true and what
-// the walk of the whole list has.
+// Ends the last chunk. Parts are completed by the last workgroup of their list; there, as for whole lists, returns true
+// and the results of the whole list.
 bool finish_walk(Work work, inout uint kept, inout float p[ROWS], inout float T[ROWS], inout vec3 light[ROWS],
     inout vec3 before[ROWS], inout uint final_[ROWS], StepUniforms u, inout Channel channel) {
     [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -190,7 +190,7 @@ bool finish_walk(Work work, inout uint kept, inout float p[ROWS], inout float T[
     return true;
 }
 
-// Says in which chunks of a list, up to the furthest splat that counts in any lane, the backward walk has work.
+// Lists the chunks, up to the furthest splat that counts in any lane, for which the backward pass has work.
 void list_chunks(Work work, uint furthest) {
 #ifndef MAIN
     if (gl_LocalInvocationID.x == 0u) {

@@ -1,4 +1,4 @@
-// What follows from a number that was counted: its counter, and the sizes of dispatches, unless it does not fit. Step, counters and
+// Writes what depends on a count: its counter, and dispatch sizes, unless it exceeds the capacity. Step, counters and
 // dispatch_args are declared before.
 
 #include "dispatch.glsl"
@@ -26,8 +26,8 @@ void put_instances(uint total) {
     put_groups(ARGS_SWEEP_INSTANCES, counters.failure != 0u ? 0u : partitions(total));
 }
 
-// All tiles of the scene, then the occupied tiles of object layers, given the longest list. Nothing after any failure: pairs that
-// were only counted have no lists, and the backward walk no chunks to find.
+// All tiles of the scene, then the occupied tiles of object layers, given the longest list. Nothing after any failure:
+// pairs that were only counted have no lists, and the backward pass has no chunks.
 void put_blend(uint layers, uint longest) {
     counters.failure |= (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
         | (longest > step.longest_list ? FAILED_SEGMENTS : 0u);

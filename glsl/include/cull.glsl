@@ -1,4 +1,4 @@
-// The test of a Gaussian that counts at no pixel: behind the near plane, too transparent, or certainly outside the image. Needs
+// Tests if a Gaussian counts at no pixel: behind the near plane, too transparent, or certainly outside the image. Needs
 // gaussian.glsl.
 
 // Bits of z, or KEY_INVISIBLE. `mean` as in means; `s` are the logarithms of the deviations.

@@ -1,4 +1,4 @@
-// Densification decision for one Gaussian; the same function serves counting and applying.
+// Densification decision for one Gaussian; the same function is used for counting and applying.
 
 const uint ACTION_PRUNE = 0u;
 const uint ACTION_KEEP = 1u;

@@ -1,4 +1,4 @@
-// Histograms of the digits of the keys that a workgroup writes, for a sort of them by passes that look back (sweep.glsl).
+// Histograms of the digits of the keys that a workgroup writes, for a look-back sort (sweep.glsl).
 // All invocations clear the bins, then count their keys, then add to the buffer `sweep`, with a barrier between.
 
 layout(constant_id = 9) const uint DIGIT_BITS = 8;

@@ -1,13 +1,13 @@
-// Finds the tiles with a pixel where a splat counts (alpha >= ALPHA_MIN), in closed form: an ellipse is convex, so those of a
-// row of tiles are an interval. Counting and emitting both use these functions. They are two pipelines but must agree to the last
-// bit: hence `precise`. Rounding may add a tile but never drops one, so a picture does not depend on the tile size.
-// Needs gaussian.glsl.
+// Finds the tiles with a pixel where a splat counts (alpha >= ALPHA_MIN), in closed form: an ellipse is convex, so
+// those of a row of tiles are an interval. Counting and emitting both use these functions. They are two pipelines but
+// must agree to the last bit: hence `precise`. Rounding may add a tile but never drops one, so a picture does not
+// depend on the tile size. Needs gaussian.glsl.
 
 layout(constant_id = 1) const uint TILE_WIDTH = 8;
 layout(constant_id = 2) const uint TILE_HEIGHT = 8;
 
-// At y px below the mean, the ellipse reaches from lean y - w to lean y + w px right of it, where w w = width2 - taper y y. Its
-// rightmost point is at y = tip, the leftmost one at -tip.
+// At y px below the mean, the ellipse reaches from lean y - w to lean y + w px right of it, where w w = width2 - taper
+// y y. Its rightmost point is at y = tip, the leftmost one at -tip.
 struct Ellipse {
     vec2 mean; // px
     float lean, width2, taper, tip;

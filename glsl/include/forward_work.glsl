@@ -1,5 +1,5 @@
-// What a workgroup of the forward walk of cards works on: a list, or a chunk of a long one. Chunks of long lists come first, then
-// the next longest lists (long_lists.glsl), then the others in their order.
+// The work of a forward workgroup on GPUs: a list, or a chunk of a long list. Chunks of long lists come first, then
+// the next longest lists (long_lists.glsl), then the other lists in order.
 
 #ifdef MAIN
 const bool HAS_PARTS = false;

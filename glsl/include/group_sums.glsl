@@ -1,4 +1,5 @@
-// Ten sums over the lanes of each subgroup of a workgroup, for each of the splats that they walk at once, in shared memory.
+// Ten sums over the lanes of each subgroup of a workgroup, for each of the splats that they process at once, in shared
+// memory.
 
 #include "transposed_sums.glsl"
 

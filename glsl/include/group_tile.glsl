@@ -1,15 +1,16 @@
-// Common code of the blend passes of cards: a workgroup of several subgroups owns one tile of one layer. A subgroup owns a block of
-// its pixels, and a lane ROWS pixels of one column. Splats are staged in shared memory, relative to the tile's corner, and a
-// subgroup skips those that its block does not touch; the result does not depend on that.
+// Common code of the blend passes on GPUs: a workgroup of several subgroups owns one tile of one layer. A subgroup owns
+// a block of its pixels, and a lane ROWS pixels of one column. Splats are staged in shared memory, relative to the
+// tile's corner, and a subgroup skips splats that its block does not touch, which does not affect the result.
 //
-// A list is cut into chunks of CHUNK_LENGTH splats. The forward walk keeps each pixel's transmittance and light at the end of
-// a chunk, so that the backward walk has a workgroup for each chunk, and no tile is waited for. Chunks are numbered without a
-// scan: those of job j, whose list starts at pair s, have the slots from s / CHUNK_LENGTH + j on, because lists ascend with
-// their jobs; there are always enough. States between chunks are numbered from s / CHUNK_LENGTH on.
+// A list is cut into chunks of CHUNK_LENGTH splats. The forward pass stores each pixel's transmittance and light at the
+// end of a chunk, so that the backward pass has a workgroup per chunk, and no tile delays the others. Chunks are
+// numbered without a scan: the chunks of job j, whose list starts at pair s, have the slots starting at s /
+// CHUNK_LENGTH + j. Lists ascend with their jobs, so there are always enough slots. States between chunks start at s /
+// CHUNK_LENGTH.
 //
-// The forward walk of a list is a walk of its chunks. The transmittance is that at the chunk's start, which is the product of those
-// that the chunks before let through, times that within the chunk; so long lists can be walked by a workgroup for each chunk
-// (group_products.comp), with the same bits.
+// The forward pass processes a list chunk by chunk. The transmittance is the product of all earlier chunks'
+// transmittances, times the transmittance within the chunk, so long lists can be processed by one workgroup per chunk
+// (group_products.comp) with the same bits.
 
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 16;
@@ -76,8 +77,9 @@ void stage(uint at, uint index, vec2 corner) {
     staged_2[at] = fetch4(splats, 3u * index + 2u);
 }
 
-// True unless the staged splat counts at no pixel of the subgroup's block. Between pixels too: the largest exponent over the block,
-// which is 0 at the mean and falls from there, lies on the sides that face the mean. Margins as in ellipse.glsl.
+// True unless the staged splat counts at no pixel of the subgroup's block. Also between pixels: the largest exponent
+// over the block, which is 0 at the mean and decreases from there, is on the sides that face the mean. Margins as in
+// ellipse.glsl.
 bool touches(uint at) {
     if (CULLS == 0u) {
         return true;
@@ -96,7 +98,8 @@ bool touches(uint at) {
     return !is_beyond; // true for NaN too
 }
 
-// A bit for each of the subgroup's lanes up to `count` whose splat is hit. Emulated subgroups walk all, because they must walk together.
+// A bit for each of the subgroup's lanes up to `count` whose splat is hit. Emulated subgroups process all, because they
+// must stay together.
 uvec2 hits_of(bool hit, uint count) {
 #ifdef EMULATED
     return uvec2(count >= 32u ? 0xffffffffu : (1u << count) - 1u,
@@ -110,7 +113,7 @@ bool some(uvec2 hits) {
     return (hits.x | (SUBGROUP_SIZE > 32u ? hits.y : 0u)) != 0u;
 }
 
-// Takes the first hit, which there must be.
+// Removes the first hit, which must exist.
 uint take_first(inout uvec2 hits) {
     bool low = SUBGROUP_SIZE <= 32u || hits.x != 0u;
     uint j = low ? uint(findLSB(hits.x)) : 32u + uint(findLSB(hits.y));
@@ -118,7 +121,7 @@ uint take_first(inout uvec2 hits) {
     return j;
 }
 
-// Takes the last one.
+// Removes the last hit.
 uint take_last(inout uvec2 hits) {
     bool high = SUBGROUP_SIZE > 32u && hits.y != 0u;
     uint j = uint(findMSB(high ? hits.y : hits.x));

@@ -2,7 +2,7 @@
 
 #include "view_label.glsl"
 
-// 1: the paper's lift is on; each pixel then remembers its main splat.
+// 1: the paper's lift is on; each pixel then records its main splat.
 layout(constant_id = 16) const uint LIFT = 0;
 const bool REMEMBERS_MAIN = LIFT != 0u;
 
@@ -49,8 +49,8 @@ void finish_layer(TileJob t, float T[ROWS], vec3 colour[ROWS], uint final_[ROWS]
         bool counts = inside && photo.w > 0.5 && !left_out(t.layer, here, u);
         vec4 difference = counts ? vec4(colour[k], 1.0 - abs(T[k])) - wanted : vec4(0.0);
         vec4 change = counts ? abs(difference) - wanted : vec4(0.0); // wanted >= 0
-        // Opacity costs what it is off beyond the slack, but not where another object may be before this one. Without any
-        // opacity that is 1 - slack inside the mask, 0 outside.
+        // The opacity error beyond the slack is penalised, except where another object may be in front. With zero
+        // opacity, it is 1 - slack inside the mask, 0 outside.
         float off = here == label || here == 0u ? max(abs(difference.w) - ALPHA_SLACK, 0.0) : 0.0;
         loss += change.x + change.y + change.z + u.label_alpha * (off - (counts ? (1.0 - ALPHA_SLACK) * wanted.w : 0.0));
         difference.w = off > 0.0 ? difference.w : 0.0;

@@ -1,5 +1,5 @@
-// Updates of an element of a plane and of its moments (caught_up.glsl), as adam.comp makes them: first those that look_up has
-// found missing, then that of the step.
+// Updates an element of a plane and its moments like adam.comp: first the missed updates that look_up found
+// (caught_up.glsl), then the step's update.
 
 void shrink(inout vec4 value, inout vec4 m, inout vec4 v, vec4 sums) {
     value -= sums * late_direction(m, v);
@@ -13,7 +13,7 @@ void adam_step(StepUniforms u, inout vec4 value, inout vec4 m, inout vec4 v, vec
     value -= rate * (m * u.adam_correction1) / (sqrt(v * u.adam_correction2) + ADAM_EPSILON);
 }
 
-// Numbers of the planes in what their packed moments draw.
+// Plane numbers for the random draws of packed moments.
 const uint plane_means = 0u, plane_scales = 1u, plane_quats = 2u, plane_sh0 = 3u, plane_sh1 = 4u, plane_sh2 = 5u, plane_sh3 = 6u;
 
 #define LATE_ADAM(name, sums) \

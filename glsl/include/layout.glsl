@@ -23,15 +23,15 @@
 #define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
 #define INOUT(number, T, name) STORAGE(number, ) name##_block { T name[]; }
 
-// Also what other workgroups of the dispatch wrote, after a memoryBarrierBuffer() of both.
+// Also sees writes of other workgroups of the dispatch, after a memoryBarrierBuffer() of both.
 #define INOUT_SHARED(number, T, name) STORAGE(number, coherent) name##_block { T name[]; }
 
 #define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }
 #define WRITE1(number, T, name) STORAGE(number, writeonly) name##_block { T name; }
 #define INOUT1(number, T, name) STORAGE(number, ) name##_block { T name; }
 
-// Words of a pass that all its invocations share: passes that differ in them alone are compiled once. On the Rust side they are
-// like specialisation constants.
+// Push constants of a pass: passes that differ only in these are compiled once. On the Rust side they are like
+// specialisation constants.
 layout(push_constant) uniform PassWords {
     uint COUNT_SOURCE; // what the items are (count.glsl)
     uint LANES;        // of a sort or scan over all workgroups

@@ -1,4 +1,4 @@
-// How long the pixels of a forward walk of cards take splats.
+// Tracks whether pixels of the forward pass on GPUs still accept splats.
 
 shared uint live_subgroups; // SUBGROUPS at the start
 
@@ -10,7 +10,7 @@ float most_of(float p[ROWS]) {
     return most;
 }
 
-// False once no subgroup of the workgroup has a pixel that takes splats; `is_live` says if this one has.
+// False once no subgroup of the workgroup has a pixel that accepts splats; `is_live` says if this one has.
 bool some_live(bool still, inout bool is_live) {
     if (is_live && !still && subgroup_lane() == 0u) {
         atomicAdd(live_subgroups, 0xffffffffu);

@@ -1,8 +1,9 @@
-// Lists of the scene that the forward walk of cards takes before the others, because the walk ends with them. Counters and step are
+// Lists of the scene that the forward pass on GPUs processes first, because they take longest. Counters and step are
 // declared before.
 
 layout(constant_id = 20) const uint LONG_LIST = 1024; // longer lists may be walked in parts
-const uint LONG_SHARE = 512u; // they are if they have more than this part of all pairs: others end while a card walks the rest
+// Only if they have more than this part of all pairs: shorter lists finish while the GPU processes the rest.
+const uint LONG_SHARE = 512u;
 
 // A workgroup for each chunk.
 bool is_long(uint length) {

@@ -1,13 +1,13 @@
-// Sums over the partitions before this one, for passes of one dispatch with one word a partition. As in sweep.glsl, but all
-// invocations of a workgroup look back at once, each at another partition. The includer declares the buffer look_back, which is 0
-// before the step, and LOOK_LANES, its invocations.
+// Sums over the partitions before this one, for single-dispatch passes with one word per partition. As in sweep.glsl,
+// but all invocations of a workgroup look back at once, each at a different partition. The includer declares the buffer
+// look_back, which is 0 before the step, and LOOK_LANES, its invocations.
 //
 // The buffer: a ticket for each of the two passes; the words of project_visible; those of emit_ordered.
 
 #include "partition_words.glsl"
 const uint LOOK_SPINS = 16u;        // looks at a word that is not there yet
 
-// Gaussians of an invocation of project_visible, of `n` in all: few where there would not be enough workgroups.
+// Gaussians per invocation of project_visible, of `n` in all: few if there would not be enough workgroups.
 uint visible_items(uint n) {
     return clamp(n >> 17u, VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST);
 }
@@ -32,7 +32,7 @@ uint look_words(uint n) {
 shared uint look_ticket, look_failed;
 shared uint look_nearest, look_missing, look_low, look_high;
 
-// What a partition has, by all its invocations; each pass has its own.
+// Counts a partition, by all its invocations; each pass defines its own.
 uint look_recount(uint part);
 
 // The partition of this workgroup, taken from a ticket, and the failure word, equal for all of them.
@@ -46,8 +46,8 @@ uint look_partition(uint ticket, uint failed, out bool has_failed) {
     return look_ticket;
 }
 
-// Tells what the partition has, and returns the sum over the partitions before. Called by all invocations of the workgroup, with
-// equal arguments.
+// Publishes the partition's count, and returns the sum over earlier partitions. Called by all invocations of the
+// workgroup with equal arguments.
 uint look_before(uint words, uint part, uint own) {
     uint lane = gl_LocalInvocationIndex;
     bool tells = lane == 0u && part + 1u != SWEEP_HELD;

@@ -1,5 +1,6 @@
-// The gradient record of a splat from its sums over the pixels of a tile: six moments of p about the tile's centre, in the order of
-// transposed_sums.glsl, then v_colour, then the channel. `mean` is relative to the tile's corner, `q` the conic in the exponent.
+// The gradient record of a splat from its sums over the pixels of a tile: six moments of p about the tile's centre, in
+// the order of transposed_sums.glsl, then v_colour, then the channel. `mean` is relative to the tile's corner, `q` the
+// conic in the exponent.
 
 void write_record(uint instance, vec2 mean, vec3 q, float sums[SUMS], uint stamp) {
     float o0 = sums[0], ox = sums[1], oy = sums[2], oxx = sums[3], oxy = sums[4], oyy = sums[5];

@@ -1,13 +1,14 @@
-// First and second moments m and v of Adam of an element of a plane, each a vec4, in memory: in two planes of floats, or with HALF
-// in one of words, a word for each parameter.
+// First and second moments m and v of Adam of an element of a plane, each a vec4, in memory: in two planes of floats,
+// or with HALF in one of words, a word for each parameter.
 //
-// A word has q = m / sqrt(v) in its high 16 bits, in steps of 1 / MOMENT_RATIO: Adam lets no |q| be more than 7.3. Its low 16 bits
-// have log2(sqrt(v)) above -MOMENT_FLOOR, in steps of 1 / MOMENT_LOG, from about ADAM_EPSILON to 2^14; or 0 where v is 0, and the
-// whole word is. So a plane of zeros has no moments in both forms.
+// A word has q = m / sqrt(v) in its high 16 bits, in steps of 1 / MOMENT_RATIO: Adam lets no |q| be more than 7.3. Its
+// low 16 bits have log2(sqrt(v)) above -MOMENT_FLOOR, in steps of 1 / MOMENT_LOG, from about ADAM_EPSILON to 2^14; or 0
+// where v is 0, and the whole word is. A plane of zeros therefore means zero moments in both forms.
 //
-// What lies between two steps is rounded to either at random, so that it is right in the mean of many updates. To the nearest one,
-// v would stand still: an update moves it by a thousandth of g^2 - v, and half a step is 7e-4 of v. What is drawn depends on the
-// seed of the step, the element and its plane: the same step has the same bits. No plane draws what other passes of the step do.
+// Values between two steps are rounded stochastically, so that they are right on average over many updates. With
+// rounding to nearest, v would never change: an update moves it by a thousandth of g^2 - v, and half a step is 7e-4 of
+// v. The draw depends on the step's seed, the element and its plane, so the same step has the same bits. Draws differ
+// from those of other passes.
 
 #ifdef HALF
 #include "random.glsl"

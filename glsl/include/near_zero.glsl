@@ -1,4 +1,5 @@
-// Logarithms and exponentials that keep their relative precision near zero. Vulkan lets `log` err by 5e-7 near 1.
+// Logarithms and exponentials that keep their relative precision near zero. Vulkan allows `log` an error of 5e-7 near
+// 1.
 #ifndef NEAR_ZERO_GLSL
 #define NEAR_ZERO_GLSL
 

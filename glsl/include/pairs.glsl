@@ -1,6 +1,7 @@
-// Writes (splat, tile) pairs. The includer declares tile_keys, splat_from_instance, and with SWEEP includes digit_counts.glsl.
+// Writes (splat, tile) pairs. The includer declares tile_keys, splat_from_instance, and with SWEEP includes
+// digit_counts.glsl.
 
-// Where the instances of a splat go.
+// Destination of a splat's instances.
 struct Target {
     uint splat, layer;
     uint first; // instance

@@ -1,10 +1,10 @@
-// What a partition tells those after it (sweep.glsl, look_back.glsl): two bits for the state of a word, then a sum.
+// The word that a partition publishes (sweep.glsl, look_back.glsl): two state bits, then a sum.
 
 const uint SWEEP_OWN = 1u << 30u;    // of the partition alone
 const uint SWEEP_PREFIX = 2u << 30u; // of all partitions up to this one
 const uint SWEEP_SUM = (1u << 30u) - 1u;
 
-// A sum that does not leave the bits of a word; the largest stands for all above.
+// A sum that saturates at the largest value of its bits.
 uint sweep_add(uint a, uint b) {
     return min(a + b, SWEEP_SUM);
 }

@@ -1,7 +1,8 @@
-// Correction of a camera's pose by the rows of a photo, ROW and those after it: six trained numbers in two rows; the
-// first one's fourth number is 1 once the pose is settled, the second one's is the depth of the scene in this view. Then the
-// six rows of the photo's preconditioner, each in two of these rows. The preconditioner times the numbers is a Rodrigues
-// vector in camera space, and a move in camera space in units of that depth. step_rows and shared_parameters are declared before.
+// Correction of a camera's pose by the rows of a photo, starting at ROW: six trained numbers in two rows; the fourth
+// number of the first row is 1 once the pose is settled, that of the second row is the scene depth in this view. Then
+// the six rows of the photo's preconditioner, each in two of these rows. The preconditioner times the numbers is a
+// Rodrigues vector in camera space, and a translation in camera space in units of that depth. step_rows and
+// shared_parameters are declared before.
 
 float correction(uint k) {
     uint row = ROW + 2u * (k + 1u);

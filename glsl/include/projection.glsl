@@ -1,5 +1,5 @@
-// Projection of one Gaussian: the forward quantities of project_forward, which project_backward recomputes. The includer
-// includes gaussian.glsl before. ANTIALIASED: blur takes opacity, so that the light of a splat stays the same.
+// Projection of one Gaussian: the forward quantities of project_forward, which project_backward recomputes. The
+// includer includes gaussian.glsl before. ANTIALIASED: blur reduces opacity, so that a splat's light stays the same.
 
 struct Projection {
     vec3 view;      // mean in camera space

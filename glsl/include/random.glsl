@@ -11,7 +11,7 @@ float uniform_draw(uint seed, uint index, uint draw) { // in (0, 1)
     return (float(pcg_hash(pcg_hash(pcg_hash(seed) + index) + draw) >> 8) + 0.5) * (1.0 / 16777216.0);
 }
 
-// Vulkan lets `cos` err by 5e-4. Drivers use this, so a series stands in for it.
+// Vulkan allows `cos` an error of 5e-4, and drivers use it, so a series replaces it.
 
 float cos_of_turns(float turns) { // turns in [0, 1]; Taylor series over a quarter of a turn
     float half_turn = abs(turns - 0.5); // cos(2 pi turns) = -cos(2 pi half_turn)

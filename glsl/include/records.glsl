@@ -1,5 +1,5 @@
-// Sums of the gradient records of a splat. The includer declares their planes, what finds them, densify_stats and step. GROUP:
-// also of a splat with many records, by all invocations of a workgroup.
+// Sums of the gradient records of a splat. The includer declares their planes, the offsets, densify_stats and step.
+// With GROUP, all invocations of a workgroup sum a splat with many records.
 
 #ifdef GROUP
 const uint WALKERS = 64u; // invocations of a workgroup
@@ -9,7 +9,7 @@ shared vec4 shared_a[WALKERS / 2u], shared_b[WALKERS / 2u]; // and sums of one o
 shared vec3 shared_c[WALKERS / 2u];
 #endif
 
-// Records of a splat; those of the scene layer are first.
+// Records of a splat; records of the scene layer come first.
 struct Records {
     uint first, total, scene, gaussian;
 };
@@ -61,7 +61,8 @@ void note_gradient(Records r, Sums sums) {
 }
 
 #ifdef GROUP
-// The sums of a splat by all invocations: each adds up every 64th record, and a tree their sums, for the first invocation.
+// The sums of a splat by all invocations: each adds up every 64th record, and a tree their sums, for the first
+// invocation.
 Sums sum_together(Records r) {
     uint lane = gl_LocalInvocationID.x;
     Sums sums = sum_records(r, lane, WALKERS);

@@ -1,5 +1,5 @@
-// The rows of tiles of a workgroup's splats, shared out among its invocations one by one, so that nobody waits for the one with a
-// large splat. All invocations of the workgroup call share_rows and sums_before.
+// Distributes the tile rows of a workgroup's splats among its invocations, so that none waits for the one with a large
+// splat. All invocations of the workgroup call share_rows and sums_before.
 
 #ifndef WALKERS
 #define WALKERS 64u // invocations of a workgroup
@@ -9,7 +9,7 @@ shared uint starts[2u * WALKERS]; // of a table's entries, ascending: first row 
 shared uvec2 sums[2u * WALKERS];
 uint sums_half = 0u; // halves take turns: one barrier a step is then enough
 
-// Sums over the invocations before, and over all.
+// Sums over earlier invocations, and over all.
 uvec2 sums_before(uvec2 v, out uvec2 all) {
     uint lane = gl_LocalInvocationID.x;
     uvec2 sum = v;
@@ -32,8 +32,8 @@ uint entry_at(uint table, uint at) {
     return entry;
 }
 
-// Takes the splat of this invocation, which may have no rows, and sums another number. Returns the number of all rows; then the
-// splat of a row is entry_at(0, row), and starts[splat] is its first one.
+// Adds this invocation's splat, which may have no rows, and sums another number. Returns the number of all rows;
+// afterwards the splat of a row is entry_at(0, row), and starts[splat] is its first row.
 uint share_rows(Ellipse e, uint v, out uint v_before) {
     uint lane = gl_LocalInvocationID.x;
     uvec2 all, before = sums_before(uvec2(e.rows, v), all);

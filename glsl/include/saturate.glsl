@@ -1,4 +1,4 @@
-// Sums that saturate at the largest number instead of wrapping to 0, so that a need beyond 2^32 stays visible.
+// Sums that saturate at the largest number instead of wrapping to 0, so that a need above 2^32 stays visible.
 
 uint saturating_add(uint a, uint b) {
     uint sum = a + b;

@@ -1,6 +1,6 @@
-// Reads the coefficients k of Gaussian i, of the active degrees, and returns its colour before the clamp at 0. They are rgb triples,
-// one after the other over sh0 to sh3 with 1, 2, 4 and 5 vec4: sh0 ends with the first float of degree 1, sh2 with that of degree 3.
-// value4: an element of a plane, with what the Gaussian has missed (caught_up.glsl).
+// Reads the coefficients k of Gaussian i, of the active degrees, and returns its colour before the clamp at 0. They are
+// consecutive rgb triples over sh0 to sh3 with 1, 2, 4 and 5 vec4: sh0 ends with the first float of degree 1, sh2 with
+// the first float of degree 3. value4: an element of a plane after missed updates (caught_up.glsl).
 
 #ifndef value4
 #define value4(name, e) fetch4(name, e)

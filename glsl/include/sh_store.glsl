@@ -1,4 +1,5 @@
-// Gradients of the coefficients of splat s, given that of its colour, as sh_colour.glsl has these; 0 above the active degree.
+// Gradients of splat s's coefficients, given the gradient of its colour, in the layout of sh_colour.glsl; 0 above the
+// active degree.
 
 void store_sh_gradient(uint s, float basis[15], vec3 v) {
     v_sh0[s] = vec4(SH_C0 * v, SH_DEGREE >= 1u ? basis[0] * v.x : 0.0);

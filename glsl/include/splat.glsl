@@ -1,10 +1,10 @@
-// Projects and colours a Gaussian that counts. The includer declares the planes, splats, splat_from_gaussian, counters and SH_DEGREE, and
-// includes gaussian.glsl, projection.glsl, sh.glsl, record.glsl, ellipse.glsl and caught_up.glsl. Variant antialiased: opacity times
-// the root of the coverage (Mip-Splatting).
+// Projects and colours a Gaussian that counts. The includer declares the planes, splats, splat_from_gaussian, counters
+// and SH_DEGREE, and includes gaussian.glsl, projection.glsl, sh.glsl, record.glsl, ellipse.glsl and caught_up.glsl.
+// Variant antialiased: opacity times the root of the coverage (Mip-Splatting).
 
 #include "sh_colour.glsl"
 
-// Writes the record of a splat. Returns where its tiles are, and its depth.
+// Writes the record of a splat. Returns its tile ellipse, and its depth.
 Ellipse project_splat(StepUniforms u, uint s, uint i, out float z) {
     look_up_trained(u, i);
     vec4 mean = value4(means, i);

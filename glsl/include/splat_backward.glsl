@@ -1,6 +1,6 @@
-// The body of a function: gradients of a splat carried back to the parameters of its Gaussian i. Given are the uniforms u; mean and
-// quat; the projection p; gradients a: mean2d, conic xy, b: conic z, ln opacity, colour rg, and blue; and sane, which is false if
-// these are not finite. The includer includes what reads the coefficients.
+// The body of a function: gradients of a splat carried back to the parameters of its Gaussian i. Given are the uniforms
+// u; mean and quat; the projection p; gradients a: mean2d, conic xy, b: conic z, ln opacity, colour rg, and blue; and
+// sane, which is false if these are not finite. The includer also includes the code that reads the coefficients.
 
     vec3 offset = mean.xyz - u.camera_centre;
     float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));

@@ -1,12 +1,13 @@
-// SSIM: the window (11 taps, sigma 1.5, sum 1), the strip length that one lane filters in registers, and a pixel's value.
+// SSIM: the window (11 taps, sigma 1.5, sum 1), the strip length that one lane filters in registers, and a pixel's
+// value.
 
 const uint STRIP = 8u;
 const float WINDOW[11] = float[11](0.00102838008447911, 0.00759875813523919, 0.0360007721284308, 0.109360689509700,
     0.213005537711254, 0.266011724861795, 0.213005537711254, 0.109360689509700, 0.0360007721284308, 0.00759875813523919,
     0.00102838008447911);
 
-// Derivatives of SSIM with respect to the filtered mean x, mean x^2 + y^2 and mean x y, and its value:
-// ((2 mx my + C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2)). Moments: mean x, mean y, mean x^2 + y^2, mean x y.
+// Derivatives of SSIM with respect to the filtered mean x, mean x^2 + y^2 and mean x y, and its value: ((2 mx my +
+// C1)(2 sxy + C2)) / ((mx^2 + my^2 + C1)(sxx + syy + C2)). Moments: mean x, mean y, mean x^2 + y^2, mean x y.
 vec4 ssim(vec4 moments) {
     float mx = moments.x, my = moments.y;
     float squares = mx * mx + my * my, product = mx * my;

@@ -11,9 +11,9 @@ struct StepUniforms {
     float cy;
     vec3 background;
     float lambda_dssim;
-    vec3 free_centre;       // space before all cameras between this one and another one is free (mark_near): its centre,
-    float free_near;        // and the near plane on the way; 0: there is none
-    vec3 grow_axis0;        // Gaussians grow at low <= mean < high along these unit vectors; everywhere if both are equal
+    vec3 free_centre;       // partner camera: space in front of cameras in between is free (mark_near)
+    float free_near;        // near plane of the cameras in between; 0 without a partner
+    vec3 grow_axis0;        // Gaussians grow at low <= mean < high along these axes; everywhere if equal
     float clamp_x_min;      // limits of x/z and y/z in the Jacobian
     vec3 grow_axis1;
     float clamp_x_max;
@@ -53,7 +53,7 @@ struct StepUniforms {
     uint layer_tile_capacity; // tiles of object layers,
     uint longest_list;      // and splats of a tile that fit
     uint chunk_length;      // splats of a workgroup of the backward blend; 0 for tiles (group_tile.glsl)
-    float finest;           // least deviation of a Gaussian at depth 1 of this view (smooth)
+    float finest;           // smallest deviation at depth 1 of this view (smooth)
 };
 
 struct Counters {
@@ -61,8 +61,8 @@ struct Counters {
     uint instance_count;    // (splat, tile) pairs over all layers; the need, even beyond capacity
     uint layer_tile_count;  // tiles of object layers with a splat
     uint longest_list;      // splats in the fullest tile
-    uint long_chunk_count;  // chunks of lists that are walked forward in parts (long_lists.glsl),
-    uint first_list_count;  // and lists that come after them, before the others
+    uint long_chunk_count;  // chunks of lists that are processed in parts (long_lists.glsl),
+    uint first_list_count;  // and lists that follow them, before the others
     uint nonfinite_count, nonfinite_first; // Gaussians with a dropped, nonfinite gradient; lowest index
     uint broken_count, broken_first; // Gaussians with a nonfinite position, opacity or scale (cull); lowest index
     uint unprojected_count, unprojected_first; // Gaussians with a nonfinite splat (project_forward); lowest index
@@ -74,7 +74,7 @@ struct Counters {
     uint undecided_tiles;   // tiles whose label map needs another walk
     uint cloned_count, split_count, pruned_count;
     uint failure;           // sticky bits (below), from step to step until the host clears them
-    float loss_l1, loss_ssim, loss_label; // sums without normalisation; the label loss minus that of empty layers
+    float loss_l1, loss_ssim, loss_label; // unnormalised sums; label loss minus the loss of empty layers
 };
 
 // Bits of counters.failure. While it is not 0, passes do not change the model.

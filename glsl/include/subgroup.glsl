@@ -12,7 +12,7 @@ layout(constant_id = 0) const uint SUBGROUP_SIZE = 8;
 #endif
 #ifdef EMULATED
 // Exchanges use the two halves in turn. One barrier each is then enough: no invocation writes to a half again before
-// all have read it, because the exchange between has a barrier too.
+// all have read it, because the exchange in between also has a barrier.
 shared uvec3 exchange[2u * EXCHANGE_LANES];
 uint exchange_half = 0u;
 
@@ -24,7 +24,7 @@ uint subgroup_id() {
     return gl_LocalInvocationIndex / SUBGROUP_SIZE;
 }
 
-// Makes what the lanes wrote to shared memory visible to their subgroup.
+// Makes the lanes' writes to shared memory visible to their subgroup.
 #define subgroup_fence() barrier()
 
 uvec3 subgroup_shuffle(uvec3 v, uint lane) {
@@ -119,7 +119,7 @@ vec3 subgroup_sum(vec3 v) {
 }
 #endif
 
-// The sum in the device's own order.
+// The sum in the device's native order.
 float subgroup_add(float v) {
 #ifdef EMULATED
     return subgroup_sum(v);

@@ -1,10 +1,10 @@
-// Passes over partitions of the items, of one dispatch each: a workgroup takes the next partition by a ticket, counts it, and
+// Single-dispatch passes over partitions of the items: a workgroup takes the next partition by a ticket, counts it, and
 // looks back at the counts of the partitions before it (Merrill and Garland, "Single-pass parallel prefix scan with
-// decoupled look-back", 2016). No workgroup needs another one to go on: where a count is late, it counts that partition
-// itself. Counts are exact integers, so results do not depend on timing.
+// decoupled look-back", 2016). No workgroup depends on the progress of another one: if a count is late, it counts that
+// partition itself. Counts are exact integers, so results do not depend on timing.
 //
-// The buffer `sweep` is 0 before the step. Its words by partition are those of two passes of a sort, which take turns and clear
-// each other's, one for each digit, and one of each scan.
+// The buffer `sweep` is 0 before the step. Per partition, it has the words of two sort passes, one per digit, which
+// alternate and clear each other's words, and one word per scan.
 
 #include "partitions.glsl"
 const uint SWEEP_SUBGROUPS = SWEEP_LANES / SUBGROUP_SIZE;
@@ -44,8 +44,8 @@ uint sweep_words(uint part) {
     return SWEEP_WORDS + part * SWEEP_STRIDE + place;
 }
 
-// Tells what the partition has of this invocation's word, if it has one, and returns the sum over the partitions before.
-// Called by all invocations of the workgroup.
+// Publishes the partition's count of this invocation's word, if it has one, and returns the sum over earlier
+// partitions. Called by all invocations of the workgroup.
 uint sweep_look_back(uint part, bool has_word, uint own) {
     uint lane = sweep_lane(), word = sweep_words(part) + lane;
     bool tells = has_word && part + 1u != SWEEP_HELD;

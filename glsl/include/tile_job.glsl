@@ -1,5 +1,5 @@
-// What a subgroup or workgroup of the blend passes works on, and the order of that. The includer declares lane_corner(), the lane's
-// first pixel in the tile.
+// The work of a subgroup or workgroup in the blend passes, and its order. The includer declares lane_corner(), the
+// lane's first pixel in the tile.
 
 struct TileJob {
     uint layer;      // 0: the scene

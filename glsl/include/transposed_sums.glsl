@@ -1,12 +1,13 @@
-// Ten sums over the lanes of a subgroup for each splat of a batch, by a butterfly in which a lane gives half of its values
-// away at each distance: 12 exchanges at 32 lanes and 10 at 8. The additions, and so the bits, are those of subgroup_sum.
+// Ten sums over the lanes of a subgroup for each splat of a batch, by a butterfly in which a lane gives half of its
+// values away at each distance: 12 exchanges at 32 lanes and 10 at 8. The additions, and thus the bits, are the same as
+// in subgroup_sum.
 //
-// A lane ends with sums of other values than its neighbours. Which ones depends on the splat's lane j: value v of splat j
-// lies in lane j ^ lane_of_sum(v) until the batch ends, and one exchange for each value then brings it to lane j.
+// A lane ends with sums of other values than its neighbours. Which ones depends on the splat's lane j: value v of splat
+// j lies in lane j ^ lane_of_sum(v) until the batch ends, and one exchange for each value then brings it to lane j.
 
 const uint SUMS = 10u;
 
-// Bit k of v is told apart at the k-th distance. Values 8 and 9 are alone at the second and third.
+// Bit k of v is separated at the k-th distance. Values 8 and 9 are alone at the second and third.
 uint lane_of_sum(uint v) {
     return (v & 1u) * (SUBGROUP_SIZE >> 1u) + (v >> 1u & 1u) * (SUBGROUP_SIZE >> 2u) + (v >> 2u & 1u) * (SUBGROUP_SIZE >> 3u)
         + (v >> 3u) * (SUBGROUP_SIZE >> 4u);
@@ -22,7 +23,7 @@ HALVING(float)
 HALVING(vec2)
 HALVING(vec3)
 
-// Sums that end in the lane of this place. Leave the last value out by giving the one before twice.
+// Sums that end in the lane of this index. To omit the last value, pass the previous one twice.
 vec3 transposed(vec3 even, vec3 odd, vec2 last_even, vec2 last_odd, uint place) {
     vec3 a = halved(even, odd, place, SUBGROUP_SIZE >> 1u);
     vec2 b = halved(last_even, last_odd, place, SUBGROUP_SIZE >> 1u);

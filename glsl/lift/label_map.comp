@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "blend_tile.glsl"
-// label_map — the label with the largest sum of blending weights in each pixel; 0, no label, is one of them.
+// label_map — the label with the largest sum of blending weights in each pixel; 0 (no label) competes too.
 // Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk sums four labels of a
 //          tile, in order of appearance, and the rest together. Where the rest could still win in a pixel, the next
 //          walk (WALK) sums the next four labels that such pixels see.
@@ -12,9 +12,10 @@
 //          gaussian_from_splat [V]; labels [N]
 // Writes:  label_map [P] label, with LABEL_OPEN where the rest could win; label_weights [P] its sum;
 //          label_tables [T, LABEL_ROUNDS] labels of each walk; counters.undecided_tiles after the last walk
-// Math:    L(v) = argmax over k of the sum of alpha_j T_j over j with B_j = k, the smaller k of equals; 0 without weight
+// Math:    L(v) = argmax over k of the sum of alpha_j T_j over j with B_j = k, the smaller k of equals; 0 without
+//          weight
 // Order:   a label's sum adds in the order of the list, in whichever walk. Rounding is monotone, so the sum of the rest
-//          is no smaller than that of any label in it: a decided pixel has the label of one walk with all labels.
+//          is at least the sum of any label in it, so a decided pixel has the same label as a walk over all labels.
 // Mirror:  src/reference/lift.rs::label_map
 
 layout(constant_id = 15) const uint LATER = 0; // 1: not the first walk
@@ -172,7 +173,7 @@ void main() {
                 label = wins ? table[q] : label;
                 best = wins ? sum[k][q] : best;
             }
-            // Of equal sums, the smaller label may be in the rest.
+            // With equal sums, the smaller label may be in the rest.
             bool more = rest[k] > 0.0 && rest[k] >= best;
             label_map[p] = label | (more ? LABEL_OPEN : 0u);
             label_weights[p] = best;

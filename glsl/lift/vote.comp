@@ -6,9 +6,10 @@
 #include "blend_tile.glsl"
 // vote — sum, for each Gaussian and each label, the blending weights of the Gaussian in the pixels of that label.
 // Work:    one subgroup (= workgroup) per tile of the scene, jobs as in blend_forward. One walk counts four labels
-//          of the tile; tiles with more labels are walked again (WALK).
-// Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3]; gaussian_from_splat [V];
-//          view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes; vote_weights [columns]
+//          of the tile; tiles with more labels are processed again (WALK).
+// Reads:   step; tile_starts, tile_ends [T]; instance_from_sorted, splat_from_instance [I]; splats [V,3];
+//          gaussian_from_splat [V]; view_labels [P] column of each pixel's label, VOTE_NONE for pixels without votes;
+//          vote_weights [columns]
 // Writes:  votes_low, votes_high [N, columns]: 64 bits, VOTE_ONE for a pixel of weight 1, times the column's weight
 // Math:    A[j, k] = sum over pixels v with label k of alpha_j T_j (the sums of FlashSplat; every contributor counts);
 //          with ALONE, of alpha_j

@@ -3,11 +3,11 @@
 #include "constants.glsl"
 #include "step.glsl"
 #include "dispatch.glsl"
-// expose — give the picture the exposure of its photo.
+// expose — apply the photo's exposure to the picture.
 // Work:    64 pixels per workgroup.
 // Reads:   step; step_rows [ROW], the first row of the photo; shared_parameters [S]
 // Writes:  image [P] rgb, in place
-// Math:    exposure.glsl. Nothing but the photo loss reads it: the backward walk needs the transmittance only.
+// Math:    exposure.glsl. Only the photo loss reads it: the backward pass needs only the transmittance.
 // Mirror:  src/reference/exposure.rs::exposed
 
 layout(constant_id = 17) const uint ROW = 0;

@@ -34,7 +34,7 @@ void main() {
         uint p = group * EXPOSED + k + lane;
         if (p < pixels) {
             vec3 lit = image[p].rgb, v = v_image[p].rgb;
-            // A saturated photo does not tell how much brighter the scene is.
+            // A saturated photo does not show how much brighter the scene is.
             v = mix(v, vec3(0.0), bvec3(vec3(greaterThan(lit, vec3(1.0))) * vec3(equal(fetchc(target, p).rgb, vec3(1.0)))));
             vec3 c = to_scene * lit, w = v * of.gain;
             sum[0] += v * lit;

@@ -5,9 +5,9 @@
 // Work:    one workgroup.
 // Reads:   step_rows [ROW], the first row of the photo; exposure_partials [PARTIALS];
 //          shared_parameters [ROWS], STRIDE a photo
-// Writes:  v_shared [row] and those after it
+// Writes:  v_shared [row] and the following rows
 // Math:    the sum of the partials, and EXPOSURE_PRIOR times the mean of each number over all photos: the model can be
-//          brighter and all photos darker, so that the data leave this mean open. It stays near 0.
+//          brighter and all photos darker, so the data do not determine this mean. The prior keeps it near 0.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/exposure.rs::backward
 

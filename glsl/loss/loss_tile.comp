@@ -2,17 +2,20 @@
 #include "layout.glsl"
 #include "constants.glsl"
 #include "step.glsl"
-// loss_tile — the photo loss and its gradient in one dispatch: all that a tile's pixels touch goes through shared memory.
-// Work:    LOSS_TILE x LOSS_TILE pixels per workgroup, one per invocation; a filter makes RUN values per invocation. The last
-//          workgroup sums the losses of all.
+// loss_tile — the photo loss and its gradient in one dispatch: everything that a tile's pixels touch goes through
+//             shared memory.
+// Work:    LOSS_TILE x LOSS_TILE pixels per workgroup, one per invocation; a filter makes RUN values per invocation.
+//          The last workgroup sums the losses of all.
 // Reads:   step; image [P]; target [P] RGBA8 (pixels with alpha 0 are ignored; both pictures count as 0 there);
 //          variant labels: layer_loss [counters.layer_tile_count];
 //          variant exposure: step_rows [ROW], the first row of the photo; shared_parameters [S]
-// Writes:  v_image [P] (rgb, 0); loss_partials [workgroups] (sum |x - y|, sum ssim); counters.loss_l1, loss_ssim, loss_label;
-//          variant exposure: exposure_partials [workgroups, EXPOSURE_ROWS] (r, g, b, 0)
-// Math:    (1 - lambda) |x - y| + lambda (1 - ssim), times loss_scale = 1 / (3 valid pixels); ssim of ssim.glsl. The windows
-//          reach 5 pixels twice. Variant exposure: of the exposed picture (exposure.glsl), expose_backward.comp.
-// Order:   fixed, bitwise reproducible: whichever workgroup is the last adds the partials in the order of the workgroups.
+// Writes:  v_image [P] (rgb, 0); loss_partials [workgroups] (sum |x - y|, sum ssim); counters.loss_l1, loss_ssim,
+//          loss_label; variant exposure: exposure_partials [workgroups, EXPOSURE_ROWS] (r, g, b, 0)
+// Math:    (1 - lambda) |x - y| + lambda (1 - ssim), times loss_scale = 1 / (3 valid pixels); ssim of ssim.glsl. The
+//          windows reach 5 pixels twice. Variant exposure: of the exposed picture (exposure.glsl),
+//          expose_backward.comp.
+// Order:   fixed, bitwise reproducible: whichever workgroup is the last adds the partials in the order of the
+//          workgroups.
 // Mirror:  src/reference/loss.rs::photo_loss, exposure.rs::backward
 
 layout(constant_id = 17) const uint ROW = 0;
@@ -41,7 +44,7 @@ const uint RUN = 4u; // neighbouring values of a filter by one invocation
 const uint LOSS_LANES = LOSS_TILE * LOSS_TILE;
 const uint MIDDLE = LOSS_TILE + 2u * REACH; // px by side whose SSIM the tile touches
 const uint OUTER = MIDDLE + 2u * REACH;     // px by side that these depend on
-// Lanes of a filter along x have rows of their own: with these pitches they meet no bank together.
+// Lanes of a filter along x have separate rows: these pitches avoid bank conflicts.
 const uint TILE_PITCH = LOSS_TILE + 1u, MIDDLE_PITCH = MIDDLE + 1u, OUTER_PITCH = OUTER + 1u;
 const uint OUTER_CELLS = OUTER * OUTER_PITCH, MIDDLE_CELLS = MIDDLE * MIDDLE_PITCH;
 
@@ -53,7 +56,7 @@ bool is_inside(ivec2 at) {
     return all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, ivec2(step.width, step.height)));
 }
 
-// 0 where the pixel does not count, outside of the picture too.
+// 0 where the pixel does not count, also outside of the picture.
 uint photo(ivec2 at) {
     uint found = is_inside(at) ? target[at.y * step.width + at.x] : 0u;
     return found >= 0x80000000u ? found : 0u;
@@ -96,8 +99,8 @@ void filter_pictures(uint lane) {
     }
 }
 
-// Filters the moments along y, and writes the derivatives of SSIM with respect to them. Returns the sum of SSIM over the
-// pixels of the tile that this invocation meets.
+// Filters the moments along y, and writes the derivatives of SSIM with respect to them. Returns the sum of SSIM over
+// the pixels of the tile that this invocation processes.
 float differentiate(uint lane, ivec2 corner) {
     float total = 0.0;
     for (uint i = lane; i < MIDDLE * ((MIDDLE + RUN - 1u) / RUN); i += LOSS_LANES) {
@@ -144,7 +147,7 @@ vec3 sum_of(vec3 v) {
     return rows[0].xyz;
 }
 
-// Sums the losses of all workgroups, in the last one that is here.
+// Sums the losses of all workgroups, in the last one to finish.
 void finish(vec2 losses) {
     uint lane = gl_LocalInvocationIndex, groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
@@ -221,7 +224,7 @@ void main() {
         barrier();
     }
 #ifdef EXPOSURE
-    // A saturated photo does not tell how much brighter the scene is.
+    // A saturated photo does not show how much brighter the scene is.
     gradient = mix(gradient, vec3(0.0), bvec3(vec3(greaterThan(lit, vec3(1.0))) * vec3(equal(given, vec3(1.0)))));
     vec3 c = image[p].rgb, w = gradient * of.gain;
     vec3 of_rows[EXPOSURE_ROWS] =

@@ -4,9 +4,9 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "moments_store.glsl"
-// adam — one Adam update of one attribute of all trained Gaussians. An invisible Gaussian has gradient 0; with SEEN_ONLY it
-//        stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other rows stay
-//        unchanged, and the number of updates of each row corrects its moments. HALF: the moments are packed.
+// adam — one Adam update of one attribute of all trained Gaussians. An invisible Gaussian has gradient 0; with
+//        SEEN_ONLY, it stays unchanged. SHARED: one update of the step's shared rows with a rate above 0; all other
+//        rows stay unchanged, and the number of updates of each row corrects its moments. HALF: the moments are packed.
 // Work:    one vec4 of one Gaussian per invocation; STRIDE vec4 per Gaussian. SHARED: one row of the step.
 // Reads:   step, counters; splat_from_gaussian [N]; gradients [V,STRIDE]; parameters_in and their moments
 //          [N,STRIDE]. SHARED: counters; step_rows, step_rates, gradients, weights and the rest [S]

@@ -4,11 +4,12 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "moments_store.glsl"
-// catch_up — give all Gaussians the updates of Adam that they have missed.
-// Work:    64 Gaussians per workgroup; their vec4 are shared out.
+// catch_up — apply all missed Adam updates.
+// Work:    64 Gaussians per workgroup; their vec4 are distributed among the invocations.
 // Reads:   step, counters; missed
-// Writes:  parameters, first and second moments [N], active colours alone; touched_at [N] of those that had missed some
-// Math:    see caught_up.glsl. A list of its own does so after a failure too.
+// Writes:  parameters, first and second moments [N], active colours only; touched_at [N] of Gaussians that had missed
+//          updates
+// Math:    see caught_up.glsl. A separate list does so also after a failure.
 // Mirror:  src/reference/lazy.rs::caught_up
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
@@ -42,7 +43,7 @@ shared uint late_count; // Gaussians that have missed updates: rows, and how man
 shared uint late_row[64];
 shared uint late_age[64];
 
-// Finds the late Gaussian of a vec4 in a plane with so many of them each. Returns its element.
+// Finds the late Gaussian of a vec4 in a plane with this many vec4 per Gaussian. Returns its element.
 uint find(uint at, uint stride) {
     uint slot = at / stride;
     look_up(late_age[slot]);

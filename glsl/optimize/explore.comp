@@ -5,7 +5,7 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 #include "random.glsl"
-// explore — move Gaussians at random within their own shape, the fainter the farther.
+// explore — move Gaussians at random within their own shape; fainter Gaussians move farther.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step, counters; means_in, scales, quats [N]
 // Writes:  means.xyz [N], the same buffer

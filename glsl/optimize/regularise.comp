@@ -4,7 +4,7 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// regularise — add the gradients of the mean opacity and of the mean standard deviation to those of the view.
+// regularise — add the gradients of mean opacity and mean standard deviation to the view's gradients.
 // Work:    64 splats per workgroup.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales [N]
 // Writes:  v_means.w, v_scales.xyz [V], added

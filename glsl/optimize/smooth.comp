@@ -4,12 +4,14 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "gaussian.glsl"
-// smooth — keep Gaussians from becoming finer than the photos can show, or views from nearby would find needles and gaps.
+// smooth — keep Gaussians from becoming finer than the photos can resolve, which would show as needles and gaps in
+//          close views.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step, counters; means, scales_in [N]
-// Writes:  scales [N], the same buffer: w is the limit, the least over the views so far that see the centre; 0: none yet
-// Math:    3-D filter of Mip-Splatting as a lower limit: s >= FINEST z / f, f of the photo at full size; the update of
-//          Adam is projected to it.
+// Writes:  scales [N], the same buffer: w is the limit, the smallest over all views so far that see the centre; 0 if
+//          there is none
+// Math:    3-D filter of Mip-Splatting as a lower limit: s >= FINEST z / f, f of the photo at full size; Adam's update
+//          is projected onto it.
 // Mirror:  src/reference/smooth.rs::smooth
 
 layout(local_size_x = 64) in;

@@ -7,16 +7,16 @@
 #include "projection.glsl"
 #include "sh.glsl"
 #include "moments_store.glsl"
-// update — what a step changes of the Gaussians that it touched: sums the gradient records of each, carries them back to its
-//          parameters, and applies the updates of Adam that it has missed, then that of the step.
-// Work:    64 Gaussians of the model per workgroup, one an invocation; colours by vec4, shared out. A splat with many records is
-//          summed by all invocations, in a tree.
-// Reads:   step, counters; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I]; missed; variant
-//          labels: labels [N], layer_from_label
+// update — update the Gaussians that a step touched: sum the gradient records of each, carry them back to its
+//          parameters, and apply its missed Adam updates, then the step's update.
+// Work:    64 Gaussians of the model per workgroup, one per invocation; colours by vec4, distributed among the
+//          invocations. A splat with many records is summed by all invocations, in a tree.
+// Reads:   step, counters; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
+//          missed; variant labels: labels [N], layer_from_label
 // Writes:  parameters, first and second moments [N], active colours alone; touched_at [N]; densify_stats [N];
 //          counters.nonfinite_* (integer atomics)
-// Math:    gather, project_backward and adam. A Gaussian whose gradients are all 0 stays as it is: it has missed one update
-//          more (caught_up.glsl).
+// Math:    gather, project_backward and adam. A Gaussian with zero gradients is unchanged: it has missed one more
+//          update (caught_up.glsl).
 // Order:   fixed, bitwise reproducible; no atomics on floats.
 // Mirror:  src/reference/project.rs::project_backward, densify.rs::accumulate, adam.rs::adam, lazy.rs::caught_up
 
@@ -102,7 +102,7 @@ Sums sum_all(Records r, uint s) {
     return sums;
 }
 
-// Updates all but colours, and keeps what their update needs.
+// Updates everything except colours, and stores what the colour update needs.
 void update_geometry(StepUniforms u, uint i, Sums sums) {
     look_up(missed_updates(i));
     vec4 mean = means_now(i), quat = quats_now(i);
@@ -141,7 +141,7 @@ vec4 coefficient_gradient(uint slot, uint first) {
     return g;
 }
 
-// Finds the touched Gaussian of a vec4 in a plane with so many of them each, and its element.
+// Finds the touched Gaussian of a vec4 in a plane with this many vec4 per Gaussian, and its element.
 uint find(uint at, uint stride, out uint part) {
     uint slot = at / stride;
     part = at - slot * stride;

@@ -5,7 +5,8 @@
 #include "dispatch.glsl"
 #include "gaussian.glsl"
 #include "cull.glsl"
-// cull — drop Gaussians that count at no pixel: behind the near plane, too transparent, or certainly outside the image.
+// cull — drop Gaussians that do not count at any pixel: behind the near plane, too transparent, or certainly outside
+//        the image.
 // Work:    64 Gaussians per workgroup.
 // Reads:   step; means [N] (xyz world, w opacity logit); scales [N] (ln)
 // Writes:  depth_keys [N]: bits of z, or KEY_INVISIBLE; splat_from_gaussian [N] = NO_SPLAT; counters.broken_* (integer

@@ -5,7 +5,7 @@
 // pose — correct the pose of the step's camera.
 // Work:    one invocation.
 // Reads:   step_rows from [ROW] on, the rows of the photo; shared_parameters [S] (pose.glsl)
-// Writes:  step: rotation and centre of the camera, in place; the host writes them anew for each submit
+// Writes:  step: rotation and centre of the camera, in place; the host rewrites them for each submit
 // Math:    R' = T(w) R, c' = c + d R^T m with the depth d in the fourth number of the second row
 // Mirror:  src/reference/pose.rs::corrected
 

@@ -4,13 +4,13 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "sh.glsl"
-// pose_backward — sum what the gradients of the splats say about the pose of the camera.
+// pose_backward — sum the gradients of the splats with respect to the camera's pose.
 // Work:    64 splats per workgroup.
 // Reads:   step; counters; gaussian_from_splat [V]; means, quats, sh0..sh3 [N]; v_means, v_quats, v_sh0 [V]
 // Writes:  pose_partials [ceil(V / 64), 2]: the force, and the torque around the camera, both in world axes
-// Math:    moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Turning it turns them around the camera,
-//          but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the
-//          orientations, (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
+// Math:    moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Rotating it rotates them around the
+//          camera, but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part
+//          of the orientations, (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/pose.rs::backward
 

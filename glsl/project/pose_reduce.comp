@@ -6,9 +6,10 @@
 // Work:    one workgroup.
 // Reads:   step, with the corrected camera; counters; step_rows from [ROW] on; shared_parameters [S]; pose_partials
 // Writes:  v_shared [2 rows]
-// Math:    the torque t in camera axes is the gradient of a turn on top; that of its vector is g = (t + t x w) / (1 + w w).
-//          That of the move is -d R force, with the rotation R before the turn. POSE_PRIOR pulls both to 0. The
-//          transposed preconditioner carries both to the trained numbers. A settled pose has none.
+// Math:    the torque t in camera axes is the gradient of an additional rotation; the gradient of its vector is g = (t
+//          + t x w) / (1 + w w). The gradient of the translation is -d R force, with the rotation R before the
+//          correction. POSE_PRIOR pulls both to 0. The transposed preconditioner converts both to the trained numbers.
+//          A settled pose has no gradient.
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/pose.rs::backward
 

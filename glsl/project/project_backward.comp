@@ -9,8 +9,9 @@
 // project_backward — carry the gradients of each splat back to the parameters of its Gaussian.
 // Work:    64 splats per workgroup.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0..sh3 [N]; v_splats [V,3]
-// Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,2], v_sh2 [V,4],
-//          v_sh3 [V,5]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which becomes 0
+// Writes:  v_means [V] (xyz world, w opacity logit), v_scales [V] (ln), v_quats [V], v_sh0 [V], v_sh1 [V,2], v_sh2
+//          [V,4], v_sh3 [V,5]; counters.nonfinite_* (integer atomics): Gaussians with a nonfinite gradient, which
+//          becomes 0
 // Math:    dSigma = -Q dQ Q through the inverse; dM = 2 G M; Jacobian, view direction and mean2d paths reach the mean;
 //          a clamped x/z or y/z has gradient 0; so does a colour clamped at 0;
 //          variant antialiased: the opacity reaches M through the coverage.

@@ -12,8 +12,8 @@
 // Work:    64 splats per workgroup, splats in depth order.
 // Reads:   step, counters; gaussian_from_splat [V]; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label
-// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N]; counters.unprojected_*
-//          (integer atomics): nonfinite splats, which touch no tile
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; splat_from_gaussian [N];
+//          counters.unprojected_* (integer atomics): nonfinite splats, which touch no tile
 // Math:    EWA splatting with Cauchy-Binet determinant; SH colour, clamped at 0; ellipse.glsl for the tiles;
 //          variant antialiased: opacity times the root of the coverage (Mip-Splatting).
 // Mirror:  src/reference/project.rs::project_forward, tile.rs::row_interval

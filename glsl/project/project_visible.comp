@@ -10,15 +10,16 @@
 #include "ellipse.glsl"
 #include "cull.glsl"
 #include "moments_store.glsl"
-// project_visible — cull, and then project_forward, on cards: list, project and colour the visible Gaussians in the order of the
-//                   model, and count the tiles of each.
-// Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible ones are shared out again, so that
-//          no invocation waits for the others, and so are the rows of their tiles.
+// project_visible — cull, then project_forward, on GPUs: list, project and colour the visible Gaussians in model order,
+//                   and count the tiles of each.
+// Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible Gaussians, and then
+//          their tile rows, are redistributed among the invocations, so that none has to wait.
 // Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
-// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits of z;
-//          splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_* (integer atomics) as
-//          cull and project_forward; look_back; variant sweep: sweep (histograms of the digits of the keys)
+// Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits
+//          of z; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
+//          (integer atomics) as cull and project_forward; look_back; variant sweep: sweep (histograms of the digits of
+//          the keys)
 // Math:    as cull and project_forward.
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval
@@ -120,7 +121,7 @@ uint look_recount(uint part) {
     return own;
 }
 
-// Place in the partition of its n-th visible Gaussian.
+// Index in the partition of its n-th visible Gaussian.
 uint nth_visible(uint n) {
     uint word = 0u;
     [[unroll]] for (uint jump = WORDS / 2u; jump > 0u; jump /= 2u) {
@@ -137,7 +138,7 @@ uint nth_visible(uint n) {
     return word * 32u + bit;
 }
 
-// Counts the tiles of the splat of this invocation, which may have no rows.
+// Counts the tiles of this invocation's splat, which may have no rows.
 uint count_tiles(Ellipse e) {
     uint lane = gl_LocalInvocationIndex, unused;
     tiles[lane] = 0u;

@@ -4,10 +4,10 @@
 #include "step.glsl"
 #include "count.glsl"
 // radix_count — histogram of one digit of the keys, one histogram per lane.
-// Work:    LANES lanes over all workgroups of one subgroup; lane i owns keys [i c, (i+1) c). Each lane has its own column
-//          of the table: this needs no atomics, and equal keys keep their order.
+// Work:    LANES lanes over all workgroups of one subgroup; lane i owns keys [i c, (i+1) c). Each lane has its own
+//          column of the table, so no atomics are needed and equal keys keep their order.
 // Reads:   step, counters; keys_in [n]
-// Writes:  histogram [2^DIGIT_BITS, LANES]: sums over the lanes before in the workgroup; totals [2^DIGIT_BITS,
+// Writes:  histogram [2^DIGIT_BITS, LANES]: sums over earlier lanes of the workgroup; totals [2^DIGIT_BITS,
 //          workgroups]
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/sort.rs::radix_sort

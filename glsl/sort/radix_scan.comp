@@ -1,8 +1,8 @@
 #version 460
 #include "layout.glsl"
 // radix_scan — exclusive scan of the workgroups' totals, digit-major, in place.
-// Work:    one workgroup of one subgroup; lane i owns a contiguous share. A round has several words under way, because
-//          nothing else hides the wait for memory.
+// Work:    one workgroup of one subgroup; lane i owns a contiguous share. Each round has several loads in flight,
+//          because nothing else hides memory latency.
 // Reads:   totals [CELLS]
 // Writes:  totals [CELLS]
 // Order:   exact integers, equal in every run.

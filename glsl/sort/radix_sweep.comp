@@ -5,11 +5,12 @@
 #include "count.glsl"
 #include "sort_key.glsl"
 // radix_sweep — move keys and values to their sorted positions for one digit, in one dispatch; stable.
-// Work:    one partition of SWEEP_LANES x SWEEP_ITEMS pairs per workgroup. Subgroups rank their keys by ballots; the pairs of
-//          each digit leave together, through shared memory. Variant narrow: keys of 16 bits.
-// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the digit)
-// Writes:  keys_out [n], values_out [n]; sweep (words of this pass, and zeros in those of the next one)
-// Order:   exact integers, equal in every run: that of the radix_scatter passes.
+// Work:    one partition of SWEEP_LANES x SWEEP_ITEMS pairs per workgroup. Subgroups rank their keys by ballots; the
+//          pairs of each digit are written together, through shared memory. Variant narrow: 16-bit keys.
+// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the
+//          digit)
+// Writes:  keys_out [n], values_out [n]; sweep (words of this pass; zeros in the words of the next pass)
+// Order:   exact integers, equal in every run: the order of the radix_scatter passes.
 // Mirror:  src/reference/sort.rs::radix_sort
 
 #define EXCHANGE_LANES SWEEP_LANES
@@ -54,7 +55,7 @@ void sweep_recount(uint part) {
     barrier();
 }
 
-// The place of each lane's key among the subgroup's keys of the same digit.
+// The rank of each lane's key among the subgroup's keys of the same digit.
 uint rank(uint digit, bool is_item, uint table) {
     uvec2 peers = subgroup_ballot(is_item);
     [[unroll]] for (uint bit = 0u; bit < DIGIT_BITS; bit++) {

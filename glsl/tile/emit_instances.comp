@@ -8,8 +8,8 @@
 #include "ellipse.glsl"
 #include "sort_key.glsl"
 // emit_instances — write one (tile key, splat) pair for every tile of a splat.
-// Work:    64 splats per workgroup. A splat's instances are contiguous: first those of the scene layer, then
-//          those of its object layer; keys are layer * tile_count + tile.
+// Work:    64 splats per workgroup. A splat's instances are contiguous: first in the scene layer, then in its object
+//          layer; keys are layer * tile_count + tile.
 // Reads:   step, counters; splats [V,3]; tiles_touched [V]; instance_offsets [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  tile_keys [I]; splat_from_instance [I]

@@ -7,13 +7,15 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 #include "sort_key.glsl"
-// emit_ordered — emit_instances on cards: write one (tile key, splat) pair for every tile of a splat, in the order of depth.
-// Work:    64 splats per workgroup, in the order of depth, whose rows and tiles are shared out. A splat's instances are contiguous:
-//          first those of the scene layer, then those of its object layer; keys are layer * tile_count + tile.
+// emit_ordered — emit_instances on GPUs: write one (tile key, splat) pair for every tile of a splat, in depth order.
+// Work:    64 splats per workgroup, in depth order; their rows and tiles are distributed among the invocations. A
+//          splat's instances are contiguous: first in the scene layer, then in its object layer; keys are layer *
+//          tile_count + tile.
 // Reads:   step; order [V] splats by depth; splats [V,3]; tiles_touched [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
-// Writes:  instance_offsets [V]; tile_keys [I] (variant narrow: of 16 bits); splat_from_instance [I]; counters.instance_count, and what follows from it (count_args.glsl):
-//          dispatch_args; look_back; variant sweep: sweep (histograms of the digits of the keys)
+// Writes:  instance_offsets [V]; tile_keys [I] (variant narrow: 16-bit); splat_from_instance [I];
+//          counters.instance_count, and what depends on it (count_args.glsl): dispatch_args; look_back; variant sweep:
+//          sweep (histograms of the digits of the keys)
 // Order:   exact integers, equal in every run. Pairs beyond the capacity are counted, not written.
 // Mirror:  src/reference/tile.rs::emit_instances, tile.rs::row_interval, scan.rs::exclusive_scan
 
@@ -58,7 +60,8 @@ uint look_recount(uint part) {
     return min(all.x, SWEEP_SUM);
 }
 
-// Rows of tiles by invocation, 64 at a time; then their tiles by invocation, so that neighbours write to neighbouring places.
+// Rows of tiles by invocation, 64 at a time; then their tiles by invocation, so that neighbours write to adjacent
+// addresses.
 void emit(StepUniforms u, Target t, Ellipse e) {
     uint lane = gl_LocalInvocationIndex, written = 0u;
     targets[lane] = t;

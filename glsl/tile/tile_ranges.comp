@@ -8,12 +8,12 @@
 // labels) the occupied tiles of object layers.
 // Work:    one tile of one layer per invocation; the grid covers the step's layers. There are far fewer tiles than
 //          pairs, so a binary search per tile is cheaper than a test per pair.
-// Reads:   step, counters; tile_keys [I] sorted (KEYS_PER_WORD 2: of 16 bits)
+// Reads:   step, counters; tile_keys [I] sorted (KEYS_PER_WORD 2: 16-bit)
 // Writes:  tile_starts, tile_ends [layers * T], equal for an empty list; counters.longest_list (integer maximum, any
-//          order); variant labels: layer_occupied [layers * T] 0 or 1; else what follows from the longest list, by the last
-//          workgroup (count_args.glsl): dispatch_args, counters.failure; variant parts: of the scene's long lists (long_lists.glsl)
-//          long_chunks (tile, chunk), their chunks; first_lists, the tiles of those that come next; both in any order;
-//          counters.long_chunk_count, first_list_count
+//          order); variant labels: layer_occupied [layers * T] 0 or 1; otherwise the last workgroup writes what depends
+//          on the longest list (count_args.glsl): dispatch_args, counters.failure; variant parts: long_chunks (tile,
+//          chunk), the chunks of the scene's long lists (long_lists.glsl); first_lists, the tiles of the next longest
+//          lists; both in any order; counters.long_chunk_count, first_list_count
 // Mirror:  src/reference/tile.rs::tile_ranges, tile.rs::tile_lengths
 
 layout(constant_id = 23) const uint KEYS_PER_WORD = 1;
@@ -43,7 +43,7 @@ uint key_at(uint i) {
     return (fetchu(tile_keys, i >> 1u) >> 16u * (i & 1u)) & 0xffffu;
 }
 
-// The first pair with a key of at least `key`, which may be one more than keys of 16 bits can be.
+// The first pair with a key of at least `key`, which may be one above the 16-bit range.
 uint first_not_less(uint key, uint count) {
     uint low = 0u, high = count;
     while (low < high) {
