@@ -69,7 +69,7 @@ impl CoarseModel {
 
     /// Finds the near rows, keeps them, and returns them with their positions.
     pub(super) fn settle(&mut self, frame: &Frame) -> Vec<(usize, glam::DVec3)> {
-        let near = frame.near(&self.model);
+        let near = frame.near_gaussians(&self.model);
         self.near_rows = near.iter().map(|(row, _)| *row).collect();
         near
     }

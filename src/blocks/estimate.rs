@@ -1,6 +1,6 @@
 //! Estimates number, size and training time of the blocks of a planned scene.
 
-use super::need::{BlockNeed, CommonNeed, TargetGpu};
+use super::need::{BlockNeed, BlockSize, CommonNeed, TargetGpu};
 use super::plan::BLOCKS_MAX;
 use crate::error::{Error, Result, Setting};
 
@@ -69,7 +69,7 @@ pub fn estimate(sketch: &PlannedScene) -> Result<Estimate> {
         let frozen = (sketch.coarse as f64 * outside).round() as u64;
         let shared = if blocks == 1 { 1.0 } else { BLOCK_VIEWS_PER_SCENE_VIEW };
         let views = ((sketch.views as f64 * shared * share).ceil() as u64).min(sketch.views);
-        let need = common.need(&card, (gaussians, frozen), views as usize, sketch.steps)?;
+        let need = common.need(&card, BlockSize { gaussians, frozen, views: views as usize }, sketch.steps)?;
         if card.fits(&need) {
             return Ok(Estimate { blocks, gaussians, frozen, views, need });
         }

@@ -41,7 +41,7 @@ impl Frame {
     }
 
     /// Returns the rows and ground-frame positions of the near Gaussians.
-    pub(super) fn near(&self, model: &Gaussians) -> Vec<(usize, DVec3)> {
+    pub(super) fn near_gaussians(&self, model: &Gaussians) -> Vec<(usize, DVec3)> {
         let rows = (0..model.len()).map(|row| (row, model.world(row)));
         rows.filter(|(_, at)| at.distance(self.centre) <= self.far).map(|(row, at)| (row, self.place(at))).collect()
     }

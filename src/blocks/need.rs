@@ -61,16 +61,21 @@ impl TargetGpu {
     }
 }
 
+/// The contents of a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockSize {
+    /// Gaussians after growth, without frozen ones.
+    pub gaussians: u64,
+    /// Frozen Gaussians.
+    pub frozen: u64,
+    /// Number of views.
+    pub views: usize,
+}
+
 impl CommonNeed {
-    /// Predicts the need of a block from its Gaussians after growth, frozen Gaussians and views. `steps` are the steps
-    /// of a run with few views.
-    pub(super) fn need(
-        &self,
-        card: &TargetGpu,
-        (gaussians, frozen): (u64, u64),
-        views: usize,
-        steps: u32,
-    ) -> Result<BlockNeed> {
+    /// Predicts the need of a block. `steps` are the steps of a run with few views.
+    pub(super) fn need(&self, card: &TargetGpu, block: BlockSize, steps: u32) -> Result<BlockNeed> {
+        let BlockSize { gaussians, frozen, views } = block;
         let all = gaussians + frozen;
         let labels = self.max_label.map(|max_label| LabelSize {
             max_label,

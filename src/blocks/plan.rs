@@ -4,7 +4,7 @@ use super::cells::Cell;
 use super::choose::{BlockPhotos, choose};
 use super::coarse::CoarseModel;
 use super::frame::Frame;
-use super::need::{BlockNeed, CommonNeed, TargetGpu};
+use super::need::{BlockNeed, BlockSize, CommonNeed, TargetGpu};
 use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
@@ -229,7 +229,7 @@ impl Planner<'_> {
 
     fn need(&self, start: usize, frozen: u64, views: usize) -> Result<BlockNeed> {
         let steps = if self.options.steps > 0 { self.options.steps } else { self.coarse.settings.train.iterations };
-        self.common.need(&self.card, (self.grown(start), frozen), views, steps)
+        self.common.need(&self.card, BlockSize { gaussians: self.grown(start), frozen, views }, steps)
     }
 
     fn block(&self, cell: &Cell, mut chosen: BlockPhotos) -> Result<PlannedBlock> {

@@ -181,7 +181,7 @@ impl Gpu {
         self.capabilities.subgroup.size
     }
 
-    /// True if the device is the host's processor.
+    /// True if the device is the CPU.
     pub fn is_cpu(&self) -> bool {
         self.capabilities.is_cpu()
     }

@@ -11,13 +11,29 @@ use std::path::Path;
 /// Default weight of known depths.
 const DEPTH_WEIGHT_DEFAULT: f64 = 0.3;
 
+/// Where known depths come from.
+#[derive(Clone, Copy)]
+pub(super) struct DepthSource<'a> {
+    /// Scene folder or file.
+    pub scene: &'a Path,
+    /// Where the scene's files are.
+    pub lookup: &'a Lookup,
+    /// The scene.
+    pub dataset: &'a Dataset,
+    /// Folder of depth maps that replace the points of the reconstruction.
+    pub folder: Option<&'a Path>,
+    /// Which photo shows which point.
+    pub sightings: &'a Sightings<'a>,
+}
+
 /// Decides the weight of known depths and returns them for each training photo; empty if the weight is 0. Only a new
-/// run decides the weight. `folder` has depth maps that replace the points of the reconstruction.
-pub(super) fn decided(
-    (scene, lookup, dataset): (&Path, &Lookup, &Dataset),
-    (config, is_new): (&TrainConfig, bool),
-    (folder, sightings): (Option<&Path>, &Sightings),
+/// run decides the weight.
+pub(super) fn decide(
+    source: DepthSource,
+    config: &TrainConfig,
+    is_new: bool,
 ) -> Result<(TrainConfig, Vec<KnownDepths>)> {
+    let DepthSource { scene, dataset, folder, .. } = source;
     let weight = config.depth_weight.unwrap_or(if is_new { DEPTH_WEIGHT_DEFAULT } else { 0.0 });
     let with = |weight: f64| TrainConfig { depth_weight: Some(weight), ..config.clone() };
     if weight == 0.0 {
@@ -26,9 +42,9 @@ pub(super) fn decided(
         return folder.map_or(Ok((with(0.0), Vec::new())), |_| unread());
     }
     let known = match folder {
-        Some(folder) => depths_from_maps(folder, (scene, lookup, dataset))?,
+        Some(folder) => depths_from_maps(folder, source)?,
         None => {
-            let points = sightings.points()?;
+            let points = source.sightings.points()?;
             let of_view = |(view, points): (&View, Vec<_>)| KnownDepths::from_points(view, points.into_iter());
             dataset.train.iter().zip(points).map(of_view).collect()
         }
@@ -52,9 +68,9 @@ pub(super) fn decided(
     Err(Error::data(scene, "points", problem))
 }
 
-fn depths_from_maps(folder: &Path, (scene, lookup, dataset): (&Path, &Lookup, &Dataset)) -> Result<Vec<KnownDepths>> {
-    let maps = DepthFolder::open(folder, scene, lookup)?;
-    let views: Vec<&View> = dataset.train.iter().collect();
+fn depths_from_maps(folder: &Path, source: DepthSource) -> Result<Vec<KnownDepths>> {
+    let maps = DepthFolder::open(folder, source.scene, source.lookup)?;
+    let views: Vec<&View> = source.dataset.train.iter().collect();
     maps.check_complete(&views)?;
     views.into_iter().map(|view| maps.read(view).map(|map| KnownDepths::from_map(&map))).collect()
 }

@@ -2,12 +2,13 @@
 
 use super::block::{self, Block};
 use super::checkpoints::Checkpoints;
+use super::depths::{self, DepthSource};
 use super::every::Every;
 use super::history::{Recorder, Sums};
 use super::info::Info;
 use super::models::{Models, open};
 use super::resume::{self, ResumePoint, RunState};
-use super::{Inputs, Observer, Request, Run, Settings, Start, depths, occluders, pictures};
+use super::{Inputs, Observer, Request, Run, Settings, Start, occluders, pictures};
 use crate::engine::Engine;
 use crate::error::{Error, Result, Setting};
 use crate::files::label_table::LabelTable;
@@ -161,9 +162,9 @@ pub(super) fn begin<'a>(
     };
     let is_new = resumed.is_none();
     let lookup = lookup(&settings, &inputs);
-    let sightings = Sightings::new(&lookup, &dataset);
-    let files = (inputs.known_depths.as_deref(), &sightings);
-    let (train, depths) = depths::decided((&request.scene, &lookup, &dataset), (&settings.train, is_new), files)?;
+    let (sightings, folder) = (&Sightings::new(&lookup, &dataset), inputs.known_depths.as_deref());
+    let source = DepthSource { scene: &request.scene, lookup: &lookup, dataset: &dataset, folder, sightings };
+    let (train, depths) = depths::decide(source, &settings.train, is_new)?;
     let options = TrainerOptions { region: block.map(|block| block.region()).transpose()?, depths, ..options.into() };
     let mut facts = facts(request, inputs.masks.as_deref(), &gpu);
     facts.extend(resumed.as_ref().map(|resumed| ("resumed after step", resumed.state.step.to_string())));
@@ -183,7 +184,7 @@ pub(super) fn begin<'a>(
     let checkpoints = Checkpoints::new(out, lock, record, resumed.as_ref().map(|resumed| &resumed.state))?;
     let mut trainer = match resumed {
         Some(resumed) => Trainer::resume(gpu, &dataset, resumed.state, options)?,
-        None => start(gpu, (&train, first), (&sightings, &dataset), table.as_ref(), options)?,
+        None => start(gpu, (&train, first), (sightings, &dataset), table.as_ref(), options)?,
     };
     info.plan(&mut trainer);
     // The near plane is decided now.
@@ -241,7 +242,8 @@ fn start(
         if let Some(first) = without.first() {
             let count = without.len();
             tracing::warn!(
-                "{count} training views (such as {first}) have no occluder list; their objects are assumed not to be hidden"
+                "{count} training views (such as {first}) have no occluder list; their objects are assumed \
+                 not to be hidden"
             );
         }
     }

@@ -90,8 +90,8 @@ impl Loads {
         }
         let recorder = Recorder::begin(gpu, &of.command)?;
         for load in &of.last {
-            let staging = (storage.own(load.buf, count + frame)?, load.start);
-            let to = (storage.own(load.buf, frame)?, load.start);
+            let staging = (storage.own_buffer(load.buf, count + frame)?, load.start);
+            let to = (storage.own_buffer(load.buf, frame)?, load.start);
             match &load.source {
                 Source::Staging => recorder.copy(staging, to, load.bytes)?,
                 Source::Kept(kept) => {
@@ -170,7 +170,7 @@ impl Scheduler {
 
     /// Writes bytes to the staging of a frame that is not in use.
     pub(super) fn stage(&mut self, buf: Buf, frame: usize, start: u64, data: &[u8]) -> Result<()> {
-        self.storage.own(buf, self.limits.frames + frame)?.write(start, data)?;
+        self.storage.own_buffer(buf, self.limits.frames + frame)?.write(start, data)?;
         if let Some(loads) = &mut self.loads {
             loads.push(frame, Load { buf, start, bytes: data.len() as u64, source: Source::Staging });
         }

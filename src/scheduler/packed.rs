@@ -76,7 +76,7 @@ impl Scheduler {
             }
             let keep = memory::bytes_of(decl, counts)?.min(memory::bytes_of(decl, &self.counts)?);
             self.immediately(|recorder, storage, _| {
-                let Ok(fresh) = storage.own(Buf(index as u16), 0) else { return Ok(()) };
+                let Ok(fresh) = storage.own_buffer(Buf(index as u16), 0) else { return Ok(()) };
                 let keep = if old.is_empty() { 0 } else { keep };
                 if fresh.bytes() > keep {
                     recorder.fill(fresh, keep, fresh.bytes() - keep, 0)?;

@@ -39,7 +39,7 @@ impl Scheduler {
         self.immediately(|recorder, storage, _| {
             for (&(buf, _), copy) in buffers.iter().zip(made) {
                 let Some(copy) = copy else { continue };
-                recorder.copy((storage.own(buf, 0)?, 0), (copy, 0), copy.bytes())?;
+                recorder.copy((storage.own_buffer(buf, 0)?, 0), (copy, 0), copy.bytes())?;
             }
             Ok(())
         })?;

@@ -25,13 +25,15 @@ impl Storage {
         let place = plan.placement(buf)?;
         let buffer = match place.page {
             Page::Step(page) => self.step.get(page as usize),
-            Page::Own(buf) => return Ok((self.own(buf, copy_of(plan.table[buf.index()].class, frame))?, place.offset)),
+            Page::Own(buf) => {
+                return Ok((self.own_buffer(buf, copy_of(plan.table[buf.index()].class, frame))?, place.offset));
+            }
         };
         Ok((buffer.ok_or_else(|| Error::Bug(format!("no memory for buffer {}", buf.0)))?, place.offset))
     }
 
     /// Returns one copy of a buffer outside of scratch.
-    pub(super) fn own(&self, buf: Buf, copy: usize) -> Result<&Buffer> {
+    pub(super) fn own_buffer(&self, buf: Buf, copy: usize) -> Result<&Buffer> {
         let buffer = self.own.get(buf.index()).and_then(|copies| copies.get(copy));
         buffer.ok_or_else(|| Error::Bug(format!("no memory for copy {copy} of buffer {}", buf.0)))
     }
@@ -172,7 +174,7 @@ impl Scheduler {
             return Ok(());
         }
         self.immediately(|recorder, storage, _| {
-            let fresh = storage.own(buf, 0)?;
+            let fresh = storage.own_buffer(buf, 0)?;
             let Some(old) = old.first() else { return recorder.fill(fresh, 0, bytes, 0) };
             if bytes > keep {
                 recorder.fill(fresh, keep, bytes - keep, 0)?;

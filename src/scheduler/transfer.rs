@@ -45,7 +45,7 @@ impl Scheduler {
             self.wait_frame(frame)?;
             return match self.loads.as_ref().filter(|_| class == Class::PerFrame) {
                 Some(_) => self.stage(buf, frame, start, data),
-                None => self.storage.own(buf, frame)?.write(start, data),
+                None => self.storage.own_buffer(buf, frame)?.write(start, data),
             };
         }
         if class == Class::Step && self.options.plan.aliases() {
@@ -133,7 +133,7 @@ impl Scheduler {
         self.traffic.down += bytes.len() as u64;
         if class == Class::Report || (class == Class::PerFrame && self.loads.is_none()) {
             self.wait_frame(frame)?;
-            return self.storage.own(buf, frame)?.read(start, bytes);
+            return self.storage.own_buffer(buf, frame)?.read(start, bytes);
         }
         let half = self.staging.down.bytes();
         for (index, chunk) in bytes.chunks_mut(half as usize).enumerate() {
@@ -204,7 +204,7 @@ enum BufferLocation {
 impl BufferLocation {
     fn find(self, storage: &Storage) -> Result<(&Buffer, u64)> {
         match self {
-            Self::Own(buf, copy) => Ok((storage.own(buf, copy)?, 0)),
+            Self::Own(buf, copy) => Ok((storage.own_buffer(buf, copy)?, 0)),
             Self::Step(page, offset) => {
                 let buffer = storage.step_pages().get(page);
                 Ok((buffer.ok_or_else(|| Error::Bug(format!("no scratch page {page}")))?, offset))

@@ -21,7 +21,7 @@ use crate::scene::LabelMap;
 use std::collections::BTreeMap;
 
 /// Calls `visit(own label, other label, pixel, neighbours)` for each pixel on a contour and each label on the other
-/// side, sorted, the background included. `neighbours` are the ones of its 8 neighbours with the other label.
+/// side, sorted, the background included. `neighbours` are those of the 8 neighbours with the other label.
 fn walk(labels: &LabelMap, mut visit: impl FnMut(u16, u16, usize, &[usize])) {
     let (width, height) = (i64::from(labels.width), i64::from(labels.height));
     let mut others: BTreeMap<u16, Vec<usize>> = BTreeMap::new();

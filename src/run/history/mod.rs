@@ -44,7 +44,7 @@ impl Recorder {
     /// history.
     pub(super) fn new(out: &Path, (step, last): (u32, u32), sums: Sums) -> Self {
         let path = out.join(HISTORY_FILE);
-        let (bytes, before) = kept(&path, step, last);
+        let (bytes, before) = kept_part(&path, step, last);
         let mut recorder = Self {
             lines: None,
             sums,
@@ -69,7 +69,7 @@ impl Recorder {
 
     /// Rewinds to `step` after a failure.
     pub(super) fn go_back(&mut self, step: u32, last: u32, sums: Sums) {
-        let (bytes, _) = kept(&self.path, step, last);
+        let (bytes, _) = kept_part(&self.path, step, last);
         self.due.clear();
         (self.sums, self.spent) = (sums, (Duration::ZERO, 0));
         self.write(|lines| lines.cut(bytes));
@@ -152,7 +152,7 @@ impl Recorder {
 
 /// Returns the length of the history up to `step` in bytes, and the seconds until then. A run that ended at `step` is
 /// scored again, so its final scores are dropped.
-fn kept(path: &Path, step: u32, last: u32) -> (u64, f64) {
+fn kept_part(path: &Path, step: u32, last: u32) -> (u64, f64) {
     if step == 0 || !path.is_file() {
         return (0, 0.0);
     }

@@ -241,7 +241,7 @@ crate::options! {
 
             /// Objects per step.
             ///
-            /// Each step samples them anew, for labels and label loss. LabelGS uses 10, to limit memory.
+            /// Each step samples new objects, for labels and label loss. LabelGS uses 10, to limit memory.
             #[cfg_attr(feature = "cli", arg(value_parser = samples))]
             label_samples <"N|all">: u32 = 10, at_least(1), setting;
 

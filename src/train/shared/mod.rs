@@ -185,13 +185,13 @@ impl SharedSet {
         self.placed().map(|(of, place)| of.extension(place)).collect()
     }
 
-    pub(in crate::train) fn kept(&self) -> Option<SharedState> {
+    pub(in crate::train) fn saved_state(&self) -> Option<SharedState> {
         let names: Vec<&str> = self.0.iter().map(|of| of.name()).collect();
         (!names.is_empty()).then(|| SharedState { name: names.join(" and "), layout: self.layout() })
     }
 
     pub(in crate::train) fn check(&self, kept: Option<&SharedState>) -> Result<(), String> {
-        let own = self.kept();
+        let own = self.saved_state();
         let text = |kept: Option<&SharedState>| kept.map_or("none".to_owned(), ToString::to_string);
         if own.as_ref() == kept {
             return Ok(());

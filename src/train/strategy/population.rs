@@ -67,7 +67,7 @@ impl Population<'_> {
     /// Resets statistics.
     pub fn densify(&mut self, uniforms: StepUniforms, budget: u64) -> Result<DensifyCounts> {
         let wanted = self.count_densified(uniforms)?.densified_count;
-        let mut most = self.most(wanted)?.min(budget);
+        let mut most = self.count_limit(wanted)?.min(budget);
         let (uniforms, counted) = loop {
             let bounded = self.bounded(uniforms, wanted, most)?;
             let counted = self.count_densified(bounded)?;
@@ -113,7 +113,7 @@ impl Population<'_> {
         if alive == 0 {
             return Err(Error::Pruned { step: self.step });
         }
-        let mut most = self.most(u32::try_from(wanted).unwrap_or(u32::MAX))?.max(alive);
+        let mut most = self.count_limit(u32::try_from(wanted).unwrap_or(u32::MAX))?.max(alive);
         while let Some(room) = self.make_room(most, most)? {
             most = room;
         }
@@ -157,7 +157,7 @@ impl Population<'_> {
     }
 
     /// Returns the limit for `count` wanted Gaussians: the setting, or the number that fits into memory.
-    fn most(&mut self, count: u32) -> Result<u64> {
+    fn count_limit(&mut self, count: u32) -> Result<u64> {
         let wanted = u64::from(count).min(self.bound.most);
         let fits = self.engine.most_gaussians(wanted)?;
         if fits < wanted && !self.bound.by_memory {

@@ -63,7 +63,7 @@ impl Trainer {
             occluders: self.occluders(),
             run: serde_json::Value::Null,
             strategy: StrategyState::from_strategy(&*self.context.strategy),
-            shared: self.context.shared.kept(),
+            shared: self.context.shared.saved_state(),
             planes: Vec::new(),
             path: PathBuf::new(),
         };

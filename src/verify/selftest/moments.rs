@@ -30,7 +30,7 @@ struct ParameterSlot {
 }
 
 impl ParameterSlot {
-    fn all() -> impl Iterator<Item = Self> {
+    fn every() -> impl Iterator<Item = Self> {
         PLANE_LAYOUT.into_iter().enumerate().flat_map(|(plane, (floats, runs))| {
             runs.iter().flat_map(move |&(from, to, length)| {
                 (0..length).map(move |i| Self { plane, floats, offset: from + i, at: to + i })
@@ -72,7 +72,7 @@ impl Fixture {
         let planes =
             MOMENTS_1.into_iter().zip(PLANE_LAYOUT).map(|(plane, (floats, _))| self.get(plane, count * floats));
         let planes = planes.collect::<Result<Vec<Vec<u32>>>>()?;
-        for place in ParameterSlot::all() {
+        for place in ParameterSlot::every() {
             let of_row = planes[place.plane].chunks_exact(place.floats);
             words.iter_mut().zip(of_row).for_each(|(row, all)| row[place.at] = all[place.offset]);
         }
@@ -98,7 +98,7 @@ impl Fixture {
         let words: Vec<[u32; ROW_FLOATS]> = m.iter().zip(u).map(|(m, u)| words_of(m, u)).collect();
         for (index, (plane, (floats, _))) in MOMENTS_1.into_iter().zip(PLANE_LAYOUT).enumerate() {
             let mut of_plane = vec![0; words.len() * floats];
-            for place in ParameterSlot::all().filter(|place| place.plane == index) {
+            for place in ParameterSlot::every().filter(|place| place.plane == index) {
                 let rows = of_plane.chunks_exact_mut(floats).zip(&words);
                 rows.for_each(|(row, words)| row[place.offset] = words[place.at]);
             }
@@ -198,7 +198,7 @@ impl StepChange {
             let found = after.rows[row].floats();
             let mut rates = [0.0; ROW_FLOATS];
             Group::ALL.into_iter().zip(self.rates.0).for_each(|(g, rate)| rates[g.range()].fill(rate));
-            for place in ParameterSlot::all() {
+            for place in ParameterSlot::every() {
                 let at = place.at;
                 let word = pack(rules, (first[at], second[at]), place.draw(seed, row, was_late));
                 let (m, u) = unpack(rules, after.words[row][at]);

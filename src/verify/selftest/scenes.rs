@@ -165,7 +165,7 @@ pub fn scene(seed: u64, shape: &Shape) -> Scene {
     Scene { camera, gaussians, target, frozen: 0 }
 }
 
-/// A camera at the origin that looks along z: focal length 100 px, principal point in the middle.
+/// A camera at the origin that looks along z: focal length 100 px, principal point at the centre.
 pub fn plain_camera(width: u32, height: u32) -> Camera {
     Camera {
         rotation: DMat3::IDENTITY,
