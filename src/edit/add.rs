@@ -1,14 +1,14 @@
 //! A new label for some Gaussians.
 
 use super::catalogue::Catalogue;
-use super::merge::Merged;
+use super::merge::MergedLabels;
 use super::rename::give_name;
 use labelgs_files::label_table::{LabelEntry, LabelTable};
 use labelgs_scene::{Error, Gaussians, MODEL_LABEL_MAX, Result, Setting, UNLABELLED};
 
-/// Gives the Gaussians of some rows a label of their own, after the last one of the model and of its table. They are sure of
-/// it, and all others keep theirs.
-pub fn add(model: &Gaussians, table: Option<LabelTable>, rows: &[bool], name: Option<&str>) -> Result<Merged> {
+/// Gives the Gaussians of some rows a new label: the id after the last one of the model and its table. Their confidence
+/// is 1; all other Gaussians keep their labels.
+pub fn add(model: &Gaussians, table: Option<LabelTable>, rows: &[bool], name: Option<&str>) -> Result<MergedLabels> {
     if rows.len() != model.len() {
         return Err(Error::Bug(format!("{} rows for {} Gaussians", rows.len(), model.len())));
     }
@@ -29,5 +29,5 @@ pub fn add(model: &Gaussians, table: Option<LabelTable>, rows: &[bool], name: Op
     if let Some(name) = name {
         table = give_name(&Catalogue::default(), Some(table), into, name)?;
     }
-    Ok(Merged { model, table: Some(table), into })
+    Ok(MergedLabels { model, table: Some(table), into })
 }

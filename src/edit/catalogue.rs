@@ -5,7 +5,7 @@ use labelgs_scene::words::did_you_mean;
 use labelgs_scene::{Error, Gaussians, Result, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most labels in a message.
+/// Most labels listed in a message.
 const LISTED_MAX: usize = 6;
 
 /// A choice of labels on the command line.
@@ -43,13 +43,13 @@ impl Catalogue {
         let mut ids = BTreeSet::new();
         for pick in picks {
             match pick {
-                // Of a long range, as many ids as there are labels, and those that a message lists.
+                // Of a long range, check only as many ids as there are labels, plus those that a message lists.
                 Pick::Ids(first, last) => {
                     ids.extend((*first..=*last).take(self.gaussians.len() + LISTED_MAX + 1));
                 }
                 Pick::Name(name) => {
                     let found = self.table.as_ref().and_then(|table| table.by_name(name));
-                    ids.insert(found.ok_or_else(|| Error::usage(argument, self.unknown(name)))?);
+                    ids.insert(found.ok_or_else(|| Error::usage(argument, self.unknown_name(name)))?);
                 }
             }
         }
@@ -62,11 +62,11 @@ impl Catalogue {
         let unknown: Vec<String> =
             ids.iter().filter(|id| !self.gaussians.contains_key(id)).map(|&id| self.title(id)).collect();
         if ids.is_empty() {
-            return Err(Error::usage(argument, format!("names no label; {}", self.there_is())));
+            return Err(Error::usage(argument, format!("names no label; {}", self.describe())));
         }
         if !unknown.is_empty() {
             let some = unknown.iter().take(LISTED_MAX).map(String::as_str).collect::<Vec<_>>().join(", ");
-            return Err(Error::usage(argument, format!("no Gaussian has label {some}; {}", self.there_is())));
+            return Err(Error::usage(argument, format!("no Gaussian has label {some}; {}", self.describe())));
         }
         Ok(())
     }
@@ -81,15 +81,15 @@ impl Catalogue {
         self.name(id).map_or_else(|| id.to_string(), |name| format!("{id} {name}"))
     }
 
-    /// Returns what is wrong with the name of no label.
-    fn unknown(&self, name: &str) -> String {
+    /// Returns the message for an unknown name.
+    fn unknown_name(&self, name: &str) -> String {
         let names = self.table.iter().flat_map(|table| &table.labels).filter_map(|entry| entry.name.as_deref());
-        let cure = did_you_mean(name, names).unwrap_or_else(|| self.there_is());
+        let cure = did_you_mean(name, names).unwrap_or_else(|| self.describe());
         format!("no label is named {name}; {cure}")
     }
 
     /// Returns a few of the labels for messages: "the model has 1 cup, 3, 4 barrel and 12 more".
-    pub fn there_is(&self) -> String {
+    pub fn describe(&self) -> String {
         let objects = self.gaussians.keys().filter(|id| **id != UNLABELLED);
         let texts: Vec<String> = objects.clone().take(LISTED_MAX).map(|&id| self.title(id)).collect();
         if texts.is_empty() {

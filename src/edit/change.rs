@@ -1,14 +1,14 @@
-//! Changes of the colours or labels of a model.
+//! Changes colours or labels of a model.
 
 use super::components::{Grouping, components};
 use labelgs_scene::harmonics::sh0_of;
 use labelgs_scene::{Error, Gaussians, LABEL_MAX, MODEL_LABEL_MAX, Result, Setting, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The treatment of parts that are too small.
+/// What happens to parts that are too small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Specks {
+pub enum SmallParts {
     /// They keep their label.
     #[default]
     Keep,
@@ -23,8 +23,8 @@ fn labels_of(model: &Gaussians) -> Vec<u32> {
     model.labels.clone().unwrap_or_else(|| vec![UNLABELLED; model.len()])
 }
 
-/// Mixes a colour (r, g, b, 0 to 1) into the Gaussians of some labels. `mix` 1 replaces their colour in every
-/// direction, 0 keeps it.
+/// Mixes a colour (r, g, b, 0 to 1) into the Gaussians of some labels. A `mix` of 1 replaces their colour in every
+/// direction; 0 keeps it.
 pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix: f32) -> Gaussians {
     let mut out = model.clone();
     let target = colour.map(|value| sh0_of(f64::from(value)));
@@ -36,14 +36,14 @@ pub fn recolour(model: &Gaussians, labels: &BTreeSet<u32>, colour: [f32; 3], mix
     out
 }
 
-/// Mixes a coefficient of degree 0 (r, g, b) into a Gaussian.
+/// Mixes a degree-0 coefficient (r, g, b) into a Gaussian.
 pub fn mix_in(model: &mut Gaussians, row: usize, target: [f32; 3], mix: f32) {
     let old = model.sh0[row];
     model.sh0[row] = [0, 1, 2].map(|c| old[c] * (1.0 - mix) + target[c] * mix);
     model.rest_mut(row).iter_mut().flatten().for_each(|value| *value *= 1.0 - mix);
 }
 
-/// Replaces labels by new ids, all at once. Labels that are not in the map stay.
+/// Replaces labels by new ids, all at once. Labels missing from the map stay.
 pub fn relabel(model: &Gaussians, map: &BTreeMap<u32, u32>) -> Gaussians {
     let labels = labels_of(model).iter().map(|label| *map.get(label).unwrap_or(label)).collect();
     Gaussians { labels: Some(labels), ..model.clone() }
@@ -51,7 +51,7 @@ pub fn relabel(model: &Gaussians, map: &BTreeMap<u32, u32>) -> Gaussians {
 
 /// The result of [`split_components`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Split {
+pub struct SplitLabels {
     /// The model with its new labels.
     pub model: Gaussians,
     /// For each split label, the ids of its parts by decreasing size. The largest part keeps the old id.
@@ -67,13 +67,13 @@ pub fn split_components(
     labels: &BTreeSet<u32>,
     taken: &BTreeSet<u32>,
     how: Grouping,
-    specks: Specks,
-) -> Result<Split> {
+    specks: SmallParts,
+) -> Result<SplitLabels> {
     let mut new = labels_of(model);
     let old = new.clone();
     let used: BTreeSet<u32> = taken.iter().copied().chain(old.iter().copied()).collect();
     let last = used.last().copied().unwrap_or(UNLABELLED);
-    // Ids after the last one, then gaps. Ids of masks are kept to, if the model does.
+    // Use ids after the last one, then gaps. Stay within the ids that masks can hold if the model does.
     let most = if last > LABEL_MAX { MODEL_LABEL_MAX } else { LABEL_MAX };
     let mut free = (last + 1..=most).chain((1..last).filter(|id| !used.contains(id)));
     let (mut ids, mut small) = (BTreeMap::new(), BTreeSet::new());
@@ -89,12 +89,12 @@ pub fn split_components(
         ids.insert(label, own);
         small.extend(found.specks);
     }
-    if specks == Specks::Unlabel {
+    if specks == SmallParts::Unlabel {
         small.iter().for_each(|&row| new[row] = UNLABELLED);
     }
     let labelled = Gaussians { labels: Some(new), ..model.clone() };
-    let model = if specks == Specks::Drop { labelled.filtered(|row| !small.contains(&row)) } else { labelled };
-    Ok(Split { model, ids, specks: small.len() as u64 })
+    let model = if specks == SmallParts::Drop { labelled.filtered(|row| !small.contains(&row)) } else { labelled };
+    Ok(SplitLabels { model, ids, specks: small.len() as u64 })
 }
 
 /// Returns the model without the specks of each label.

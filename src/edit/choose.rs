@@ -31,8 +31,8 @@ pub fn candidates(map: &LabelMap, mask: &[bool]) -> Vec<Candidate> {
     found
 }
 
-/// Returns the labels with more than half of their pixels of the view inside the mask (rule of the paper), sorted. May
-/// be empty.
+/// Returns the labels with more than half of their pixels of the view inside the mask (the paper's rule), sorted;
+/// possibly none.
 pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
     let mut labels: Vec<u32> = candidates(map, mask)
         .iter()
@@ -43,7 +43,7 @@ pub fn choose_labels(map: &LabelMap, mask: &[bool]) -> Vec<u32> {
     labels
 }
 
-/// Like [`choose_labels`], but no label is an error, which names `argument` and lists the closest labels.
+/// Like [`choose_labels`], but an empty choice is an error that names `argument` and lists the closest labels.
 pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Catalogue) -> Result<Vec<u32>> {
     if mask.len() != map.ids.len() {
         let problem = format!("has {} pixels, the view has {} x {}", mask.len(), map.width, map.height);
@@ -59,7 +59,7 @@ pub fn require_labels(argument: &str, map: &LabelMap, mask: &[bool], known: &Cat
         .map(|c| format!("{} ({} of its {} pixels are inside)", known.title(c.label), c.inside, c.pixels))
         .collect();
     let problem = if near.is_empty() {
-        format!("covers no pixel of any label in this view; draw it over an object; {}", known.there_is())
+        format!("covers no pixel of any label in this view; draw it over an object; {}", known.describe())
     } else {
         format!(
             "selects nothing, because no label has more than half of its pixels inside; it touches {}; \

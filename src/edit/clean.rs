@@ -1,4 +1,4 @@
-//! Drops Gaussians that only disturb: faint, huge, lonely or far ones.
+//! Removes floaters: Gaussians that are faint, huge, isolated or far away.
 
 use crate::nearest::tree;
 use glam::DVec3;
@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::num::NonZero;
 
-/// The neighbour whose distance tells how lonely a Gaussian is.
-const NEIGHBOUR: usize = 8;
+/// The neighbour whose distance says how isolated a Gaussian is.
+const GAP_NEIGHBOUR: usize = 8;
 
-/// What is dropped. Nothing is, by default.
+/// Which Gaussians to remove. The default removes none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cleaning {
     /// Least opacity after the sigmoid.
@@ -24,9 +24,9 @@ pub struct Cleaning {
     pub inside: Option<[DVec3; 2]>,
 }
 
-/// Number of Gaussians dropped, each for the first reason.
+/// Numbers of removed Gaussians, each counted for the first reason that applies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Cleaned {
+pub struct CleaningCounts {
     /// Fainter than the least opacity.
     pub faint: u64,
     /// Larger than the largest size.
@@ -37,10 +37,10 @@ pub struct Cleaned {
     pub lonely: u64,
 }
 
-/// Returns the model without what `how` drops, and the numbers of dropped Gaussians. Loneliness counts among those that
-/// are left by the other rules.
-pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> {
-    let mut counts = Cleaned::default();
+/// Returns the cleaned model and the numbers of removed Gaussians. Isolation is measured among the Gaussians that the
+/// other rules keep.
+pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, CleaningCounts)> {
+    let mut counts = CleaningCounts::default();
     let kept = model.filtered(|row| {
         let opacity = 1.0 / (1.0 + (-model.opacities[row]).exp());
         let size = model.scales[row].iter().fold(f32::MIN, |most, &scale| most.max(scale));
@@ -66,10 +66,10 @@ pub fn clean(model: &Gaussians, how: &Cleaning) -> Result<(Gaussians, Cleaned)> 
     Ok((kept.filtered(|row| gaps[row] <= limit), counts))
 }
 
-/// Distance of each place to its eighth neighbour, or to the last one of fewer.
+/// Returns the distance of each position to its eighth neighbour, or to the farthest if there are fewer.
 pub(super) fn gaps(places: &[[f64; 3]]) -> Result<Vec<f64>> {
-    // One more, because each finds itself.
-    let Some(asked) = NonZero::new((NEIGHBOUR + 1).min(places.len())) else { return Ok(Vec::new()) };
+    // +1: the query returns the position itself.
+    let Some(asked) = NonZero::new((GAP_NEIGHBOUR + 1).min(places.len())) else { return Ok(Vec::new()) };
     let tree = tree(places)?;
     let gap = |place: &[f64; 3]| {
         let found = tree.query(place).nearest_n::<SquaredEuclidean<f64>>(asked).execute();

@@ -1,6 +1,6 @@
 //! Connected parts of a set of Gaussians.
 //!
-//! Two Gaussians are connected if their ellipsoids of `REACH` standard deviations, grown by half of a gap, intersect.
+//! Two Gaussians are connected if their ellipsoids of `ELLIPSOID_DEVIATIONS` standard deviations, grown by half of a gap, intersect.
 //! The test uses the contact function of Perram and Wertheim (1985).
 
 use crate::nearest::tree;
@@ -11,15 +11,15 @@ use labelgs_scene::stage::Stage;
 use labelgs_scene::{Gaussians, Result};
 use std::collections::BTreeMap;
 
-/// Half axes of an ellipsoid in standard deviations: at its surface an eighth of the opacity is left.
-pub const REACH: f64 = 2.0;
+/// Half axes of an ellipsoid in standard deviations: at its surface, an eighth of the opacity remains.
+pub const ELLIPSOID_DEVIATIONS: f64 = 2.0;
 
-/// The rules for connected parts and specks.
+/// How parts are connected, and which are too small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grouping {
-    /// Largest gap between two connected ellipsoids, world units; 0: they must touch.
+    /// Largest gap between two connected ellipsoids, world units. At 0 they must touch.
     pub gap: f64,
-    /// Share of the Gaussians below which a part is a speck, 0 to 1. The largest part never is.
+    /// Share of the Gaussians below which a part is a fragment, 0 to 1. The largest part is never a fragment.
     pub min_share: f64,
 }
 
@@ -34,7 +34,7 @@ impl Default for Grouping {
 pub struct Parts {
     /// Parts that are large enough, by decreasing size, then by first row.
     pub parts: Vec<Vec<usize>>,
-    /// Rows of all other parts.
+    /// Rows of the fragments.
     pub specks: Vec<usize>,
 }
 
@@ -55,14 +55,14 @@ pub fn components(model: &Gaussians, rows: &[usize], how: Grouping) -> Result<Pa
     Ok(Parts { parts, specks })
 }
 
-/// Returns the representative of each body's group.
+/// Returns the representative of each body's set.
 fn join(bodies: &[Body]) -> Result<Vec<usize>> {
-    let mut groups = Sets::new(bodies.len());
+    let mut groups = DisjointSets::new(bodies.len());
     let centres: Vec<[f64; 3]> = bodies.iter().map(|body| body.centre.to_array()).collect();
     if !centres.is_empty() {
         let tree = tree(&centres)?;
         for (index, body) in bodies.iter().enumerate() {
-            // Each pair is tested from its larger body, so that a small one has few tests.
+            // Test each pair from its larger body, so that a small one has few tests.
             let reach = (2.0 * body.radius).powi(2);
             for found in tree.query(&centres[index]).within::<SquaredEuclidean<f64>>(reach).unsorted().execute() {
                 let other = found.item as usize;
@@ -76,16 +76,16 @@ fn join(bodies: &[Body]) -> Result<Vec<usize>> {
     Ok((0..bodies.len()).map(|index| groups.root(index)).collect())
 }
 
-/// Disjoint sets of numbers, each a tree: a number points at another one of its set, the root at itself.
-struct Sets(Vec<usize>);
+/// Disjoint sets of numbers as trees: each number points at another of its set, and the root at itself.
+struct DisjointSets(Vec<usize>);
 
-impl Sets {
-    /// Puts each of the numbers below `count` into a set of its own.
+impl DisjointSets {
+    /// Starts with a set for each number below `count`.
     fn new(count: usize) -> Self {
         Self((0..count).collect())
     }
 
-    /// Returns the root of a number's set, and shortens the way to it.
+    /// Returns the root of a number's set and shortens the path to it.
     fn root(&mut self, mut index: usize) -> usize {
         while self.0[index] != index {
             self.0[index] = self.0[self.0[index]];
@@ -109,8 +109,9 @@ struct Body {
 
 impl Body {
     fn new(model: &Gaussians, row: usize, gap: f64) -> Self {
-        // Never flat, so that sums of shapes are invertible.
-        let axes = DVec3::from_array(model.scales[row].map(f64::from)).map(|scale| REACH * scale.exp() + gap / 2.0);
+        // Never flat, so that sums of shapes can be inverted.
+        let axes = DVec3::from_array(model.scales[row].map(f64::from))
+            .map(|scale| ELLIPSOID_DEVIATIONS * scale.exp() + gap / 2.0);
         let axes = axes.clamp(DVec3::splat(axes.max_element() * 1e-6), DVec3::splat(1e100)).max(DVec3::splat(1e-100));
         let turn = axes_of(model.quats[row]);
         Self {
@@ -120,8 +121,8 @@ impl Body {
         }
     }
 
-    /// Returns true if the two ellipsoids intersect: the largest value of s (1 - s) d' ((1 - s) A + s B)^-1 d over s in
-    /// 0 to 1 is at most 1. The function is concave, so a ternary search finds it.
+    /// Returns true if the two ellipsoids intersect, that is if the maximum of s (1 - s) d' ((1 - s) A + s B)^-1 d over
+    /// s in 0 to 1 is at most 1. The function is concave, so a ternary search finds its maximum.
     fn meets(&self, other: &Self) -> bool {
         let between = other.centre - self.centre;
         if between.length() > self.radius + other.radius {

@@ -1,4 +1,4 @@
-//! Several labels become one, or one gets a name.
+//! Merges labels, or names one.
 
 use super::catalogue::Catalogue;
 use super::change::relabel;
@@ -9,34 +9,37 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The result of [`merge`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Merged {
+pub struct MergedLabels {
     /// The model with its new labels.
     pub model: Gaussians,
-    /// The names of its labels, if there are names.
+    /// The names of its labels, if there are any.
     pub table: Option<LabelTable>,
-    /// The label that the others became.
+    /// The label that results.
     pub into: u32,
 }
 
-/// Merges labels into one: `into`, which is one of them or a free id, else the smallest of them. It gets `name`, else
-/// the name of the label with that id, or the first name among the others.
+/// Merges labels into `into`, which is one of them or a free id, or by default into the smallest. The result is called
+/// `name`, or else keeps the name of that id, or else gets the first name among the others.
 pub fn merge(
     model: &Gaussians,
     known: &Catalogue,
     labels: &BTreeSet<u32>,
     into: Option<u32>,
     name: Option<&str>,
-) -> Result<Merged> {
+) -> Result<MergedLabels> {
     let smallest = labels.iter().copied().find(|&label| label != UNLABELLED);
     let into = match into.or(smallest) {
         Some(UNLABELLED) | None => {
-            return Err(Error::usage(Setting("into"), "0 means no label; relabelling removes labels"));
+            return Err(Error::usage(Setting("into"), "0 means no label; use relabel to remove labels"));
         }
         Some(into) => into,
     };
     if known.gaussians.contains_key(&into) && !labels.contains(&into) {
-        let problem =
-            format!("label {} is another one; add it to {}, or choose a free id", known.title(into), Setting("labels"));
+        let problem = format!(
+            "label {} is not one of them; add it to {}, or choose a free id",
+            known.title(into),
+            Setting("labels")
+        );
         return Err(Error::usage(Setting("into"), problem));
     }
     let map: BTreeMap<u32, u32> = labels.iter().map(|&label| (label, into)).collect();
@@ -45,5 +48,5 @@ pub fn merge(
     if let Some(name) = name {
         table = Some(give_name(&Catalogue::new(&merged, None), table, into, name)?);
     }
-    Ok(Merged { model: merged, table, into })
+    Ok(MergedLabels { model: merged, table, into })
 }

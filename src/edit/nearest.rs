@@ -1,12 +1,12 @@
-//! Places sorted for questions about the nearest ones.
+//! Spatial index for nearest-neighbour queries.
 
 use kiddo::ImmutableKdTree;
 use labelgs_scene::{Error, Result};
 
-/// A tree of places, world units.
+/// A k-d tree of positions, world units.
 pub type Tree = ImmutableKdTree<f64, 3>;
 
-/// Sorts places. There is at least one, and all are finite.
+/// Builds the tree. `places` must have at least one position, all finite.
 ///
 /// # Errors
 ///

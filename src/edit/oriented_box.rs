@@ -1,4 +1,4 @@
-//! Boxes of objects along their own axes, which floaters do not stretch.
+//! Bounding boxes of objects along their own axes, robust to floaters.
 
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::median::median;
@@ -7,29 +7,29 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Most Gaussians of a label that are measured, evenly through the model.
+/// Most Gaussians measured per label, spread evenly through the model.
 const SAMPLES_MAX: u64 = 2000;
-/// Most of them that the search for axes looks at.
+/// Most of the measured Gaussians used in the search for axes.
 const SEARCHED_MAX: usize = 300;
-/// Share of the weight that lies within the radius of an object.
-const WITHIN: f64 = 0.8;
-/// Radii from the middle beyond which a Gaussian is a floater.
-const FLOATER: f64 = 4.0;
-/// Share of the weight that may stick out at each side.
-const OUTSIDE: f64 = 0.01;
-/// Steps by which axes are turned to a smaller box, degrees, and how far.
-const TURNS: [(f64, i32); 2] = [(5.0, 9), (1.0, 4)];
-/// Rounds through the three axes.
-const ROUNDS: usize = 2;
+/// Share of the weight that lies within an object's radius.
+const RADIUS_WEIGHT_SHARE: f64 = 0.8;
+/// Distance from the centre, in radii, beyond which a Gaussian is a floater.
+const FLOATER_RADII: f64 = 4.0;
+/// Largest share of the weight that may stick out at each side.
+const OUTSIDE_SHARE_MAX: f64 = 0.01;
+/// Steps by which axes are turned to a smaller box, in degrees, and how many steps each way.
+const TURN_STEPS: [(f64, i32); 2] = [(5.0, 9), (1.0, 4)];
+/// Passes over the three axes per step size.
+const TURN_PASSES: usize = 2;
 
 /// A box along the axes of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OrientedBox {
-    /// Middle, world units.
+    /// Centre, world units.
     pub centre: [f64; 3],
-    /// Axes of length 1 in the world, of the longest side first; they are right-handed.
+    /// Unit axes in the world, longest side first; right-handed.
     pub axes: [[f64; 3]; 3],
-    /// Lengths of the sides, world units, the longest first.
+    /// Side lengths, world units, longest first.
     pub sizes: [f64; 3],
     /// Volume, cubic world units.
     pub volume: f64,
@@ -52,10 +52,10 @@ impl Sample {
     }
 }
 
-/// Collects the Gaussians of each label, one after the other.
+/// Collects the Gaussians of each label, one at a time.
 #[derive(Debug, Default)]
 pub struct Boxes {
-    /// Label: each how many-th is kept, how many were seen, which are kept.
+    /// Per label: the sampling stride, the number seen, and the samples.
     by_label: BTreeMap<u32, (u64, u64, Vec<Sample>)>,
 }
 
@@ -66,8 +66,8 @@ impl Boxes {
         Self { by_label: counts.iter().map(start).collect() }
     }
 
-    /// Adds a Gaussian: its label, its place in the world, its weight such as opacity, its rotation (w, x, y, z) and the
-    /// logarithms of its standard deviations.
+    /// Adds a Gaussian: its label, its position in the world, its weight (such as opacity), its rotation (w, x, y, z)
+    /// and the logarithms of its standard deviations.
     pub fn add(&mut self, label: u32, mean: DVec3, weight: f64, quat: [f64; 4], scale: [f32; 3]) {
         let Some((every, seen, samples)) = self.by_label.get_mut(&label) else { return };
         let is_kept = seen.is_multiple_of(*every);
@@ -80,20 +80,20 @@ impl Boxes {
         }
     }
 
-    /// Returns the box of each label that has weight.
+    /// Returns the box of each label with a positive weight.
     pub fn finish(self) -> BTreeMap<u32, OrientedBox> {
         self.by_label.into_par_iter().filter_map(|(label, (.., samples))| Some((label, measured(&samples)?))).collect()
     }
 }
 
-/// Returns the box of some Gaussians: about their principal axes, turned to where it is smallest. Sides lie where all but
-/// a share of the weight is inside, of Gaussians as long as their standard deviation to both sides.
+/// Returns the box of some Gaussians. It starts at their principal axes and turns to where the box is smallest. At each
+/// side, all but a small share of the weight is inside; a Gaussian reaches one standard deviation to both sides.
 fn measured(samples: &[Sample]) -> Option<OrientedBox> {
     let along = |axis: usize| median(samples.iter().map(move |sample| sample.mean[axis]));
     let middle = DVec3::new(along(0)?, along(1)?, along(2)?);
     let far = |sample: &Sample| sample.mean.distance(middle);
-    let radius = quantile(samples.iter().map(|sample| (far(sample), sample.weight)).collect(), WITHIN)?;
-    let samples: Vec<Sample> = samples.iter().copied().filter(|sample| far(sample) <= FLOATER * radius).collect();
+    let radius = quantile(samples.iter().map(|sample| (far(sample), sample.weight)).collect(), RADIUS_WEIGHT_SHARE)?;
+    let samples: Vec<Sample> = samples.iter().copied().filter(|sample| far(sample) <= FLOATER_RADII * radius).collect();
     let weight: f64 = samples.iter().map(|sample| sample.weight).sum();
     let mean = samples.iter().map(|sample| sample.mean * sample.weight).sum::<DVec3>() / weight;
     let spread = |sample: &Sample| {
@@ -103,12 +103,12 @@ fn measured(samples: &[Sample]) -> Option<OrientedBox> {
     let covariance = samples.iter().map(spread).fold(DMat3::ZERO, |sum, one| sum + one);
     let (axes, ..) = principal_axes(&covariance);
     let few: Vec<Sample> = samples.iter().step_by(samples.len() / SEARCHED_MAX + 1).copied().collect();
-    let turned = smallest(&few, axes).axes;
-    let [own, turned] = [axes, turned].map(|axes| Sides::of(&samples, axes));
+    let turned = turned_to_smallest(&few, axes).axes;
+    let [own, turned] = [axes, turned].map(|axes| Sides::around(&samples, axes));
     Some(if turned.volume() < own.volume() { turned } else { own }.ordered())
 }
 
-/// A box with axes in any order: columns of the rotation, and the ends along them.
+/// A box with unordered axes: the columns of its rotation, and the ends along each.
 #[derive(Clone, Copy)]
 struct Sides {
     axes: DMat3,
@@ -117,7 +117,7 @@ struct Sides {
 }
 
 impl Sides {
-    fn of(samples: &[Sample], axes: DMat3) -> Self {
+    fn around(samples: &[Sample], axes: DMat3) -> Self {
         let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
         for index in 0..3 {
             let axis = axes.col(index);
@@ -125,7 +125,7 @@ impl Sides {
                 let at = |sample: &Sample| sample.mean.dot(axis) + sign * sample.deviation(axis);
                 quantile(samples.iter().map(|sample| (at(sample), sample.weight)).collect(), share).unwrap_or(0.0)
             };
-            (low[index], high[index]) = (end(-1.0, OUTSIDE), end(1.0, 1.0 - OUTSIDE));
+            (low[index], high[index]) = (end(-1.0, OUTSIDE_SHARE_MAX), end(1.0, 1.0 - OUTSIDE_SHARE_MAX));
         }
         Self { axes, low, high }
     }
@@ -138,7 +138,7 @@ impl Sides {
         let sizes = self.high - self.low;
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| sizes[b].total_cmp(&sizes[a]));
-        // Of the two directions of an axis, the one whose largest part is positive.
+        // Of an axis's two directions, choose the one whose largest component is positive.
         let direction = |index: usize| {
             let axis = self.axes.col(order[index]);
             axis * axis[axis.abs().max_position()].signum()
@@ -151,17 +151,17 @@ impl Sides {
     }
 }
 
-/// Turns a box about its axes in turn, to where it is smallest. A cube has no principal axes of its own.
-fn smallest(samples: &[Sample], axes: DMat3) -> Sides {
-    let mut best = Sides::of(samples, axes);
-    for (degrees, reach) in TURNS {
-        for _ in 0..ROUNDS {
+/// Turns a box about each axis to where it is smallest, because a cube has no unique principal axes.
+fn turned_to_smallest(samples: &[Sample], axes: DMat3) -> Sides {
+    let mut best = Sides::around(samples, axes);
+    for (degrees, reach) in TURN_STEPS {
+        for _ in 0..TURN_PASSES {
             let before = best.volume();
             for index in 0..3 {
                 let start = best.axes;
                 for step in (-reach..=reach).filter(|&step| step != 0) {
                     let turn = DMat3::from_axis_angle(start.col(index), (f64::from(step) * degrees).to_radians());
-                    let found = Sides::of(samples, turn * start);
+                    let found = Sides::around(samples, turn * start);
                     if found.volume() < best.volume() {
                         best = found;
                     }
@@ -175,7 +175,7 @@ fn smallest(samples: &[Sample], axes: DMat3) -> Sides {
     best
 }
 
-/// Returns the value below which a share of the weight lies; `None` without any weight.
+/// Returns the value below which a share of the weight lies, or `None` if the total weight is 0.
 fn quantile(mut values: Vec<(f64, f64)>, share: f64) -> Option<f64> {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let wanted = share * values.iter().map(|value| value.1).sum::<f64>();

@@ -5,9 +5,9 @@ use super::choose::{candidates, require_labels};
 use labelgs_scene::{Error, LabelMap, Result, Setting, UNLABELLED};
 use std::collections::BTreeSet;
 
-/// A place in a view. Pixels count from 0 at the top left, at the size of the label map.
+/// A part of a view. Pixels count from 0 at the top left, at the size of the label map.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum PromptArea {
     /// The label at this pixel: column, row.
     Point(u32, u32),
     /// Labels with more than half of their pixels in this box: first column and row, then end column and row,
@@ -17,7 +17,7 @@ pub enum Place {
     Mask(Vec<bool>),
 }
 
-/// A place, and what to do with its labels.
+/// A part of a view and what to do with its labels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Prompt {
     /// Flag of the prompt, for messages.
@@ -26,9 +26,9 @@ pub struct Prompt {
     pub view: String,
     /// Size of the label map, px; `None`: the size of the view.
     pub size: Option<(u32, u32)>,
-    /// The place.
-    pub place: Place,
-    /// Removes its labels from the choice instead of adding them.
+    /// The part of the view.
+    pub place: PromptArea,
+    /// Removes the labels from the choice instead of adding them.
     pub away: bool,
 }
 
@@ -43,8 +43,8 @@ pub fn choose(
     for prompt in prompts {
         let map = map_of(prompt)?;
         match prompt.place {
-            // The background is no label to remove.
-            Place::Point(x, y) if prompt.away && map.get(x, y) == Some(0) => {}
+            // The background has no label to remove.
+            PromptArea::Point(x, y) if prompt.away && map.get(x, y) == Some(0) => {}
             _ if prompt.away => away.extend(labels_at(prompt.argument, &prompt.place, &map, known)?),
             _ => chosen.extend(labels_at(prompt.argument, &prompt.place, &map, known)?),
         }
@@ -52,26 +52,27 @@ pub fn choose(
     let rest: BTreeSet<u32> = chosen.difference(&away).copied().collect();
     if rest.is_empty() {
         let lost: Vec<String> = chosen.iter().map(|&id| known.title(id)).collect();
-        let lost = if lost.is_empty() { "nothing was chosen".into() } else { format!("it takes {}", lost.join(", ")) };
-        return Err(Error::usage(Setting("not_at"), format!("leaves no label: {lost}; {}", known.there_is())));
+        let lost =
+            if lost.is_empty() { "nothing was chosen".into() } else { format!("it removes {}", lost.join(", ")) };
+        return Err(Error::usage(Setting("not_at"), format!("leaves no label: {lost}; {}", known.describe())));
     }
     Ok(rest)
 }
 
-/// Returns the labels of a place in the label map of its view. Errors name `argument` and list candidates.
-fn labels_at(argument: &str, place: &Place, map: &LabelMap, known: &Catalogue) -> Result<BTreeSet<u32>> {
+/// Returns the labels in a part of a view's label map. Errors name `argument` and list candidates.
+fn labels_at(argument: &str, place: &PromptArea, map: &LabelMap, known: &Catalogue) -> Result<BTreeSet<u32>> {
     let outside = |what: String| {
-        Error::usage(argument, format!("{what} is outside of the view, which has {} x {} px", map.width, map.height))
+        Error::usage(argument, format!("{what} is outside the view, which has {} x {} px", map.width, map.height))
     };
     match place {
-        &Place::Point(x, y) => match map.get(x, y).map(u32::from) {
+        &PromptArea::Point(x, y) => match map.get(x, y).map(u32::from) {
             None => Err(outside(format!("{x},{y}"))),
             Some(UNLABELLED) => {
                 Err(Error::usage(argument, format!("no label is at {x},{y}; the view shows {}", shown(map, known))))
             }
             Some(label) => Ok(BTreeSet::from([label])),
         },
-        &Place::Box([x0, y0, x1, y1]) => {
+        &PromptArea::Box([x0, y0, x1, y1]) => {
             if x0 >= x1.min(map.width) || y0 >= y1.min(map.height) {
                 return Err(outside(format!("{x0},{y0},{x1},{y1}")));
             }
@@ -79,7 +80,7 @@ fn labels_at(argument: &str, place: &Place, map: &LabelMap, known: &Catalogue) -
             let inside: Vec<bool> = inside.map(|(x, y)| (x0..x1).contains(&x) && (y0..y1).contains(&y)).collect();
             require_labels(argument, map, &inside, known).map(BTreeSet::from_iter)
         }
-        Place::Mask(inside) => require_labels(argument, map, inside, known).map(BTreeSet::from_iter),
+        PromptArea::Mask(inside) => require_labels(argument, map, inside, known).map(BTreeSet::from_iter),
     }
 }
 

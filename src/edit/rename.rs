@@ -5,13 +5,13 @@ use labelgs_files::label_table::{LabelEntry, LabelTable};
 use labelgs_scene::{Error, Result, Setting, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Returns the entries whose id is wanted.
+/// Returns the entries with wanted ids.
 pub fn keep(table: &LabelTable, wanted: impl Fn(u32) -> bool) -> LabelTable {
     LabelTable::new(table.labels.iter().filter(|entry| wanted(entry.id)).cloned().collect())
 }
 
-/// Returns the table after a change of ids. If labels are merged, the entry that already had the id gives name and
-/// colour, else the first one. Pixels add up; views are the maximum, so that no mask counts twice.
+/// Returns the table after ids change. Of merged labels, the entry that already had the id gives name and colour, or
+/// else the first one. Pixels add up; the number of views is the maximum, so that no mask counts twice.
 pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
     let mut groups: BTreeMap<u32, Vec<&LabelEntry>> = BTreeMap::new();
     for entry in &table.labels {
@@ -33,7 +33,7 @@ pub fn renumber(table: &LabelTable, map: &BTreeMap<u32, u32>) -> LabelTable {
     LabelTable::new(groups.into_iter().map(merged).collect())
 }
 
-/// Returns the table after a split. The parts of a named label are `NAME 2`, `NAME 3` and so on.
+/// Returns the table after a split. Parts of a named label are called `NAME 2`, `NAME 3` and so on.
 pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
     let mut names: BTreeSet<String> = table.labels.iter().filter_map(|entry| entry.name.clone()).collect();
     let mut labels = table.labels.clone();
@@ -51,7 +51,7 @@ pub fn split(table: &LabelTable, ids: &BTreeMap<u32, Vec<u32>>) -> LabelTable {
     LabelTable::new(labels)
 }
 
-/// Returns the table with a name for a label; makes the table if there is none. The name of another label is an error.
+/// Names a label, and creates the table if there is none. Errors if another label has the name.
 pub fn give_name(known: &Catalogue, table: Option<LabelTable>, id: u32, name: &str) -> Result<LabelTable> {
     let made = || known.gaussians.keys().filter(|&&id| id != UNLABELLED).map(|&id| LabelEntry::new(id)).collect();
     let mut labels = table.map_or_else(made, |table| table.labels);

@@ -1,4 +1,4 @@
-//! Lists the labels of a model, and makes models of some of them.
+//! Lists the labels of a model and extracts models of some labels.
 
 use super::catalogue::Catalogue;
 use glam::DVec3;
@@ -6,33 +6,33 @@ use labelgs_scene::{Error, Gaussians, Result, Setting};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Least label confidence of Gaussians in objects that stand alone. Gaussians that straddle an object and its
-/// background, or cover few pixels, stick out when nothing is around them.
+/// Smallest label confidence in an extracted object. Gaussians that straddle an object and its background, or cover few
+/// pixels, stick out once nothing surrounds them.
 pub const MIN_LABEL_CONFIDENCE: f32 = 0.6;
 
-/// The Gaussians of a label in numbers.
+/// Statistics of a label's Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LabelSummary {
     /// The label; 0 is unlabelled.
     pub label: u32,
     /// Number of Gaussians.
     pub count: u64,
-    /// Sum of the opacities after the sigmoid.
+    /// Sum of opacities after the sigmoid.
     pub opacity_mass: f64,
     /// Smallest coordinates of the means, world units.
     pub min: [f64; 3],
     /// Largest coordinates of the means, world units.
     pub max: [f64; 3],
-    /// Mean of the means, weighted by opacity, world units.
+    /// Opacity-weighted mean of the means, world units.
     pub centre: [f64; 3],
 }
 
-/// Adds up the Gaussians of each label, one after the other.
+/// Accumulates statistics per label, one Gaussian at a time.
 #[derive(Clone, Debug, Default)]
 pub struct Tally(BTreeMap<u32, LabelSummary>);
 
 impl Tally {
-    /// Adds a Gaussian: its label, its place in the world, and its opacity after the sigmoid.
+    /// Adds a Gaussian: its label, its position in the world, and its opacity after the sigmoid.
     pub fn add(&mut self, label: u32, mean: DVec3, opacity: f64) {
         let (min, max, centre) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
         let start = LabelSummary { label, count: 0, opacity_mass: 0.0, min, max, centre };
@@ -43,7 +43,7 @@ impl Tally {
         sum.opacity_mass += opacity;
         sum.min = DVec3::from(sum.min).min(mean).to_array();
         sum.max = DVec3::from(sum.max).max(mean).to_array();
-        // Weighted until the end.
+        // Holds the weighted sum until `summaries` divides it.
         sum.centre = (DVec3::from(sum.centre) + mean * opacity).to_array();
     }
 
@@ -59,14 +59,14 @@ impl Tally {
     }
 }
 
-/// Returns one row per label, sorted, 0 (unlabelled) included. Without labels all Gaussians have label 0.
+/// Returns one row per label, sorted, including 0 (unlabelled). Without labels, all Gaussians have label 0.
 pub fn summarise(model: &Gaussians) -> Vec<LabelSummary> {
     let mut tally = Tally::default();
     (0..model.len()).for_each(|row| tally.add(model.label(row), model.world(row), model.opacity(row)));
     tally.summaries()
 }
 
-/// Returns the mean confidence of each label that occurs; nothing without confidences.
+/// Returns the mean confidence of each label in the model; empty if the model has no confidences.
 pub fn mean_confidence(model: &Gaussians) -> BTreeMap<u32, f64> {
     let mut sums: BTreeMap<u32, (f64, u64)> = BTreeMap::new();
     for (row, &share) in model.label_confidence.iter().flatten().enumerate() {
@@ -76,8 +76,8 @@ pub fn mean_confidence(model: &Gaussians) -> BTreeMap<u32, f64> {
     sums.into_iter().map(|(label, (sum, count))| (label, sum / count as f64)).collect()
 }
 
-/// Returns the Gaussians of these labels, in order, possibly none. Leaves out Gaussians with a known confidence below
-/// `least` ([`MIN_LABEL_CONFIDENCE`]). A label that does not occur is an error, which lists the known labels.
+/// Returns the Gaussians of these labels in order, possibly none. Omits Gaussians with a known confidence below `least`
+/// ([`MIN_LABEL_CONFIDENCE`]). A missing label is an error that lists the known labels.
 pub fn extract(model: &Gaussians, labels: &[u32], least: f32) -> Result<Gaussians> {
     let wanted = check_labels(model, labels)?;
     let sure = |row: usize| model.label_confidence.as_ref().is_none_or(|shares| shares[row] >= least);
@@ -94,7 +94,7 @@ pub fn remove(model: &Gaussians, labels: &[u32]) -> Result<Gaussians> {
     Ok(rest)
 }
 
-/// The error of a choice that leaves nothing.
+/// Returns the error of a choice that would leave no Gaussian.
 pub fn nothing_left() -> Error {
     Error::usage(Setting("labels"), "names every label of the model; no Gaussian would be left")
 }

@@ -4,7 +4,7 @@ use super::message::{Choose, Viewpoint};
 use super::painter::{Painter, SURFACE_PX, Source};
 use crate::edit::Rows;
 use crate::edit::selection::{Combine, Nearby, Region, Shape, beyond, in_region, in_sphere};
-use crate::edit::strokes::{Cutting, Seed};
+use crate::edit::strokes::{GraphCut, Seed};
 use crate::error::{Error, Result};
 use crate::render::Parts;
 use crate::scene::{Gaussians, MODEL_LABEL_MAX, UNLABELLED};
@@ -25,7 +25,7 @@ pub(super) struct Chosen {
     /// What strokes have hit since the last choice of another kind.
     seeds: Vec<Seed>,
     /// Their cut, with the model that it is of.
-    cutting: Option<Cutting<Box<Gaussians>>>,
+    cutting: Option<GraphCut<Box<Gaussians>>>,
 }
 
 impl Chosen {
@@ -40,7 +40,7 @@ impl Chosen {
     }
 
     pub(super) fn rows(&self) -> Rows {
-        Rows::of(&self.rows)
+        Rows::from_mask(&self.rows)
     }
 
     /// Chooses as a page asks, among what is drawn and not locked.
@@ -118,7 +118,7 @@ impl Chosen {
         let is_one_sided = self.seeds.iter().all(|seed| seed.label == OBJECT);
         let mut cutting = match self.cutting.take() {
             Some(cutting) => cutting,
-            None => Cutting::new(Box::new(model.clone()))?,
+            None => GraphCut::new(Box::new(model.clone()))?,
         };
         cutting.add(seeds);
         let mut rows = vec![false; model.len()];

@@ -279,7 +279,7 @@ mod tests {
         let edits = [
             Edit::Rename { label: 1, name: "cup".into() },
             Edit::Merge { labels: vec![1, 2] },
-            Edit::Assign { rows: Rows::of(&half), label: None, name: None },
+            Edit::Assign { rows: Rows::from_mask(&half), label: None, name: None },
             Edit::Remove { labels: vec![3, 0], fill: false },
             Edit::Rename { label: 1, name: "set".into() },
         ];

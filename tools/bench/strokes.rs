@@ -2,7 +2,7 @@
 //! background, in the first training view that shows half as much of it as any.
 
 use crate::{device, measure::table};
-use labelgs::edit::strokes::{Cutting, Stroke};
+use labelgs::edit::strokes::{GraphCut, Stroke};
 use labelgs::formats::read_model;
 use labelgs::label::strokes::seeds;
 use labelgs::label::{VoteOptions, columns_of, label_by_votes, vote_engine};
@@ -48,7 +48,7 @@ pub fn run(options: &Options) -> Result<()> {
     let hit = seeds(device::open()?, &model, &strokes, NEAR_DEFAULT, Path::new("the rule"))?;
     let shown = start.elapsed();
     let start = Instant::now();
-    let mut cutting = Cutting::new(&model)?;
+    let mut cutting = GraphCut::new(&model)?;
     cutting.add(&hit);
     let found = cutting.cut()?;
     let (first, start) = (start.elapsed(), Instant::now());

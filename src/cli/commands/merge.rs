@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::cli::support::parsers::{Picks, label, picks};
 use crate::cli::support::{Context, EditArgs, Edited};
-use crate::edit::merge::{Merged, merge};
+use crate::edit::merge::{MergedLabels, merge};
 use clap::Args;
 use serde_json::json;
 
@@ -27,7 +27,7 @@ pub struct MergeArgs {
 pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let (model, known) = args.edit.open()?;
     let labels = args.edit.resolve(&known, "--labels", &args.labels)?;
-    let Merged { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
+    let MergedLabels { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
     let edited = Edited::new(&merged, table, model.len(), [into].into());
     args.edit.finish(context, &edited, json!({ "merged": labels }))
 }

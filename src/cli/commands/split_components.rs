@@ -4,7 +4,7 @@ use crate::Result;
 use crate::cli::commands::extract_remove::GroupingArgs;
 use crate::cli::support::parsers::{Picks, picks};
 use crate::cli::support::{Context, EditArgs, Edited};
-use crate::edit::change::{Specks, split_components};
+use crate::edit::change::{SmallParts, split_components};
 use crate::edit::rename::split;
 use crate::words::counted;
 use clap::Args;
@@ -20,7 +20,7 @@ pub struct SplitArgs {
     pub labels: Picks,
     /// What to do with parts smaller than --min-share.
     #[arg(long, value_name = "WHAT", value_enum, default_value = "keep")]
-    pub specks: Specks,
+    pub specks: SmallParts,
     /// What is connected.
     #[command(flatten)]
     pub grouping: GroupingArgs,

@@ -7,7 +7,7 @@ use crate::cli::support::model_edit::{or_list, require_labels};
 use crate::cli::support::parsers::{At, BoxAt, Picks, at, box_at, near, picks};
 use crate::cli::support::scene::{find_view, near_plane, open_gpu, open_scene};
 use crate::edit::catalogue::{Catalogue, Pick};
-use crate::edit::prompt::{Place, Prompt, choose};
+use crate::edit::prompt::{Prompt, PromptArea, choose};
 use crate::formats::ModelRef;
 use crate::scene::{Camera, LabelMap};
 use crate::scheduler::SchedulerOptions;
@@ -150,21 +150,21 @@ impl PromptArgs {
         let point = |argument, away| {
             move |at: &At| {
                 let [x, y] = at.pixel;
-                Prompt { argument, view: at.view.clone(), size: None, place: Place::Point(x, y), away }
+                Prompt { argument, view: at.view.clone(), size: None, place: PromptArea::Point(x, y), away }
             }
         };
         let area = |boxed: &BoxAt| Prompt {
             argument: "--box",
             view: boxed.view.clone(),
             size: None,
-            place: Place::Box(boxed.corners),
+            place: PromptArea::Box(boxed.corners),
             away: false,
         };
         let points = self.at.iter().map(point("--at", false)).chain(self.not_at.iter().map(point("--not-at", true)));
         let mut prompts: Vec<Prompt> = points.chain(self.boxes.iter().map(area)).collect();
         if let (Some(mask), Some(view)) = (&self.mask, &self.view) {
             let map = crate::masks::mask::read_mask(mask)?;
-            let place = Place::Mask(map.ids.iter().map(|&id| id != 0).collect());
+            let place = PromptArea::Mask(map.ids.iter().map(|&id| id != 0).collect());
             let size = Some((map.width, map.height));
             prompts.push(Prompt { argument: "--mask", view: view.clone(), size, place, away: false });
         }

@@ -1,12 +1,12 @@
-//! What a change makes of a model.
+//! Applies edits to a model.
 
 use super::Edit;
 use crate::add::add;
 use crate::catalogue::Catalogue;
-use crate::change::{Specks, recolour, split_components};
+use crate::change::{SmallParts, recolour, split_components};
 use crate::components::Grouping;
 use crate::fill::{Light, Sight, fill};
-use crate::merge::{Merged, merge};
+use crate::merge::{MergedLabels, merge};
 use crate::rename::{keep, split};
 use crate::select::{nothing_left, remove};
 use glam::DVec3;
@@ -20,19 +20,19 @@ use std::collections::BTreeSet;
 pub struct Document {
     /// The model.
     pub model: Gaussians,
-    /// The names, if there are some.
+    /// The names, if the model has any.
     pub table: Option<LabelTable>,
 }
 
-/// Draws what the views of a scene show of a model, for [`fill`].
+/// Renders what the views of a scene show of a model, for [`fill`].
 pub type Sights<'a> = dyn FnMut(&Gaussians) -> Result<Vec<Sight>> + 'a;
 
 impl Document {
-    /// Returns what an edit makes of it. `sights` is asked where a removed object is to be filled.
+    /// Returns the edited document. Calls `sights` only to fill the hole of a removed object.
     ///
     /// # Errors
     ///
-    /// Values out of bounds; labels or rows that the model has not; an edit that leaves nothing.
+    /// A value out of bounds; a missing label or row; an edit that would leave no Gaussian.
     pub fn apply(&self, edit: &Edit, sights: &mut Sights) -> Result<Self> {
         if let Some(problem) = edit.problem() {
             return Err(Error::usage("edit", problem));
@@ -57,7 +57,7 @@ impl Document {
                 Ok(Self { model, table: self.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id))) })
             }
             Edit::Assign { label: None, name, .. } => {
-                let Merged { model, table, .. } = add(&self.model, self.table.clone(), &rows, name.as_deref())?;
+                let MergedLabels { model, table, .. } = add(&self.model, self.table.clone(), &rows, name.as_deref())?;
                 Ok(Self { model, table })
             }
             Edit::Assign { label: Some(label), .. } => self.assigned(&rows, *label),
@@ -67,7 +67,7 @@ impl Document {
         }
     }
 
-    /// Returns a sentence that tells an edit of this document.
+    /// Describes an edit of this document in a sentence.
     pub fn told(&self, edit: &Edit) -> String {
         let known = self.catalogue();
         let title = |id: u32| match (id, known.name(id)) {
@@ -94,7 +94,7 @@ impl Document {
             Edit::Remove { labels, fill: false } => format!("Removed {}", titles(labels)),
             Edit::Remove { labels, fill: true } => format!("Removed {}, filled", titles(labels)),
             Edit::Assign { label: None, name, .. } => format!("New label of {size}{}", called(name)),
-            Edit::Assign { label: Some(UNLABELLED), .. } => format!("Took the label of {size} away"),
+            Edit::Assign { label: Some(UNLABELLED), .. } => format!("Removed the label of {size}"),
             Edit::Assign { label: Some(label), .. } => format!("Gave {size} to {}", title(*label)),
             Edit::Delete { .. } => format!("Deleted {size}"),
             Edit::Keep { .. } => format!("Kept only {size}"),
@@ -107,22 +107,22 @@ impl Document {
     }
 
     fn merged(&self, labels: &BTreeSet<u32>, name: Option<&str>) -> Result<Self> {
-        let Merged { model, table, .. } = merge(&self.model, &self.catalogue(), labels, None, name)?;
+        let MergedLabels { model, table, .. } = merge(&self.model, &self.catalogue(), labels, None, name)?;
         Ok(Self { model, table })
     }
 
     fn split(&self, label: u32) -> Result<Self> {
         let taken = self.table.iter().flat_map(|table| &table.labels).map(|entry| entry.id).collect();
         let labels = BTreeSet::from([label]);
-        let found = split_components(&self.model, &labels, &taken, Grouping::default(), Specks::Keep)?;
+        let found = split_components(&self.model, &labels, &taken, Grouping::default(), SmallParts::Keep)?;
         if found.ids.values().all(|ids| ids.len() < 2) {
-            return Err(Error::usage("labels", "the label has one part only; choose a part of it instead"));
+            return Err(Error::usage("labels", "the label has only one part; choose some of its Gaussians instead"));
         }
         Ok(Self { model: found.model, table: self.table.as_ref().map(|table| split(table, &found.ids)) })
     }
 
     fn filled(&self, labels: &[u32], sights: &mut Sights) -> Result<Gaussians> {
-        // A choice of nothing or of everything is refused before any picture.
+        // Refuse an empty choice, or one of everything, before rendering.
         remove(&self.model, labels)?;
         let sights = sights(&self.model)?;
         let light = Light::of(&self.model, &sights)?;
@@ -150,7 +150,7 @@ impl Document {
         if model.is_empty() {
             return Err(nothing_left());
         }
-        // Labels that have lost their last Gaussian go with it.
+        // Remove labels that have lost their last Gaussian.
         let before = self.catalogue().gaussians;
         let after = Catalogue::new(&model, None).gaussians;
         let is_left = |id| after.contains_key(&id) || !before.contains_key(&id);
@@ -164,7 +164,7 @@ impl Document {
         copies.means.iter_mut().for_each(|mean| *mean = (DVec3::from(mean.map(f64::from)) + shift).as_vec3().into());
         let is_new: Vec<bool> = (0..model.len() + copies.len()).map(|row| row >= rows.len()).collect();
         model.append(copies);
-        let Merged { model, table, .. } = add(&model, self.table.clone(), &is_new, name)?;
+        let MergedLabels { model, table, .. } = add(&model, self.table.clone(), &is_new, name)?;
         Ok(Self { model, table })
     }
 }

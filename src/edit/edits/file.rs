@@ -1,4 +1,4 @@
-//! `edits.json`: the changes of a model, to be made again.
+//! `edits.json`: the edits of a model, for replay.
 
 use super::{Document, Edit, Sights};
 use labelgs_files::{atomic, read};
@@ -10,38 +10,38 @@ use std::path::Path;
 /// Version of the layout.
 const SCHEMA_VERSION: u32 = 1;
 
-/// The changes of a model, from the first to the last.
+/// The edits of a model, first to last.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EditsFile {
     /// Version of the layout.
     pub schema_version: u32,
-    /// Number of Gaussians of the first model.
+    /// Number of Gaussians in the original model.
     pub gaussians: u64,
-    /// CRC-32 of their places and labels.
+    /// CRC-32 of their positions and labels.
     pub checksum: u32,
-    /// The changes.
+    /// The edits.
     pub edits: Vec<Edit>,
 }
 
 impl EditsFile {
-    /// Makes a list of changes of a model.
+    /// Records the edits of a model.
     pub fn new(first: &Gaussians, edits: Vec<Edit>) -> Self {
         Self { schema_version: SCHEMA_VERSION, gaussians: first.len() as u64, checksum: checksum(first), edits }
     }
 
-    /// Reads a list.
+    /// Reads the file.
     ///
     /// # Errors
     ///
-    /// A file that is none, or of another version.
+    /// A file that is not an `edits.json`, or has another version.
     pub fn read(path: &Path) -> Result<Self> {
-        let file: Self = read::json(path, "expected the edits.json of a viewer of labelgs")?;
+        let file: Self = read::json(path, "expected the edits.json of a labelgs viewer")?;
         read::require_version(path, file.schema_version, SCHEMA_VERSION)?;
         Ok(file)
     }
 
-    /// Writes the list, atomically.
+    /// Writes the file atomically.
     ///
     /// # Errors
     ///
@@ -50,15 +50,15 @@ impl EditsFile {
         atomic::write_json(path, self)
     }
 
-    /// Makes the changes. `path` is the file of the list, for messages; `sights` as in [`Document::apply`].
+    /// Applies the edits in order. `path` names the file in messages; `sights` is as in [`Document::apply`].
     ///
     /// # Errors
     ///
-    /// Another model than that of the list; a change that cannot be made, with its number.
+    /// A model other than the original; an edit that fails, with its number.
     pub fn replay(&self, path: &Path, first: Document, sights: &mut Sights) -> Result<Document> {
         if (first.model.len() as u64, checksum(&first.model)) != (self.gaussians, self.checksum) {
             let problem = format!(
-                "is for another model, of {}; replay it on the model that was opened first",
+                "is for another model, with {}; replay it on the model that was opened first",
                 counted(self.gaussians, "Gaussian")
             );
             return Err(Error::data(path, "", problem));

@@ -1,7 +1,7 @@
-//! Changes of a model and of the names of its labels, one after the other, as an editor makes them and a file keeps them.
+//! Edits of a model and its label names, made one after the other by an editor and kept in a file.
 //!
-//! An [`Edit`] is one change; [`Document::apply`] makes it; [`EditsFile`] is the list of all of them, which makes the same
-//! bytes of the same model again.
+//! An [`Edit`] is one change, and [`Document::apply`] makes it. [`EditsFile`] lists all edits; replaying it on the same
+//! model produces the same bytes.
 
 mod apply;
 mod file;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Longest name of a label, bytes.
 const NAME_MAX: usize = 200;
 
-/// A change of labels or of Gaussians. Rows are those of the model before the change.
+/// A change of labels or Gaussians. Rows are those of the model before the change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Edit {
@@ -27,12 +27,12 @@ pub enum Edit {
         /// Its name.
         name: String,
     },
-    /// Makes several labels one, with the smallest id.
+    /// Merges several labels into the one with the smallest id.
     Merge {
         /// The labels.
         labels: Vec<u32>,
     },
-    /// Makes labels of the connected parts of a label. The largest part keeps the id.
+    /// Splits a label into its connected parts. The largest part keeps the id.
     Split {
         /// The label.
         label: u32,
@@ -50,7 +50,7 @@ pub enum Edit {
     Remove {
         /// The labels.
         labels: Vec<u32>,
-        /// Continue the surfaces around them where no view ever looked.
+        /// Also continue the surrounding surfaces over the hole, where no view ever looked.
         #[serde(default)]
         fill: bool,
     },
@@ -59,7 +59,7 @@ pub enum Edit {
         /// Which Gaussians.
         #[serde(default)]
         rows: Rows,
-        /// The label; 0 takes theirs away, none makes a new one.
+        /// The label; 0 removes labels, and `None` creates one.
         #[serde(default)]
         label: Option<u32>,
         /// The name of a new label, if any.
@@ -78,12 +78,12 @@ pub enum Edit {
         #[serde(default)]
         rows: Rows,
     },
-    /// Adds copies of Gaussians beside them, with a label of their own.
+    /// Adds shifted copies of Gaussians with a new label.
     Duplicate {
         /// Which Gaussians.
         #[serde(default)]
         rows: Rows,
-        /// From a Gaussian to its copy, world units.
+        /// Shift from a Gaussian to its copy, world units.
         shift: [f64; 3],
         /// The name of the new label, if any.
         #[serde(default)]
@@ -92,7 +92,7 @@ pub enum Edit {
 }
 
 impl Edit {
-    /// Returns what is wrong with the values, if anything.
+    /// Returns what is wrong with the edit's values, if anything.
     fn problem(&self) -> Option<String> {
         match self {
             Self::Rename { name, .. }
@@ -105,13 +105,13 @@ impl Edit {
             }
             Self::Merge { labels } if labels.len() < 2 => Some("choose at least two labels to merge".to_owned()),
             Self::Duplicate { shift, .. } if !shift.iter().all(|value| value.is_finite()) => {
-                Some("a copy is at a finite place".to_owned())
+                Some("the shift of a copy must be finite".to_owned())
             }
             _ => None,
         }
     }
 
-    /// Returns the labels that it names.
+    /// Returns the labels that the edit names.
     pub fn labels(&self) -> &[u32] {
         match self {
             Self::Rename { label, .. } | Self::Split { label } => std::slice::from_ref(label),
@@ -120,7 +120,7 @@ impl Edit {
         }
     }
 
-    /// Returns the Gaussians that it names.
+    /// Returns the Gaussians that the edit names.
     pub fn rows(&self) -> Option<&Rows> {
         match self {
             Self::Assign { rows, .. } | Self::Delete { rows } | Self::Keep { rows } | Self::Duplicate { rows, .. } => {
@@ -130,7 +130,7 @@ impl Edit {
         }
     }
 
-    /// Returns the same for other Gaussians, if it is about some.
+    /// Replaces the Gaussians that the edit names, if it names any.
     pub fn with_rows(mut self, chosen: Rows) -> Self {
         match &mut self {
             Self::Assign { rows, .. } | Self::Delete { rows } | Self::Keep { rows } | Self::Duplicate { rows, .. } => {
@@ -141,7 +141,7 @@ impl Edit {
         self
     }
 
-    /// Returns true if the model has other Gaussians afterwards.
+    /// Returns true if the edit adds or removes Gaussians.
     pub fn changes_rows(&self) -> bool {
         matches!(self, Self::Remove { .. } | Self::Delete { .. } | Self::Keep { .. } | Self::Duplicate { .. })
     }
@@ -149,11 +149,11 @@ impl Edit {
 
 fn name_problem(name: &str) -> Option<String> {
     if name.trim().is_empty() {
-        Some("a name has at least one letter".to_owned())
+        Some("a name needs at least one letter".to_owned())
     } else if name.len() > NAME_MAX {
         Some(format!("a name has at most {NAME_MAX} bytes"))
     } else if name.contains(char::is_control) {
-        Some("a name is one line of text without control characters".to_owned())
+        Some("a name must be one line of text without control characters".to_owned())
     } else {
         None
     }

@@ -1,10 +1,10 @@
-//! Gaussians of a model by their rows, short in a file.
+//! Gaussians of a model by row, in a compact text form.
 
 use labelgs_scene::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Rows of a model: numbers of rows left out and taken in turn, from the first row on. In a file they are a text, such as
-/// `12 3 5 2` for rows 12, 13, 14, 20 and 21.
+/// Rows of a model as alternating lengths of skipped and chosen runs, from the first row. The text form in files is `12
+/// 3 5 2` for rows 12, 13, 14, 20 and 21.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Rows(Vec<u32>);
@@ -25,8 +25,8 @@ impl TryFrom<String> for Rows {
 }
 
 impl Rows {
-    /// Returns the rows that are true.
-    pub fn of(rows: &[bool]) -> Self {
+    /// Collects the rows that are true.
+    pub fn from_mask(rows: &[bool]) -> Self {
         let mut runs = Vec::new();
         let mut is_in = false;
         let mut length = 0;
@@ -43,15 +43,15 @@ impl Rows {
         Self(runs)
     }
 
-    /// Returns for each of `count` rows whether it is one of these.
+    /// Returns a flag for each of `count` rows, true for the chosen ones.
     ///
     /// # Errors
     ///
-    /// A row that the model has not.
+    /// A row that the model does not have.
     pub fn mask(&self, count: usize) -> Result<Vec<bool>> {
         let end: u64 = self.0.iter().map(|&length| u64::from(length)).sum();
         if end > count as u64 {
-            return Err(Error::usage("choice", format!("goes to row {end}; the model has {count}")));
+            return Err(Error::usage("choice", format!("has row {end}; the model has {count}")));
         }
         let mut rows = Vec::with_capacity(count);
         for (index, &length) in self.0.iter().enumerate() {

@@ -1,6 +1,6 @@
-//! Gaussians chosen by hand: by what is drawn over a picture, by a place, by what is alike, and by what is near.
+//! Selects Gaussians by hand: by a shape drawn over a render, by distance, by similarity, or by neighbourhood.
 //!
-//! Each rule returns a choice, one flag for each row of the model; [`Combine`] joins it with the one before.
+//! Each rule returns a selection with one flag per row of the model; [`Combine`] combines it with the previous one.
 
 mod nearby;
 mod region;
@@ -11,23 +11,23 @@ pub use region::{Region, Shape, Side, beyond, in_region, in_sphere};
 
 use serde::Deserialize;
 
-/// How a new choice joins the one before.
+/// How a new selection combines with the previous one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Combine {
-    /// It takes its place.
+    /// Replaces it.
     #[default]
     Replace,
-    /// It is added.
+    /// Adds to it.
     Add,
-    /// It is taken away.
+    /// Subtracts from it.
     Take,
-    /// Only what both have is left.
+    /// Keeps only what both contain.
     Within,
 }
 
 impl Combine {
-    /// Returns what becomes of `before`.
+    /// Returns the combined selection.
     pub fn join(self, before: &[bool], found: &[bool]) -> Vec<bool> {
         let join = |(&before, &found): (&bool, &bool)| match self {
             Self::Replace => found,

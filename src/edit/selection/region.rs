@@ -1,41 +1,43 @@
-//! Choices by what is drawn over a picture, and by a place.
+//! Selects Gaussians by a shape drawn over a render, or by position.
 
 use glam::{DVec2, DVec3};
 use labelgs_scene::{Camera, Gaussians};
 use rayon::prelude::*;
 use serde::Deserialize;
 
-/// How far behind the surface of a picture a centre may be and still be seen, in standard deviations along its longest
-/// axis, and as a share of the depth: the surface that blending shows lies a little before most of its Gaussians.
-const SEEN_BEHIND: (f64, f64) = (1.0, 0.01);
+/// How far behind the rendered surface a centre may be and still count as seen, in standard deviations along its
+/// longest axis. Blending shows a surface slightly in front of most of its Gaussians.
+const SEEN_BEHIND_DEVIATIONS: f64 = 1.0;
+/// The same, as a share of the surface's depth; both add up.
+const SEEN_BEHIND_DEPTH_SHARE: f64 = 0.01;
 /// Least opacity of a Gaussian that counts as seen.
 const SEEN_OPACITY_MIN: f64 = 0.05;
 
-/// What is drawn over a picture.
+/// A shape drawn over a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
     /// The inside of a closed line.
     Inside,
-    /// What is near to a line.
+    /// The pixels near a line.
     Along,
 }
 
-/// A part of a picture.
+/// A part of a render.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// The inside of the line, or what is along it.
+    /// Whether the region is inside the line or along it.
     pub shape: Shape,
     /// Corners of the line, px from the corner of the first pixel.
     pub points: Vec<[f64; 2]>,
-    /// Half of the width of what is along the line, px.
+    /// Half the width of a region along a line, px.
     #[serde(default)]
     pub radius: f64,
 }
 
 impl Region {
-    /// Returns true for a place in it.
+    /// Returns true if a point is in the region.
     pub fn has(&self, at: DVec2) -> bool {
         match self.shape {
             Shape::Inside => self.is_inside(at),
@@ -43,7 +45,7 @@ impl Region {
         }
     }
 
-    /// Even and odd crossings of a ray to the right.
+    /// Counts whether a ray to the right crosses the outline an odd number of times.
     fn is_inside(&self, at: DVec2) -> bool {
         let crosses = |(a, b): (DVec2, DVec2)| {
             (a.y > at.y) != (b.y > at.y) && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x)
@@ -60,7 +62,7 @@ impl Region {
         self.sides(false).any(|side| distance(side) <= self.radius * self.radius)
     }
 
-    /// The lines between the points, and if `is_closed` the one from the last to the first. A single point is a line.
+    /// Returns the lines between the points, including the closing one if `is_closed`. A single point is a line.
     fn sides(&self, is_closed: bool) -> impl Iterator<Item = (DVec2, DVec2)> {
         let count = self.points.len();
         let lines = if is_closed || count == 1 { count } else { count.saturating_sub(1) };
@@ -68,8 +70,8 @@ impl Region {
     }
 }
 
-/// Returns the Gaussians whose centre is drawn in a part of a picture of `camera`; with `depth`, the depth of the picture's
-/// surface by pixel, only those that are seen, else also what is behind.
+/// Returns the Gaussians whose centre projects into a region of `camera`. With `depth`, the depth of the rendered
+/// surface per pixel, it returns only visible Gaussians; without it, also those behind.
 pub fn in_region(model: &Gaussians, camera: &Camera, region: &Region, depth: Option<&[f32]>) -> Vec<bool> {
     let found = |row: usize| {
         let world = model.world(row);
@@ -84,7 +86,7 @@ pub fn in_region(model: &Gaussians, camera: &Camera, region: &Region, depth: Opt
 fn is_seen(model: &Gaussians, row: usize, camera: &Camera, (pixel, z): (DVec2, f64), depth: &[f32]) -> bool {
     let surface = f64::from(depth[pixel.y as usize * camera.width as usize + pixel.x as usize]);
     let longest = model.scales[row].iter().copied().fold(f32::MIN, f32::max);
-    let behind = SEEN_BEHIND.0 * f64::from(longest).exp() + SEEN_BEHIND.1 * surface;
+    let behind = SEEN_BEHIND_DEVIATIONS * f64::from(longest).exp() + SEEN_BEHIND_DEPTH_SHARE * surface;
     model.opacity(row) >= SEEN_OPACITY_MIN && (surface <= 0.0 || z <= surface + behind)
 }
 
@@ -99,7 +101,7 @@ pub fn in_sphere(model: &Gaussians, centre: DVec3, radius: f64) -> Vec<bool> {
 pub enum Side {
     /// Nearer to the camera.
     Front,
-    /// Farther, or behind the camera's back.
+    /// Farther, or behind the camera.
     Behind,
 }
 

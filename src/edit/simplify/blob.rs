@@ -1,13 +1,13 @@
-//! Two Gaussians as one.
+//! Merges two Gaussians into one.
 
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::gaussians::{ALPHA_MAX, axes_of};
 use labelgs_scene::harmonics::SH_C0;
 use labelgs_scene::principal::principal_axes;
 
-/// Weight of a difference of colour, 0 to 1 a channel, beside that of shape and place.
+/// Weight of a colour difference (0 to 1 per channel) relative to shape and position.
 const COLOUR_WEIGHT: f64 = 4.0;
-/// Smallest opacity that a merged Gaussian gets, so that it has a logit. Blending ends at the largest.
+/// Smallest opacity of a merged Gaussian, so that it has a finite logit. The largest is where blending stops.
 const OPACITY_MIN: f64 = 1e-6;
 
 /// A Gaussian as moments.
@@ -21,15 +21,15 @@ pub(super) struct Blob {
     pub weight: f64,
     pub label: u32,
     pub confidence: f32,
-    /// Coefficients of degree 0, then those above.
+    /// Coefficients of degree 0, then the higher ones.
     pub harmonics: Vec<[f32; 3]>,
-    /// The row that it was made of, if of one alone.
+    /// The original row, if this is not a merged Gaussian.
     pub row: Option<usize>,
 }
 
 impl Blob {
-    /// Returns what merging costs in the pictures: the lighter weight times how different both are. Shape and place differ by
-    /// the Bhattacharyya distance.
+    /// Returns the cost of merging to the renders: the smaller weight times the difference. Shape and position differ
+    /// by the Bhattacharyya distance.
     pub(super) fn cost(&self, other: &Self) -> f64 {
         let mean = (self.covariance + other.covariance) * 0.5;
         let (gap, product) = (self.mean - other.mean, self.covariance.determinant() * other.covariance.determinant());
@@ -38,11 +38,12 @@ impl Blob {
         let colour = self.colour().distance_squared(other.colour());
         let weight = self.weight * other.weight / (self.weight + other.weight).max(f64::MIN_POSITIVE);
         let cost = weight * (place + shape + COLOUR_WEIGHT * colour);
-        // Flat Gaussians that are too thin for an inverse stay.
+        // Keep flat Gaussians that are too thin to invert.
         if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
-    /// Returns both as one: moments and colours by weight. The opacity keeps what both cover, as far as it is visible.
+    /// Merges two Gaussians: moments and colours by weight. The opacity preserves what both cover, as far as it is
+    /// visible.
     pub(super) fn merged(&self, other: &Self) -> Self {
         let share = if self.weight + other.weight > 0.0 { self.weight / (self.weight + other.weight) } else { 0.5 };
         let mix = |a: f64, b: f64| share * a + (1.0 - share) * b;
@@ -57,7 +58,7 @@ impl Blob {
             sizes.sort_by(f64::total_cmp);
             sizes[1] * sizes[2]
         };
-        // What a hidden one covers does not count: the share of its cover that the views see, against that of the other.
+        // Ignore cover that the views do not see: compare the share of this one's cover that they see with the other's.
         let covers = [self, other].map(|blob| blob.opacity * area(&blob.covariance));
         let seen = [self, other].map(|blob| blob.weight);
         let visible = (0..2).map(|at| seen[at] / covers[at].max(f64::MIN_POSITIVE)).fold(0.0, f64::max);
@@ -90,7 +91,7 @@ pub(super) fn covariance(quat: [f32; 4], scales: [f32; 3]) -> DMat3 {
     turn * DMat3::from_diagonal(squares) * turn.transpose()
 }
 
-/// Returns a rotation and the deviations along its axes, of a covariance.
+/// Returns the rotation of a covariance and the standard deviations along its axes.
 pub(super) fn axes(covariance: &DMat3) -> (DQuat, [f64; 3]) {
     let (turn, sizes) = principal_axes(covariance);
     (DQuat::from_mat3(&turn).normalize(), sizes)

@@ -1,7 +1,7 @@
-//! Fewer Gaussians for the same pictures: pairs that cost the pictures least become one.
+//! Reduces the number of Gaussians by merging the pairs that change the renders least.
 //!
-//! What a Gaussian contributes is measured: its blending weight over all pixels of some views. Pairs are neighbours of the
-//! same label, so labels stay as they are. One without weight vanishes in its neighbour.
+//! The contribution of a Gaussian is its measured blending weight over all pixels of some views. Pairs are neighbours
+//! with the same label, so labels stay as they are. A Gaussian without weight vanishes into its neighbour.
 
 mod blob;
 
@@ -14,11 +14,11 @@ use rayon::prelude::*;
 use std::num::NonZero;
 
 /// Neighbours that a Gaussian may merge with.
-const NEIGHBOURS: usize = 10;
-/// Share of the Gaussians that may vanish in one round; merged ones find new neighbours in the next.
+const NEIGHBOUR_COUNT: usize = 10;
+/// Largest share of the Gaussians merged per round; merged ones find new neighbours in the next.
 const ROUND_SHARE_MAX: f64 = 0.1;
 
-/// A model on its way to fewer Gaussians.
+/// A model that is being simplified.
 #[derive(Clone, Debug)]
 pub struct Simplifier<'a> {
     model: &'a Gaussians,
@@ -26,7 +26,7 @@ pub struct Simplifier<'a> {
 }
 
 impl<'a> Simplifier<'a> {
-    /// Takes a model and the blending weight of each of its Gaussians.
+    /// Starts with a model and the blending weight of each of its Gaussians.
     ///
     /// # Panics
     ///
@@ -50,7 +50,7 @@ impl<'a> Simplifier<'a> {
         self.blobs.len()
     }
 
-    /// Merges until `count` are left, or until no two of a label are left.
+    /// Merges until `count` Gaussians are left, or until no label has two.
     ///
     /// # Errors
     ///
@@ -91,8 +91,8 @@ impl<'a> Simplifier<'a> {
     /// Returns neighbours of the same label, the smaller index first, with the cost of merging them.
     fn pairs(&self) -> Result<Vec<(f64, usize, usize)>> {
         let places: Vec<[f64; 3]> = self.blobs.iter().map(|blob| blob.mean.to_array()).collect();
-        // One more, because each finds itself.
-        let Some(asked) = NonZero::new((NEIGHBOURS + 1).min(places.len())) else { return Ok(Vec::new()) };
+        // +1: the query returns the Gaussian itself.
+        let Some(asked) = NonZero::new((NEIGHBOUR_COUNT + 1).min(places.len())) else { return Ok(Vec::new()) };
         let tree = tree(&places)?;
         let of = |index: usize| {
             let found = tree.query(&places[index]).nearest_n::<SquaredEuclidean<f64>>(asked).execute();

@@ -1,4 +1,4 @@
-//! What strokes claim gets their labels.
+//! Applies the labels found by strokes.
 
 use crate::catalogue::Catalogue;
 use crate::rename::give_name;
@@ -6,13 +6,13 @@ use labelgs_files::label_table::{LabelEntry, LabelTable};
 use labelgs_scene::{Error, Gaussians, Result, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Gives the Gaussians the labels that a cut found for them, and names to these labels. `found` has a label for each
-/// row, 0 for none of `labels`: a row that had one of them loses it, and other labels stay. Rows that change are sure
-/// of their label.
+/// Gives the Gaussians the labels that a cut found, and names these labels. `found` has a label for each row, 0 for
+/// none of `labels`. A row with 0 loses its label if it is one of `labels`; other labels stay. Changed rows have
+/// confidence 1.
 ///
 /// # Errors
 ///
-/// The name of another label.
+/// A name that another label has.
 pub fn claim(
     model: &Gaussians,
     table: Option<LabelTable>,

@@ -17,35 +17,35 @@ const POINTS_MAX: usize = 10_000;
 /// Largest radius, px.
 const RADIUS_MAX: f64 = 100.0;
 
-/// A line over a photo, on an object or on what does not belong to it.
+/// A line over a photo, on an object or on its background.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stroke {
-    /// Name of the view, also without its extension.
+    /// Name of the view, with or without its extension.
     pub view: String,
     /// Corners of the line, or a single point, px from the upper left corner of the photo: `[3, 0]` is in the fourth
     /// pixel of the first row.
     pub points: Vec<[f64; 2]>,
-    /// How far it reaches to each side of the pixels of its line, px.
+    /// How far the stroke reaches to each side of its line, px.
     #[serde(default)]
     pub radius: f64,
-    /// Label of the object, 0 for what belongs to none.
+    /// Label of the object; 0 for the background.
     pub label: u32,
     /// Name of the object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// False for what does not belong to the object.
-    #[serde(default = "on")]
+    /// False if the stroke marks what does not belong to the object.
+    #[serde(default = "default_on")]
     pub on: bool,
 }
 
-fn on() -> bool {
+fn default_on() -> bool {
     true
 }
 
 impl Stroke {
     /// Returns the pixels of the stroke in a photo of `width` x `height` px, row-major and ascending. A point outside
-    /// of the photo is an error, which says its number.
+    /// the photo is an error that gives its number.
     pub fn pixels(&self, (width, height): (u32, u32)) -> std::result::Result<Vec<usize>, String> {
         let is_inside = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
         if let Some(at) = self.points.iter().position(|&point| !is_inside(point)) {
@@ -76,7 +76,7 @@ impl Stroke {
         Ok((0..hit.len()).filter(|&at| hit[at]).collect())
     }
 
-    /// Returns what is wrong with it.
+    /// Returns what is wrong with the stroke, if anything.
     fn problem(&self) -> Option<String> {
         if self.points.is_empty() || self.points.len() > POINTS_MAX {
             return Some(format!("has {} points; expected 1 to {POINTS_MAX}", self.points.len()));
@@ -95,33 +95,33 @@ impl Stroke {
         None
     }
 
-    /// Returns true for one on an object.
+    /// Returns true if the stroke is on an object.
     fn is_on_object(&self) -> bool {
         self.on && self.label != UNLABELLED
     }
 }
 
-/// Strokes on objects and on what does not belong to them.
+/// Strokes on objects and on their background.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StrokesFile {
     /// Version of the layout.
     pub schema_version: u32,
-    /// The strokes. Later ones correct earlier ones.
+    /// The strokes. Later ones override earlier ones.
     pub strokes: Vec<Stroke>,
 }
 
 impl StrokesFile {
-    /// Makes a file of strokes.
+    /// Collects strokes.
     pub fn new(strokes: Vec<Stroke>) -> Self {
         Self { schema_version: SCHEMA_VERSION, strokes }
     }
 
-    /// Reads strokes, of which one at least is on an object and one on what does not belong to it.
+    /// Reads strokes. At least one must be on an object and one on the background.
     ///
     /// # Errors
     ///
-    /// A file that is none, or of another version; a stroke that cannot be, with its number from 1.
+    /// A file of another kind or version; an invalid stroke, with its number from 1.
     pub fn read(path: &Path) -> Result<Self> {
         let expected = "expected {\"schema_version\": 1, \"strokes\": [{\"view\": \"000\", \"points\": [[10, 20], \
                         [30, 20]], \"label\": 1}]}, where \"radius\", \"name\" and \"on\" may be added";
@@ -133,7 +133,7 @@ impl StrokesFile {
         }
         for (stroke, number) in file.strokes.iter().zip(1..) {
             if let Some(problem) = stroke.problem() {
-                return Err(Error::data(path, place(number), problem));
+                return Err(Error::data(path, stroke_title(number), problem));
             }
         }
         let objects: BTreeSet<u32> = file.strokes.iter().map(|stroke| stroke.label).collect();
@@ -142,10 +142,10 @@ impl StrokesFile {
             return Err(Error::data(path, "", problem));
         }
         if !file.strokes.iter().any(Stroke::is_on_object) {
-            return Err(Error::data(path, "", "no stroke is on an object; one at least needs a label from 1 on"));
+            return Err(Error::data(path, "", "no stroke is on an object; give at least one a label of 1 or more"));
         }
         if file.strokes.iter().all(Stroke::is_on_object) {
-            let problem = "no stroke is on what belongs to no object; add one with \"label\": 0 beside the objects";
+            let problem = "no stroke is on the background; add one with \"label\": 0 beside the objects";
             return Err(Error::data(path, "", problem));
         }
         file.names(path)?;
@@ -156,7 +156,7 @@ impl StrokesFile {
     ///
     /// # Errors
     ///
-    /// Two names of a label, or two labels of a name, with the number of the stroke.
+    /// Two names for one label, or one name for two labels, with the number of the stroke.
     pub fn names(&self, path: &Path) -> Result<BTreeMap<u32, String>> {
         let mut names: BTreeMap<u32, String> = BTreeMap::new();
         for (stroke, number) in self.strokes.iter().zip(1..) {
@@ -165,7 +165,7 @@ impl StrokesFile {
             let other = names.iter().find(|&(&id, known)| (id == label) != (known == name));
             if let Some((id, known)) = other {
                 let problem = format!("calls label {label} {name}, and an earlier one calls label {id} {known}");
-                return Err(Error::data(path, place(number), problem));
+                return Err(Error::data(path, stroke_title(number), problem));
             }
             names.insert(label, name.clone());
         }
@@ -173,7 +173,7 @@ impl StrokesFile {
     }
 }
 
-/// Names a stroke, by its number from 1, in messages.
-pub fn place(number: usize) -> String {
+/// Names a stroke in messages, by its number from 1.
+pub fn stroke_title(number: usize) -> String {
     format!("stroke {number}")
 }

@@ -1,27 +1,27 @@
-//! The smallest cut of a graph between a source and a sink, by the largest flow (Boykov and Kolmogorov, PAMI 2004).
+//! Minimum cut of a graph between a source and a sink, by maximum flow (Boykov and Kolmogorov, PAMI 2004).
 
 use std::collections::VecDeque;
 
-/// A parent that is none: the node is in no tree, or waits for a new parent.
-const NONE: u32 = u32::MAX;
-/// A parent that is the source or the sink.
-const TERMINAL: u32 = u32::MAX - 1;
+/// No parent: the node is free, or is waiting for a new parent.
+const NO_PARENT: u32 = u32::MAX;
+/// The parent is the source or the sink.
+const TERMINAL_PARENT: u32 = u32::MAX - 1;
 
-/// The arcs between nodes, two for each pair of them: one there, one back.
+/// The arcs between nodes, one in each direction for every pair.
 #[derive(Clone, Debug)]
 pub struct Arcs {
-    /// First arc of each node, and one past the last arc of all.
+    /// First arc of each node, and a final entry past the last arc.
     first: Vec<u32>,
     /// Node at the end of each arc.
     heads: Vec<u32>,
-    /// The same arc in the other direction.
+    /// The arc in the opposite direction.
     backs: Vec<u32>,
     /// Pair of each arc.
     pairs: Vec<u32>,
 }
 
 impl Arcs {
-    /// Makes arcs for pairs of different nodes below `nodes`.
+    /// Builds the arcs for pairs of distinct nodes below `nodes`.
     pub fn new(nodes: usize, pairs: impl ExactSizeIterator<Item = [u32; 2]> + Clone) -> Self {
         let mut first = vec![0_u32; nodes + 1];
         pairs.clone().flatten().for_each(|node| first[node as usize + 1] += 1);
@@ -51,8 +51,8 @@ impl Arcs {
         self.first.len() - 1
     }
 
-    /// Returns for each arc of a node its number, the node at its end, and its pair.
-    pub fn of(&self, node: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    /// Returns the arcs of a node: the arc's number, the node at its end, and its pair.
+    pub fn leaving(&self, node: usize) -> impl Iterator<Item = (usize, usize, usize)> {
         let arcs = self.first[node] as usize..self.first[node + 1] as usize;
         arcs.map(|arc| (arc, self.heads[arc] as usize, self.pairs[arc] as usize))
     }
@@ -62,7 +62,7 @@ impl Arcs {
         self.heads.len()
     }
 
-    /// Returns true without arcs.
+    /// Returns true if there are no arcs.
     pub fn is_empty(&self) -> bool {
         self.heads.is_empty()
     }
@@ -76,17 +76,17 @@ enum Tree {
     Sink,
 }
 
-/// A flow that grows.
+/// A growing flow.
 struct Flow<'a> {
     arcs: &'a Arcs,
-    /// What still fits through each arc.
+    /// Remaining capacity of each arc.
     room: Vec<i32>,
-    /// What the source still gives to a node, or as a negative number what the sink still takes from it.
+    /// Remaining capacity from the source to a node, or if negative, from the node to the sink.
     surplus: Vec<i64>,
     trees: Vec<Tree>,
     /// Arc of each node to its parent.
     parents: Vec<u32>,
-    /// Time of the last look at the way of a node to its root, and the length of the way then.
+    /// When each node's path to its root was last measured, and its length then.
     stamps: Vec<u32>,
     lengths: Vec<u32>,
     time: u32,
@@ -95,17 +95,18 @@ struct Flow<'a> {
     orphans: VecDeque<u32>,
 }
 
-/// Returns which nodes are on the side of the source in the smallest cut with the fewest nodes there.
+/// Returns the nodes on the source's side of the minimum cut; of several such cuts, the one with the fewest nodes
+/// there.
 ///
-/// `room` has what each arc carries, not negative: what a cut costs that parts its node, on the side of the source,
-/// from its end. `surplus` has what a node costs on the side of the sink, less what it costs on that of the source.
+/// `room` has the capacity of each arc, at least 0: the cost of separating its node, on the source's side, from its
+/// end. `surplus` has the cost of each node on the sink's side, less its cost on the source's side.
 pub fn smallest_cut(arcs: &Arcs, room: Vec<i32>, surplus: Vec<i64>) -> Vec<bool> {
     let nodes = arcs.nodes();
     let mut flow = Flow {
         arcs,
         room,
         trees: surplus.iter().map(|&surplus| tree_of(surplus)).collect(),
-        parents: surplus.iter().map(|&surplus| if surplus == 0 { NONE } else { TERMINAL }).collect(),
+        parents: surplus.iter().map(|&surplus| if surplus == 0 { NO_PARENT } else { TERMINAL_PARENT }).collect(),
         stamps: vec![0; nodes],
         lengths: surplus.iter().map(|&surplus| u32::from(surplus != 0)).collect(),
         time: 0,
@@ -131,7 +132,7 @@ impl Flow<'_> {
         while let Some(node) = self.active.pop_front() {
             let node = node as usize;
             self.is_active[node] = false;
-            // A node may have more than one way to the other tree.
+            // A node may have more than one path to the other tree.
             while let Some(bridge) = self.grow(node) {
                 self.time += 1;
                 self.augment(bridge);
@@ -142,8 +143,8 @@ impl Flow<'_> {
         }
     }
 
-    /// What still fits from a node of a tree to its child through the child's arc to it, or from a child of the sink to
-    /// its parent.
+    /// Returns the remaining capacity from a node of the source's tree to its child through the child's arc, or in the
+    /// sink's tree from the child to its parent.
     fn room_to_child(&self, tree: Tree, arc_of_child: usize) -> i32 {
         self.room[if tree == Tree::Source { self.arcs.backs[arc_of_child] as usize } else { arc_of_child }]
     }
@@ -155,14 +156,14 @@ impl Flow<'_> {
         }
     }
 
-    /// Takes the free neighbours of a node into its tree. Returns an arc from the tree of the source to that of the
-    /// sink, if one is met.
+    /// Adds the free neighbours of a node to its tree. Returns an arc from the source's tree to the sink's tree if they
+    /// meet.
     fn grow(&mut self, node: usize) -> Option<usize> {
         let (tree, arcs) = (self.trees[node], self.arcs);
         if tree == Tree::Free {
             return None;
         }
-        for (arc, head, _) in arcs.of(node) {
+        for (arc, head, _) in arcs.leaving(node) {
             let back = arcs.backs[arc] as usize;
             if self.room_to_child(tree, back) == 0 {
                 continue;
@@ -180,14 +181,14 @@ impl Flow<'_> {
         None
     }
 
-    /// Makes a node the child of another one.
+    /// Makes a node the child of another.
     fn follow(&mut self, child: usize, arc: usize, parent: usize) {
         self.parents[child] = arc as u32;
         self.stamps[child] = self.stamps[parent];
         self.lengths[child] = self.lengths[parent] + 1;
     }
 
-    /// Sends as much as fits along the way through an arc from the tree of the source to that of the sink.
+    /// Sends as much flow as fits along the path through an arc from the source's tree to the sink's tree.
     fn augment(&mut self, bridge: usize) {
         let ends = [
             (Tree::Source, self.arcs.heads[self.arcs.backs[bridge] as usize] as usize),
@@ -196,7 +197,7 @@ impl Flow<'_> {
         let mut most = i64::from(self.room[bridge]);
         for (tree, end) in ends {
             let mut node = end;
-            while self.parents[node] != TERMINAL {
+            while self.parents[node] != TERMINAL_PARENT {
                 let arc = self.parents[node] as usize;
                 most = most.min(i64::from(self.room_to_child(tree, arc)));
                 node = self.arcs.heads[arc] as usize;
@@ -206,43 +207,43 @@ impl Flow<'_> {
         self.send(bridge, most);
         for (tree, end) in ends {
             let mut node = end;
-            while self.parents[node] != TERMINAL {
+            while self.parents[node] != TERMINAL_PARENT {
                 let arc = self.parents[node] as usize;
                 self.send(if tree == Tree::Source { self.arcs.backs[arc] as usize } else { arc }, most);
                 let parent = self.arcs.heads[arc] as usize;
                 if self.room_to_child(tree, arc) == 0 {
-                    self.part(node);
+                    self.detach(node);
                 }
                 node = parent;
             }
             self.surplus[node] -= if tree == Tree::Source { most } else { -most };
             if self.surplus[node] == 0 {
-                self.part(node);
+                self.detach(node);
             }
         }
     }
 
-    /// Sends an amount through an arc, which never is more than its room.
+    /// Sends an amount through an arc, at most its remaining capacity.
     fn send(&mut self, arc: usize, amount: i64) {
         let back = self.arcs.backs[arc] as usize;
         self.room[arc] -= amount as i32;
         self.room[back] += amount as i32;
     }
 
-    /// Takes a node from its parent.
-    fn part(&mut self, node: usize) {
-        self.parents[node] = NONE;
+    /// Detaches a node from its parent.
+    fn detach(&mut self, node: usize) {
+        self.parents[node] = NO_PARENT;
         self.orphans.push_back(node as u32);
     }
 
-    /// Finds another parent for a node, the one with the shortest way to the root, or frees the node.
+    /// Finds another parent with the shortest path to the root for a node, or frees the node.
     fn adopt(&mut self, node: usize) {
         let (tree, arcs) = (self.trees[node], self.arcs);
         let mut best: Option<(u32, usize)> = None;
-        for (arc, head, _) in arcs.of(node) {
+        for (arc, head, _) in arcs.leaving(node) {
             if self.trees[head] == tree
                 && self.room_to_child(tree, arc) > 0
-                && let Some(length) = self.way(head)
+                && let Some(length) = self.path_length(head)
                 && best.is_none_or(|(shortest, _)| length < shortest)
             {
                 best = Some((length, arc));
@@ -255,7 +256,7 @@ impl Flow<'_> {
             return;
         }
         self.trees[node] = Tree::Free;
-        for (arc, head, _) in arcs.of(node) {
+        for (arc, head, _) in arcs.leaving(node) {
             if self.trees[head] != tree {
                 continue;
             }
@@ -263,13 +264,13 @@ impl Flow<'_> {
                 self.activate(head);
             }
             if self.parents[head] == arcs.backs[arc] {
-                self.part(head);
+                self.detach(head);
             }
         }
     }
 
-    /// Returns the length of the way of a node to the root of its tree, `None` if it ends at a node without a parent.
-    fn way(&mut self, from: usize) -> Option<u32> {
+    /// Returns the length of a node's path to the root of its tree, or `None` if it ends at a node without a parent.
+    fn path_length(&mut self, from: usize) -> Option<u32> {
         let (mut node, mut length) = (from, 0);
         let length = loop {
             if self.stamps[node] == self.time {
@@ -277,8 +278,8 @@ impl Flow<'_> {
             }
             length += 1;
             match self.parents[node] {
-                NONE => return None,
-                TERMINAL => {
+                NO_PARENT => return None,
+                TERMINAL_PARENT => {
                     self.stamps[node] = self.time;
                     self.lengths[node] = 1;
                     break length;

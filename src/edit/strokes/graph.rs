@@ -1,4 +1,4 @@
-//! Gaussians near strokes, and what it costs to part each of them from its neighbours.
+//! A graph of the Gaussians near strokes, with the cost of separating each from its neighbours.
 
 use super::flow::Arcs;
 use crate::selection::{Nearby, colour, normal};
@@ -10,18 +10,18 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::num::NonZeroUsize;
 
-/// Neighbours of a Gaussian, itself among them.
-const NEIGHBOURS: NonZeroUsize = NonZeroUsize::new(11).expect("not zero");
-/// What the square of a distance counts, in spacings of both.
-const DISTANCE: f64 = 0.2;
-/// What the square of a difference of colours counts, in mean squares of all neighbours.
-const COLOUR: f64 = 0.5;
-/// What the angle between flat neighbours counts, as one less its cosine.
-const BEND: f64 = 2.0;
-/// Share of the differences of light in those of colour: light and shadow change an object's light more than its hue.
-const LIGHT: f64 = 0.5;
-/// How far labels of their own part two Gaussians, if these are sure of them.
-const OWN_LABELS: f64 = 0.9;
+/// Neighbours of a Gaussian, including itself.
+const NEIGHBOUR_COUNT: NonZeroUsize = NonZeroUsize::new(11).expect("not zero");
+/// Weight of a squared distance, measured in the spacing of both Gaussians.
+const DISTANCE_WEIGHT: f64 = 0.2;
+/// Weight of a squared colour difference, relative to its mean over all neighbours.
+const COLOUR_WEIGHT: f64 = 0.5;
+/// Weight of the angle between flat neighbours, measured as one minus its cosine.
+const BEND_WEIGHT: f64 = 2.0;
+/// Scale of light relative to hue in colour differences: shading changes an object's light more than its hue.
+const LIGHT_SCALE: f64 = 0.5;
+/// How far existing labels separate two Gaussians if their confidence is 1.
+const LABEL_SEPARATION: f64 = 0.9;
 
 /// Gaussians as nodes, each with its neighbours.
 pub(super) struct Graph {
@@ -30,23 +30,23 @@ pub(super) struct Graph {
     /// Node of each row.
     nodes: Vec<Option<u32>>,
     pub arcs: Arcs,
-    /// How far apart the nodes of each pair are, in spacings of both.
+    /// Distance between the nodes of each pair, in the spacing of both.
     lengths: Vec<f32>,
-    /// What it costs to part the nodes of each pair, 0 to 1.
+    /// Cost of separating the nodes of each pair, 0 to 1.
     pub weights: Vec<f32>,
     /// Hue and light of each node.
     pub colours: Vec<DVec3>,
-    /// How much each node counts: its opacity.
+    /// Weight of each node: its opacity.
     pub shares: Vec<f32>,
 }
 
 impl Graph {
-    /// Joins some rows, in ascending order, to their neighbours.
+    /// Connects rows, given in ascending order, with their neighbours.
     pub(super) fn new(model: &Gaussians, nearby: &Nearby, rows: Vec<usize>) -> Self {
         let mut nodes = vec![None; model.len()];
         (0..).zip(&rows).for_each(|(node, &row)| nodes[row] = Some(node));
         let near = |&row: &usize| -> Vec<(u32, f64)> {
-            let others = nearby.of(row, NEIGHBOURS).filter(|&(other, _)| other != row);
+            let others = nearby.neighbours(row, NEIGHBOUR_COUNT).filter(|&(other, _)| other != row);
             others.filter_map(|(other, distance)| nodes[other].map(|node| (node, distance))).collect()
         };
         let near: Vec<Vec<(u32, f64)>> = rows.par_iter().map(near).collect();
@@ -80,87 +80,87 @@ impl Graph {
             let unlike = square([a, b]) / mean.max(f64::MIN_POSITIVE);
             let bend = normals[a].zip(normals[b]).map_or(0.0, |(a, b)| 1.0 - a.dot(b).abs());
             let share = f64::from(self.shares[a].min(self.shares[b]));
-            let left = left_to_part(model, [self.rows[a], self.rows[b]]);
-            (share * left * (-DISTANCE * far - COLOUR * unlike - BEND * bend).exp()) as f32
+            let left = separation_left(model, [self.rows[a], self.rows[b]]);
+            (share * left * (-DISTANCE_WEIGHT * far - COLOUR_WEIGHT * unlike - BEND_WEIGHT * bend).exp()) as f32
         };
         pairs.par_iter().zip(&self.lengths).map(weigh).collect()
     }
 
-    /// Returns the length of the shortest way to each node from some, infinite without any. A step is as long as its
-    /// pair, times what the node costs at which it ends.
-    pub(super) fn ways(&self, from: &[usize], costs: &[f32]) -> Vec<f32> {
-        let mut ways = vec![f32::INFINITY; self.rows.len()];
-        from.iter().for_each(|&node| ways[node] = 0.0);
-        let mut open: BinaryHeap<Way> = from.iter().map(|&node| Way { length: 0.0, node }).collect();
-        while let Some(Way { length, node }) = open.pop() {
-            if length > ways[node] {
+    /// Returns the length of the shortest path from `from` to each node, infinite if there is none. A step is as long
+    /// as its pair, times the cost of the node where it ends.
+    pub(super) fn path_lengths(&self, from: &[usize], costs: &[f32]) -> Vec<f32> {
+        let mut path_lengths = vec![f32::INFINITY; self.rows.len()];
+        from.iter().for_each(|&node| path_lengths[node] = 0.0);
+        let mut open: BinaryHeap<OpenPath> = from.iter().map(|&node| OpenPath { length: 0.0, node }).collect();
+        while let Some(OpenPath { length, node }) = open.pop() {
+            if length > path_lengths[node] {
                 continue;
             }
-            for (_, head, pair) in self.arcs.of(node) {
+            for (_, head, pair) in self.arcs.leaving(node) {
                 let further = length + self.lengths[pair] * costs[head];
-                if further < ways[head] {
-                    ways[head] = further;
-                    open.push(Way { length: further, node: head });
+                if further < path_lengths[head] {
+                    path_lengths[head] = further;
+                    open.push(OpenPath { length: further, node: head });
                 }
             }
         }
-        ways
+        path_lengths
     }
 
-    /// Returns the node of a row, if it is one.
+    /// Returns the node of a row, if the graph has it.
     pub(super) fn node(&self, row: usize) -> Option<usize> {
         self.nodes[row].map(|node| node as usize)
     }
 }
 
-/// The open end of a way. The shortest is the greatest.
-struct Way {
+/// The open end of a path. The shortest path compares greatest.
+struct OpenPath {
     length: f32,
     node: usize,
 }
 
-impl Ord for Way {
+impl Ord for OpenPath {
     fn cmp(&self, other: &Self) -> Ordering {
         other.length.total_cmp(&self.length).then(other.node.cmp(&self.node))
     }
 }
 
-impl PartialOrd for Way {
+impl PartialOrd for OpenPath {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Way {
+impl PartialEq for OpenPath {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Way {}
+impl Eq for OpenPath {}
 
-/// Returns the share that is left of the cost to part two rows: little, if they have different labels already.
-fn left_to_part(model: &Gaussians, rows: [usize; 2]) -> f64 {
+/// Returns the remaining share of the cost of separating two rows: small if they already have different labels.
+fn separation_left(model: &Gaussians, rows: [usize; 2]) -> f64 {
     let [a, b] = rows.map(|row| model.label(row));
-    let [sure_a, sure_b] = rows.map(|row| sureness(model, row));
-    if a == b { 1.0 } else { 1.0 - OWN_LABELS * f64::from(sure_a.min(sure_b)) }
+    let [sure_a, sure_b] = rows.map(|row| label_confidence(model, row));
+    if a == b { 1.0 } else { 1.0 - LABEL_SEPARATION * f64::from(sure_a.min(sure_b)) }
 }
 
-/// Returns how sure a Gaussian is of its label, 0 in a model without labels.
-pub(super) fn sureness(model: &Gaussians, row: usize) -> f32 {
+/// Returns the label confidence of a Gaussian, 0 in a model without labels.
+pub(super) fn label_confidence(model: &Gaussians, row: usize) -> f32 {
     let known = if model.labels.is_some() { 1.0 } else { 0.0 };
     model.label_confidence.as_ref().map_or(known, |shares| known * shares[row].clamp(0.0, 1.0))
 }
 
-/// Returns the light of a colour and, at right angles to it, its hue.
+/// Returns the light of a colour and, orthogonal to it, its hue.
 fn hue_and_light(colour: [f32; 3]) -> DVec3 {
     let colour = DVec3::from_array(colour.map(f64::from));
     let grey = DVec3::splat(colour.element_sum() / 3.0);
-    colour - (1.0 - LIGHT) * grey
+    colour - (1.0 - LIGHT_SCALE) * grey
 }
 
-/// Returns the rows in which strokes find objects: all that have a place, or in a larger model the `most` that are
-/// nearest to those of `from`.
+/// Returns the rows in which strokes look for objects: all with a finite position, or in a larger model the `most` that
+/// are nearest to the rows in `from`.
 pub(super) fn rows_near(model: &Gaussians, from: &[usize], most: usize) -> Result<Vec<usize>> {
     let rows: Vec<usize> = (0..model.len()).filter(|&row| model.is_finite(row)).collect();
     if rows.len() <= most || from.is_empty() {

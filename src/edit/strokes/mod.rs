@@ -1,7 +1,7 @@
-//! Objects from strokes, on what belongs to them and on what does not: a cut of a graph of Gaussians.
+//! Finds objects from strokes on them and on their background, by cutting a graph of Gaussians.
 //!
-//! A [`StrokesFile`] has strokes over photos. The Gaussians that they hit are [`Seed`]s, from which a [`Cutting`] finds
-//! the others of each object, and [`claim`] makes them labels of a model.
+//! A [`StrokesFile`] has strokes over photos. The Gaussians that they hit are [`Seed`]s. A [`GraphCut`] finds the other
+//! Gaussians of each object, and [`claim`] turns them into labels of a model.
 
 mod claim;
 mod colours;
@@ -11,7 +11,7 @@ mod flow;
 mod graph;
 
 pub use claim::claim;
-pub use file::{Stroke, StrokesFile, place};
+pub use file::{Stroke, StrokesFile, stroke_title};
 pub use flow::{Arcs, smallest_cut};
 
 use crate::selection::Nearby;
@@ -21,7 +21,7 @@ use labelgs_scene::{Gaussians, Result, UNLABELLED};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 
-/// Most Gaussians in which objects are found, those nearest to the strokes on objects. All others belong to none.
+/// Largest number of Gaussians in the graph: those nearest to the strokes on objects. All others belong to no object.
 pub const NODES_MAX: usize = 200_000;
 
 /// A Gaussian that a stroke hits.
@@ -29,23 +29,23 @@ pub const NODES_MAX: usize = 200_000;
 pub struct Seed {
     /// Row of the model.
     pub row: usize,
-    /// Label of the stroke; 0 for what belongs to no object.
+    /// Label of the stroke; 0 for the background.
     pub label: u32,
-    /// It belongs to the label, or it does not.
+    /// Whether the Gaussian belongs to the label.
     pub is_on: bool,
 }
 
-/// What strokes say of a Gaussian.
+/// What strokes say about a Gaussian.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Mark {
     /// It has this label.
     On(u32),
-    /// It has none of these.
+    /// It has none of these labels.
     Not(BTreeSet<u32>),
 }
 
 impl Mark {
-    /// Returns true if a label would contradict.
+    /// Returns true if the mark contradicts a label.
     fn forbids(&self, label: u32) -> bool {
         match self {
             Self::On(own) => *own != label,
@@ -54,15 +54,15 @@ impl Mark {
     }
 }
 
-/// Objects that are cut from a model by strokes. What does not depend on them is kept for the next strokes.
-pub struct Cutting<M> {
+/// Cuts objects out of a model by strokes. Reuses what does not depend on the strokes when more are added.
+pub struct GraphCut<M> {
     model: M,
     nearby: Nearby,
     marks: BTreeMap<usize, Mark>,
     graph: Option<Graph>,
 }
 
-impl<M: Deref<Target = Gaussians>> Cutting<M> {
+impl<M: Deref<Target = Gaussians>> GraphCut<M> {
     /// Starts without strokes.
     ///
     /// # Errors
@@ -72,7 +72,7 @@ impl<M: Deref<Target = Gaussians>> Cutting<M> {
         Ok(Self { nearby: Nearby::new(&model)?, model, marks: BTreeMap::new(), graph: None })
     }
 
-    /// Adds what strokes hit. Later strokes correct earlier ones. Rows that the model has not are left out.
+    /// Adds the Gaussians that strokes hit. Later strokes override earlier ones. Rows outside the model are ignored.
     pub fn add(&mut self, seeds: &[Seed]) {
         for &Seed { row, label, is_on } in seeds.iter().filter(|seed| seed.row < self.model.len()) {
             let mark = match self.marks.remove(&row) {
@@ -83,7 +83,7 @@ impl<M: Deref<Target = Gaussians>> Cutting<M> {
             };
             self.marks.insert(row, mark);
         }
-        // A large model has a graph near the strokes only.
+        // The graph of a large model covers only the surroundings of the strokes.
         if self.graph.as_ref().is_some_and(|graph| self.marks.keys().any(|&row| graph.node(row).is_none())) {
             self.graph = None;
         }
@@ -96,16 +96,15 @@ impl<M: Deref<Target = Gaussians>> Cutting<M> {
         labels.filter(|&label| label != UNLABELLED).collect()
     }
 
-    /// Returns the label of each Gaussian among those of the strokes, 0 for none of them. In a large model, what is far
-    /// from all strokes keeps that of these labels which it has.
+    /// Returns the label of each Gaussian among the strokes' labels, 0 for none of them. In a large model, Gaussians
+    /// far from all strokes keep their label if it is one of the strokes' labels.
     ///
-    /// The labels are found one after the other, each against all others (alpha-expansion: Boykov, Veksler and Zabih,
-    /// PAMI 2001); with one label the cut is the best one. A piece of an object needs a stroke of its own, or the label
-    /// before.
+    /// Labels expand in turn, each against all others (alpha-expansion: Boykov, Veksler and Zabih, PAMI 2001); with one
+    /// label the cut is optimal. A separate piece of an object needs its own stroke, or must already have the label.
     ///
     /// # Errors
     ///
-    /// A bug only.
+    /// Only a bug.
     pub fn cut(&mut self) -> Result<Vec<u32>> {
         let objects = self.labels();
         let before = (0..self.model.len()).map(|row| self.model.label(row));
@@ -125,7 +124,7 @@ impl<M: Deref<Target = Gaussians>> Cutting<M> {
         Ok(found)
     }
 
-    /// Returns the rows near the strokes, and those that these hit.
+    /// Returns the rows near the strokes, and those that the strokes hit.
     fn rows(&self) -> Result<Vec<usize>> {
         let is_object = |mark: &Mark| matches!(mark, Mark::On(label) if *label != UNLABELLED);
         let hit: Vec<usize> = self.marks.iter().filter(|(_, mark)| is_object(mark)).map(|(&row, _)| row).collect();

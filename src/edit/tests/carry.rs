@@ -1,7 +1,7 @@
-//! Labels that go back to a copy from another program: sorted, thinned, rounded, merged or moved.
+//! Labels are restored to a copy from another program: sorted, thinned, rounded, merged or moved.
 
 use glam::{DMat3, DVec3};
-use labelgs_edit::{Carried, carry};
+use labelgs_edit::{CarriedLabels, carry};
 use labelgs_formats::{LabelType, WriteOptions, export_model, read_model};
 use labelgs_scene::harmonics::value_of;
 use labelgs_scene::{Error, Gaussians};
@@ -9,7 +9,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Balls on a table, labels 0 to 5; each label has its colour, each Gaussian its shade of it.
+/// Balls on a table, labels 0 to 5. Each label has a colour, and each Gaussian a shade of it.
 fn model() -> Gaussians {
     let mut random = Pcg64::seed_from_u64(7);
     let mut model = Gaussians { labels: Some(Vec::new()), label_confidence: Some(Vec::new()), ..Gaussians::default() };
@@ -39,13 +39,13 @@ fn model() -> Gaussians {
     model
 }
 
-/// What another program writes: the same rows without labels.
+/// The same rows without labels, as another program writes them.
 fn bare(model: &Gaussians) -> Gaussians {
     Gaussians { labels: None, label_confidence: None, ..model.clone() }
 }
 
-/// Share of the rows of a copy with the label of the row of the model that each comes from.
-fn right(carried: &Carried, model: &Gaussians, from: &[usize]) -> f64 {
+/// Share of a copy's rows with the label of the row of the model that each comes from.
+fn right(carried: &CarriedLabels, model: &Gaussians, from: &[usize]) -> f64 {
     let is_right = |(row, &source): (usize, &usize)| carried.model.label(row) == model.label(source);
     let count = from.iter().enumerate().filter(|&pair| is_right(pair)).count();
     count as f64 / from.len() as f64
@@ -84,7 +84,7 @@ fn of_several_at_one_place_the_most_alike_counts() {
     rows.reverse();
     let carried = carry(&bare(&model.picked(&rows)), &model).expect("carried");
     assert_eq!(carried.model.labels, model.picked(&rows).labels);
-    // All at one place, more than a leaf of the tree has.
+    // All at one position, more than a leaf of the tree holds.
     model.means.fill([1.0, 2.0, 3.0]);
     let carried = carry(&bare(&model.picked(&rows)), &model).expect("carried");
     assert_eq!(carried.model.labels, model.picked(&rows).labels);
@@ -102,7 +102,7 @@ fn formats_round_and_labels_come_back() {
         let carried = carry(&copy, &model).expect("carried");
         assert_eq!(carried.none, 0, "{name}");
         assert!(!exact || carried.near == 0, "{name}: {} are not at the same place", carried.near);
-        // Some formats sort, so a row is known by its place.
+        // Some formats sort, so positions identify the rows.
         let from: Vec<usize> = copy.means.iter().map(|mean| nearest(&model, *mean)).collect();
         let share = right(&carried, &model, &from);
         assert!(share > 0.999, "{name}: {share} have the right label");
@@ -117,7 +117,7 @@ fn nearest(model: &Gaussians, mean: [f32; 3]) -> usize {
     (0..model.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a row")
 }
 
-/// Rounding coarser than the space between balls: the colour tells which of the Gaussians around a place it was.
+/// Rounding is coarser than the space between balls, so only colours tell Gaussians around a position apart.
 #[test]
 fn coarse_steps_are_told_by_the_look() {
     let mut model = model();
@@ -136,7 +136,7 @@ fn coarse_steps_are_told_by_the_look() {
     assert!(share > 0.99 && nearest < 0.96, "{share} are right, {nearest} by the nearest place alone");
 }
 
-/// A .splat has places as floats, and one byte for each colour and opacity.
+/// A .splat stores positions as floats, and colour and opacity as bytes.
 #[test]
 fn a_splat_gets_its_labels() {
     let (model, folder) = (model(), tempfile::tempdir().expect("a folder"));
@@ -203,7 +203,7 @@ fn a_moved_copy_is_refused() {
     }
 }
 
-/// Programs drop the origin of a scene far away; others move it.
+/// Programs drop the origin of a faraway scene, or move the scene.
 #[test]
 fn the_origin_may_be_lost_or_another() {
     let far = Gaussians { origin: DVec3::new(5e5, 4e6, 100.0), ..model() };

@@ -1,4 +1,4 @@
-//! Changes of an editor, taken one by one and from a file.
+//! Edits of an editor, one by one and replayed from a file.
 
 use labelgs_edit::fill::Sight;
 use labelgs_edit::{Document, Edit, EditsFile, Rows};
@@ -32,10 +32,10 @@ fn document() -> Document {
 }
 
 fn rows(count: usize, is_in: impl Fn(usize) -> bool) -> Rows {
-    Rows::of(&(0..count).map(is_in).collect::<Vec<_>>())
+    Rows::from_mask(&(0..count).map(is_in).collect::<Vec<_>>())
 }
 
-/// One of each kind; each is possible after those before.
+/// One edit of each kind, in an order that makes each possible.
 fn edits() -> Vec<(Edit, &'static str)> {
     let first_six = rows(12, |row| row < 6);
     vec![
@@ -48,7 +48,7 @@ fn edits() -> Vec<(Edit, &'static str)> {
         (Edit::Assign { rows: rows(12, |row| row == 7), label: Some(4), name: None }, "Gave 1 Gaussian to new"),
         (
             Edit::Assign { rows: rows(12, |row| row == 0), label: Some(0), name: None },
-            "Took the label of 1 Gaussian away",
+            "Removed the label of 1 Gaussian",
         ),
         (Edit::Duplicate { rows: first_six, shift: [0.0, 100.0, 0.0], name: None }, "Duplicated 6 Gaussians"),
         (Edit::Split { label: 4 }, "Split new"),
@@ -108,10 +108,10 @@ fn a_file_of_changes_makes_the_same_model() {
     assert_eq!(file.edits, edits);
     assert_eq!(file.replay(&path, first.clone(), &mut no_sights).expect("a model"), one_by_one);
 
-    // Another model, and a change that cannot be made: the message says which.
+    // Another model, and an edit that fails: the message gives its number.
     let other = Document { model: first.model.filtered(|row| row != 3), table: None };
     let text = file.replay(&path, other, &mut no_sights).expect_err("another model").to_string();
-    assert!(text.contains("edits.json") && text.contains("another model, of 12 Gaussians"), "{text}");
+    assert!(text.contains("edits.json") && text.contains("another model, with 12 Gaussians"), "{text}");
     let mut moved = first.clone();
     moved.model.means[5][1] += 0.001;
     assert!(file.replay(&path, moved, &mut no_sights).is_err());
@@ -152,12 +152,12 @@ fn changes_that_cannot_be_made_are_refused() {
 #[test]
 fn rows_are_a_short_text() {
     let mask = [false, false, true, true, true, false, true, false];
-    let rows = Rows::of(&mask);
+    let rows = Rows::from_mask(&mask);
     let text = serde_json::to_string(&rows).expect("a text");
     assert_eq!(text, r#""2 3 1 1""#);
     assert_eq!(serde_json::from_str::<Rows>(&text).expect("rows"), rows);
     assert_eq!((rows.mask(8).expect("rows"), rows.count()), (mask.to_vec(), 4));
     assert!(serde_json::from_str::<Rows>(r#""2 x""#).is_err());
     assert!(serde_json::from_str::<Rows>(r#""4294967295 4294967295""#).expect("rows").mask(8).is_err());
-    assert_eq!(Rows::of(&[true; 3]).mask(3).expect("rows"), [true; 3]);
+    assert_eq!(Rows::from_mask(&[true; 3]).mask(3).expect("rows"), [true; 3]);
 }

@@ -1,18 +1,18 @@
-//! Choosing and editing labels, on Gaussians and label maps made by hand.
+//! Labels are chosen and edited, on synthetic Gaussians and label maps.
 
 use glam::DVec3;
 use labelgs_edit::components::components;
 use labelgs_edit::rename::{give_name, keep, renumber, split};
 use labelgs_edit::{
-    Catalogue, Cleaned, Cleaning, Grouping, Pick, Place, Prompt, Specks, Transform, choose, clean, recolour, relabel,
-    split_components, without_specks,
+    Catalogue, Cleaning, CleaningCounts, Grouping, Pick, Prompt, PromptArea, SmallParts, Transform, choose, clean,
+    recolour, relabel, split_components, without_specks,
 };
 use labelgs_files::{LabelEntry, LabelTable};
 use labelgs_scene::harmonics::SH_C0;
 use labelgs_scene::{Error, Gaussians, LabelMap};
 use std::collections::{BTreeMap, BTreeSet};
 
-const UPRIGHT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+const NO_ROTATION: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 
 /// Gaussians of given centres, standard deviations and rotations, with label 1.
 fn model(rows: &[([f32; 3], [f32; 3], [f32; 4])]) -> Gaussians {
@@ -32,9 +32,10 @@ fn model(rows: &[([f32; 3], [f32; 3], [f32; 4])]) -> Gaussians {
     }
 }
 
-/// Round Gaussians of standard deviation 0.3 along x. Each reaches 0.6, so two touch at a distance up to 1.2.
+/// Round Gaussians of standard deviation 0.3 along x. Each ellipsoid has radius 0.6, so two touch up to a distance of
+/// 1.2.
 fn beads(places: &[f32]) -> Gaussians {
-    model(&places.iter().map(|&x| ([x, 0.0, 0.0], [0.3; 3], UPRIGHT)).collect::<Vec<_>>())
+    model(&places.iter().map(|&x| ([x, 0.0, 0.0], [0.3; 3], NO_ROTATION)).collect::<Vec<_>>())
 }
 
 /// The parts of all rows, without a bound on their size.
@@ -59,27 +60,27 @@ fn contact_depends_on_shape_and_rotation() {
     let turned = [0.5_f32.sqrt(), 0.0, 0.0, 0.5_f32.sqrt()];
     let pair = |between: [f32; 3], quat| parts(&model(&[([0.0; 3], rod, quat), (between, rod, quat)]), 0.0).len();
     // End to end the rods reach 2 + 2, side by side 0.1 + 0.1.
-    assert_eq!([pair([3.9, 0.0, 0.0], UPRIGHT), pair([4.1, 0.0, 0.0], UPRIGHT)], [1, 2]);
-    assert_eq!([pair([0.0, 0.19, 0.0], UPRIGHT), pair([0.0, 0.21, 0.0], UPRIGHT)], [1, 2]);
+    assert_eq!([pair([3.9, 0.0, 0.0], NO_ROTATION), pair([4.1, 0.0, 0.0], NO_ROTATION)], [1, 2]);
+    assert_eq!([pair([0.0, 0.19, 0.0], NO_ROTATION), pair([0.0, 0.21, 0.0], NO_ROTATION)], [1, 2]);
     assert_eq!([pair([0.0, 3.9, 0.0], turned), pair([3.9, 0.0, 0.0], turned)], [1, 2]);
     // A second rod across the first; its tip just touches the first one's side, or just misses it.
-    let across = |y: f32| parts(&model(&[([0.0; 3], rod, UPRIGHT), ([0.0, y, 0.0], rod, turned)]), 0.0).len();
+    let across = |y: f32| parts(&model(&[([0.0; 3], rod, NO_ROTATION), ([0.0, y, 0.0], rod, turned)]), 0.0).len();
     assert_eq!([across(2.09), across(2.11)], [1, 2]);
 }
 
 #[test]
 fn a_small_part_between_large_ones_joins_them() {
-    let rows = [([0.0; 3], [1.0; 3], UPRIGHT), ([4.2, 0.0, 0.0], [1.0; 3], UPRIGHT)];
+    let rows = [([0.0; 3], [1.0; 3], NO_ROTATION), ([4.2, 0.0, 0.0], [1.0; 3], NO_ROTATION)];
     assert_eq!(parts(&model(&rows), 0.0).len(), 2);
-    let bridge = ([2.1, 0.0, 0.0], [0.06; 3], UPRIGHT);
+    let bridge = ([2.1, 0.0, 0.0], [0.06; 3], NO_ROTATION);
     assert_eq!(parts(&model(&[rows[0], bridge, rows[1]]), 0.0).len(), 1);
 }
 
 #[test]
 fn many_gaussians_at_one_place_or_in_one_plane_are_grouped() {
-    let plane = |index: usize| ([0.0, (index % 20) as f32 * 0.5, (index / 20) as f32 * 0.5], [0.15; 3], UPRIGHT);
+    let plane = |index: usize| ([0.0, (index % 20) as f32 * 0.5, (index / 20) as f32 * 0.5], [0.15; 3], NO_ROTATION);
     let mut rows: Vec<_> = (0..400).map(plane).collect();
-    rows.extend(vec![([9.0; 3], [1e-4; 3], UPRIGHT); 300]);
+    rows.extend(vec![([9.0; 3], [1e-4; 3], NO_ROTATION); 300]);
     let found = parts(&model(&rows), 0.0);
     assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [400, 300]);
 }
@@ -96,18 +97,18 @@ fn parts_of_a_label_get_the_next_free_ids() {
     let how = Grouping { gap: 0.0, min_share: 0.2 };
     let ones = BTreeSet::from([1]);
     let run = |specks| split_components(&scattered(), &ones, &BTreeSet::from([10]), how, specks).expect("split");
-    let kept = run(Specks::Keep);
+    let kept = run(SmallParts::Keep);
     assert_eq!(kept.model.labels, Some(vec![1, 1, 1, 1, 11, 11, 11, 1, 2, 9]), "10 is taken by the table");
     assert_eq!((kept.ids, kept.specks), (BTreeMap::from([(1, vec![1, 11])]), 1));
-    assert_eq!(run(Specks::Unlabel).model.labels, Some(vec![1, 1, 1, 1, 11, 11, 11, 0, 2, 9]));
-    let dropped = run(Specks::Drop).model;
+    assert_eq!(run(SmallParts::Unlabel).model.labels, Some(vec![1, 1, 1, 1, 11, 11, 11, 0, 2, 9]));
+    let dropped = run(SmallParts::Drop).model;
     assert_eq!(dropped.labels, Some(vec![1, 1, 1, 1, 11, 11, 11, 2, 9]));
     assert_eq!(dropped.means[7], [30.0, 0.0, 0.0]);
-    // No id is free above the largest, so gaps are filled.
-    let full = split_components(&scattered(), &ones, &BTreeSet::from([65_535]), how, Specks::Keep).expect("split");
+    // No id is free above the largest, so gaps are used.
+    let full = split_components(&scattered(), &ones, &BTreeSet::from([65_535]), how, SmallParts::Keep).expect("split");
     assert_eq!(full.ids[&1], [1, 3]);
     let all: BTreeSet<u32> = (1..=65_535).collect();
-    let message = split_components(&scattered(), &ones, &all, how, Specks::Keep).expect_err("no id").to_string();
+    let message = split_components(&scattered(), &ones, &all, how, SmallParts::Keep).expect_err("no id").to_string();
     assert!(message.contains("no id is free"), "{message}");
 }
 
@@ -217,8 +218,8 @@ fn map() -> LabelMap {
     LabelMap { width: 4, height: 2, ids: vec![1, 1, 3, 0, 1, 1, 3, 3] }
 }
 
-fn ask(start: &[u32], prompts: &[(Place, bool)]) -> labelgs_scene::Result<Vec<u32>> {
-    let prompt = |(place, away): &(Place, bool)| Prompt {
+fn ask(start: &[u32], prompts: &[(PromptArea, bool)]) -> labelgs_scene::Result<Vec<u32>> {
+    let prompt = |(place, away): &(PromptArea, bool)| Prompt {
         argument: if *away { "--not-at" } else { "--at" },
         view: "v".into(),
         size: None,
@@ -232,9 +233,9 @@ fn ask(start: &[u32], prompts: &[(Place, bool)]) -> labelgs_scene::Result<Vec<u3
 
 #[test]
 fn points_and_boxes_mean_labels() {
-    let point = |x, y| (Place::Point(x, y), false);
-    let not = |x, y| (Place::Point(x, y), true);
-    let boxed = |corners| (Place::Box(corners), false);
+    let point = |x, y| (PromptArea::Point(x, y), false);
+    let not = |x, y| (PromptArea::Point(x, y), true);
+    let boxed = |corners| (PromptArea::Box(corners), false);
     assert_eq!(ask(&[], &[point(2, 0)]).expect("chosen"), [3]);
     assert_eq!(ask(&[], &[point(2, 0), point(0, 1)]).expect("chosen"), [1, 3]);
     assert_eq!(ask(&[1], &[point(3, 1), not(0, 0)]).expect("chosen"), [3], "what is taken away stays away");
@@ -246,12 +247,12 @@ fn points_and_boxes_mean_labels() {
     let message = |prompts: &[_]| ask(&[], prompts).expect_err("refused").to_string();
     let nothing = message(&[point(3, 0)]);
     assert_eq!(nothing, "--at: no label is at 3,0; the view shows 1 cup (4 px), 3 (3 px)");
-    assert!(message(&[point(4, 0)]).contains("outside of the view, which has 4 x 2 px"));
+    assert!(message(&[point(4, 0)]).contains("outside the view, which has 4 x 2 px"));
     assert!(message(&[boxed([4, 0, 6, 2])]).contains("outside"));
     let half = message(&[boxed([0, 0, 1, 2])]);
     assert!(half.contains("1 cup (2 of its 4 pixels are inside)"), "{half}");
     let lost = message(&[point(0, 0), not(1, 1)]);
-    assert!(lost.starts_with("not_at: leaves no label: it takes 1 cup; the model has 1 cup"), "{lost}");
+    assert!(lost.starts_with("not_at: leaves no label: it removes 1 cup; the model has 1 cup"), "{lost}");
 }
 
 #[test]
@@ -268,7 +269,7 @@ fn models_are_set_upright_moved_and_scaled() {
     assert!((after.scales[0][0] - 0.6_f32.ln()).abs() < 1e-6);
     assert_eq!(Transform::default().apply(&before).expect("the same"), before);
     assert!(Transform { scale: 0.0, ..Transform::default() }.apply(&before).is_err());
-    // A scene that comes from far away keeps its digits.
+    // A faraway scene keeps its precision.
     let far = Gaussians { origin: DVec3::new(4e5, 5e6, 64.0), ..before.clone() };
     let back = Transform { origin: far.origin, ..Transform::default() }.apply(&far).expect("moved");
     assert_eq!(back, before);
@@ -289,14 +290,14 @@ fn cleaning_drops_by_opacity_size_box_and_loneliness() {
         rows.map(|row| places[row]).collect::<Vec<_>>()
     };
     let nothing = Cleaning::default();
-    assert_eq!(kept(nothing), (without(&[]), Cleaned::default()));
+    assert_eq!(kept(nothing), (without(&[]), CleaningCounts::default()));
     let how = Cleaning { min_opacity: Some(0.01), ..nothing };
-    assert_eq!(kept(how), (without(&[3]), Cleaned { faint: 1, ..Cleaned::default() }));
+    assert_eq!(kept(how), (without(&[3]), CleaningCounts { faint: 1, ..CleaningCounts::default() }));
     let how = Cleaning { max_size: Some(8.9), ..nothing };
-    assert_eq!(kept(how), (without(&[5]), Cleaned { huge: 1, ..Cleaned::default() }));
+    assert_eq!(kept(how), (without(&[5]), CleaningCounts { huge: 1, ..CleaningCounts::default() }));
     let how = Cleaning { max_gap: Some(10.0), ..nothing };
-    assert_eq!(kept(how), (without(&[20]), Cleaned { lonely: 1, ..Cleaned::default() }));
+    assert_eq!(kept(how), (without(&[20]), CleaningCounts { lonely: 1, ..CleaningCounts::default() }));
     let inside = Some([DVec3::new(0.05, -1.0, -1.0), DVec3::new(2.0, 1.0, 1.0)]);
     let all = Cleaning { min_opacity: Some(0.01), max_size: Some(8.9), max_gap: Some(10.0), inside };
-    assert_eq!(kept(all), (without(&[0, 3, 5, 20]), Cleaned { faint: 1, huge: 1, outside: 2, lonely: 0 }));
+    assert_eq!(kept(all), (without(&[0, 3, 5, 20]), CleaningCounts { faint: 1, huge: 1, outside: 2, lonely: 0 }));
 }

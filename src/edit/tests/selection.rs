@@ -1,20 +1,20 @@
-//! Gaussians chosen by hand.
+//! Gaussians are selected by hand.
 
 use glam::{DMat3, DVec3};
 use labelgs_edit::selection::{Combine, Nearby, Region, Shape, Side, beyond, in_region, in_sphere};
 use labelgs_scene::{Camera, Gaussians};
 
-/// Gaussians on a side of the grid.
-const SIDE: usize = 21;
+/// Gaussians along a side of the grid.
+const GRID_SIDE: usize = 21;
 
-/// Two flat sheets of a grid, one at z = 2 and one at z = 4, from -1 to 1 in x and y. The left half of each is red, the
-/// right one green.
+/// Two flat square grids, one at z = 2 and one at z = 4, from -1 to 1 in x and y. The left half of each is red, the
+/// right half green.
 fn sheets() -> Gaussians {
     let place = |row: usize| {
-        let (sheet, at) = (row / (SIDE * SIDE), row % (SIDE * SIDE));
-        [(at % SIDE) as f32 * 0.1 - 1.0, (at / SIDE) as f32 * 0.1 - 1.0, 2.0 + 2.0 * sheet as f32]
+        let (sheet, at) = (row / (GRID_SIDE * GRID_SIDE), row % (GRID_SIDE * GRID_SIDE));
+        [(at % GRID_SIDE) as f32 * 0.1 - 1.0, (at / GRID_SIDE) as f32 * 0.1 - 1.0, 2.0 + 2.0 * sheet as f32]
     };
-    let count = 2 * SIDE * SIDE;
+    let count = 2 * GRID_SIDE * GRID_SIDE;
     Gaussians {
         means: (0..count).map(place).collect(),
         quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
@@ -25,7 +25,7 @@ fn sheets() -> Gaussians {
     }
 }
 
-/// A camera at the origin that looks along z; a unit is 50 px at z = 2.
+/// A camera at the origin that looks along z; one unit is 50 px at z = 2.
 fn camera() -> Camera {
     let camera = Camera::at_origin([100.0, 100.0, 100.0, 75.0], (200, 150));
     assert_eq!((camera.rotation, camera.translation), (DMat3::IDENTITY, DVec3::ZERO));
@@ -44,7 +44,7 @@ fn what_is_drawn_over_a_picture_is_chosen() {
         points: vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
         radius: 0.0,
     };
-    // The front sheet is what is seen.
+    // Only the front sheet is visible.
     let depth = vec![2.0_f32; 200 * 150];
     let square = box_of(100.0, 75.0, 127.0, 102.0);
     let seen = places(&model, &in_region(&model, &camera, &square, Some(&depth)));
@@ -53,7 +53,7 @@ fn what_is_drawn_over_a_picture_is_chosen() {
     let through = places(&model, &in_region(&model, &camera, &square, None));
     assert_eq!(through.iter().filter(|at| at.z == 4.0).count(), 121, "0 to 1 at twice the depth");
     assert_eq!(through.len(), 36 + 121);
-    // Where nothing is seen, nothing hides.
+    // Where no surface was drawn, nothing is hidden.
     assert_eq!(
         in_region(&model, &camera, &square, Some(&vec![0.0; 200 * 150])),
         in_region(&model, &camera, &square, None)
@@ -86,7 +86,7 @@ fn places_and_depths_are_chosen() {
     assert_eq!(ball.len(), 9);
     for (side, z) in [(Side::Front, 2.0), (Side::Behind, 4.0)] {
         let found = places(&model, &beyond(&model, &camera, 3.0, side));
-        assert!(found.len() == SIDE * SIDE && found.iter().all(|at| at.z == z), "{side:?}");
+        assert!(found.len() == GRID_SIDE * GRID_SIDE && found.iter().all(|at| at.z == z), "{side:?}");
     }
 }
 
@@ -95,20 +95,20 @@ fn a_flood_stays_on_its_colour_and_its_sheet() {
     let mut model = sheets();
     let nearby = Nearby::new(&model).expect("a tree");
     let free = vec![true; model.len()];
-    let first = 10 * SIDE + 15;
+    let first = 10 * GRID_SIDE + 15;
     let found = places(&model, &nearby.flood(&model, first, 0.2, &free));
     assert!(found.iter().all(|at| at.z == 2.0 && at.x > -0.01), "{found:?}");
-    assert_eq!(found.len(), 11 * SIDE);
-    assert_eq!(places(&model, &nearby.flood(&model, first, 1.0, &free)).len(), SIDE * SIDE, "any colour");
-    // Two locked columns stop it, and so does a sheet that stands upright.
+    assert_eq!(found.len(), 11 * GRID_SIDE);
+    assert_eq!(places(&model, &nearby.flood(&model, first, 1.0, &free)).len(), GRID_SIDE * GRID_SIDE, "any colour");
+    // Two locked columns stop the flood, and so does an upright sheet.
     let unlocked: Vec<bool> = (0..model.len()).map(|row| (model.means[row][0] - 0.55).abs() > 0.06).collect();
-    assert_eq!(places(&model, &nearby.flood(&model, 10 * SIDE + 12, 0.2, &unlocked)).len(), 5 * SIDE);
+    assert_eq!(places(&model, &nearby.flood(&model, 10 * GRID_SIDE + 12, 0.2, &unlocked)).len(), 5 * GRID_SIDE);
     for row in 0..model.len() {
         if model.means[row][0] > 0.45 {
             model.scales[row] = [-6.0, -2.8, -2.8];
         }
     }
-    assert_eq!(places(&model, &nearby.flood(&model, 10 * SIDE + 12, 0.2, &free)).len(), 5 * SIDE);
+    assert_eq!(places(&model, &nearby.flood(&model, 10 * GRID_SIDE + 12, 0.2, &free)).len(), 5 * GRID_SIDE);
 }
 
 #[test]

@@ -1,6 +1,6 @@
-//! Objects cut from a model by strokes.
+//! Objects are cut from a model by strokes.
 
-use labelgs_edit::strokes::{Arcs, Cutting, Seed, Stroke, StrokesFile, claim, smallest_cut};
+use labelgs_edit::strokes::{Arcs, GraphCut, Seed, Stroke, StrokesFile, claim, smallest_cut};
 use labelgs_files::label_table::LabelTable;
 use labelgs_scene::Gaussians;
 use labelgs_scene::harmonics::sh0_of;
@@ -9,7 +9,7 @@ use rand_pcg::Pcg64Mcg;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What a cut costs.
+/// The cost of a cut.
 fn cost(pairs: &[[u32; 2]], rooms: &[[i32; 2]], surplus: &[i64], is_source: impl Fn(usize) -> bool) -> i64 {
     let nodes: i64 = surplus
         .iter()
@@ -32,13 +32,13 @@ fn a_cut_is_the_smallest_of_all() {
         let nodes = random.random_range(1..=11_usize);
         let all = (0..nodes as u32).flat_map(|b| (0..b).map(move |a| [a, b]));
         let pairs: Vec<[u32; 2]> = all.filter(|_| random.random_range(0..3) > 0).collect();
-        // Few values, so that many ways are full at once.
+        // Few values, so that many paths are full at once.
         let rooms: Vec<[i32; 2]> = pairs.iter().map(|_| [0, 0].map(|_: i32| random.random_range(0..=4))).collect();
         let surplus: Vec<i64> = (0..nodes).map(|_| random.random_range(-6..=6)).collect();
         let arcs = Arcs::new(nodes, pairs.iter().copied());
         let mut room = vec![0; arcs.len()];
         for node in 0..nodes {
-            for (arc, head, pair) in arcs.of(node) {
+            for (arc, head, pair) in arcs.leaving(node) {
                 room[arc] = rooms[pair][usize::from(node > head)];
             }
         }
@@ -53,12 +53,12 @@ fn a_cut_is_the_smallest_of_all() {
     }
 }
 
-/// Gaussians on a side of a sheet.
-const SIDE: usize = 24;
-const RED: [f64; 3] = [0.7, 0.2, 0.15];
-const GREY: [f64; 3] = [0.5, 0.5, 0.48];
+/// Gaussians along a side of a sheet.
+const SHEET_SIDE: usize = 24;
+const RED_RGB: [f64; 3] = [0.7, 0.2, 0.15];
+const GREY_RGB: [f64; 3] = [0.5, 0.5, 0.48];
 
-/// A grey floor with noise in its colours, and on it two upright red sheets far from each other.
+/// A grey floor with noise in its colours, and on it two upright red sheets far apart.
 fn room() -> Gaussians {
     let mut random = Pcg64Mcg::seed_from_u64(3);
     let mut model = Gaussians::default();
@@ -70,23 +70,23 @@ fn room() -> Gaussians {
         model.sh0.push(colour.map(|value| sh0_of(value + random.random_range(-0.04..0.04))));
     };
     let at = |index: usize| index as f64 * 0.1;
-    for (x, z) in (0..3 * SIDE).flat_map(|x| (0..SIDE).map(move |z| (x, z))) {
-        put([at(x), 0.0, at(z)], [-3.0, -6.0, -3.0], GREY);
+    for (x, z) in (0..3 * SHEET_SIDE).flat_map(|x| (0..SHEET_SIDE).map(move |z| (x, z))) {
+        put([at(x), 0.0, at(z)], [-3.0, -6.0, -3.0], GREY_RGB);
     }
     for (sheet, y, z) in (0..2).flat_map(|sheet| (1..9).flat_map(move |y| (6..16).map(move |z| (sheet, y, z)))) {
-        put([0.5 + 5.0 * f64::from(sheet), at(y), at(z)], [-6.0, -3.0, -3.0], RED);
+        put([0.5 + 5.0 * f64::from(sheet), at(y), at(z)], [-6.0, -3.0, -3.0], RED_RGB);
     }
     model
 }
 
 /// Row of a Gaussian of the floor.
 fn floor(x: usize, z: usize) -> usize {
-    x * SIDE + z
+    x * SHEET_SIDE + z
 }
 
 /// Row of a Gaussian of a red sheet.
 fn upright(sheet: usize, y: usize, z: usize) -> usize {
-    3 * SIDE * SIDE + sheet * 80 + (y - 1) * 10 + z - 6
+    3 * SHEET_SIDE * SHEET_SIDE + sheet * 80 + (y - 1) * 10 + z - 6
 }
 
 fn seed(row: usize, label: u32) -> Seed {
@@ -100,7 +100,7 @@ fn rows_of(labels: &[u32], label: u32) -> Vec<usize> {
 #[test]
 fn strokes_make_objects_of_what_is_near_and_alike() {
     let model = room();
-    let mut cutting = Cutting::new(&model).expect("a tree");
+    let mut cutting = GraphCut::new(&model).expect("a tree");
     assert!(cutting.cut().expect("nothing to cut").iter().all(|&label| label == 0));
     let stroke: Vec<Seed> = (8..14).map(|z| seed(upright(0, 4, z), 1)).collect();
     let ground: Vec<Seed> = (20..50).map(|x| seed(floor(x, 20), 0)).collect();
@@ -113,54 +113,54 @@ fn strokes_make_objects_of_what_is_near_and_alike() {
 
     let mut known = model.clone();
     known.labels = Some((0..model.len()).map(|row| u32::from(row >= upright(1, 1, 6))).collect());
-    let mut again = Cutting::new(&known).expect("a tree");
+    let mut again = GraphCut::new(&known).expect("a tree");
     again.add(&stroke);
     again.add(&ground);
     let two = again.cut().expect("a cut");
     assert_eq!(rows_of(&two, 1), [sheet(0), sheet(1)].concat(), "a piece that has the label already");
 
-    // The other sheet as an object of its own.
+    // The other sheet as a separate object.
     cutting.add(&(8..14).map(|z| seed(upright(1, 4, z), 7)).collect::<Vec<_>>());
     assert_eq!(cutting.labels(), BTreeSet::from([1, 7]));
     let both = cutting.cut().expect("a cut");
     assert_eq!((rows_of(&both, 1), rows_of(&both, 7)), (sheet(0), sheet(1)));
 
-    // What is not of it: strokes bind, whatever the colours say.
+    // Strokes override colours.
     let off = Seed { row: upright(0, 8, 10), label: 1, is_on: false };
     cutting.add(&[off]);
     assert_ne!(cutting.cut().expect("a cut")[off.row], 1);
     cutting.add(&[Seed { is_on: true, ..off }]);
     assert_eq!(cutting.cut().expect("a cut")[off.row], 1, "the later stroke counts");
-    // Another object may have what is not of this one, and its stroke says so already.
+    // Another object may own what a stroke excluded from this one; here its own stroke says so.
     cutting.add(&[seed(off.row, 7), off]);
     assert_eq!(cutting.cut().expect("a cut")[off.row], 7);
-    // Two objects may be ruled out.
+    // Two objects may be excluded.
     cutting.add(&[Seed { label: 7, is_on: false, ..off }, off]);
     assert_eq!(cutting.cut().expect("a cut")[off.row], 0);
 }
 
 #[test]
 fn strokes_follow_labels_that_are_there() {
-    // A sheet of one colour, of which votes know the left half.
+    // A sheet of one colour whose left half has a label from votes.
     let mut model = Gaussians::default();
     let mut random = Pcg64Mcg::seed_from_u64(5);
-    for (x, z) in (0..SIDE).flat_map(|x| (0..SIDE).map(move |z| (x, z))) {
+    for (x, z) in (0..SHEET_SIDE).flat_map(|x| (0..SHEET_SIDE).map(move |z| (x, z))) {
         model.means.push([x as f32 * 0.1, 0.0, z as f32 * 0.1]);
         model.scales.push([-3.0, -6.0, -3.0]);
         model.quats.push([1.0, 0.0, 0.0, 0.0]);
         model.opacities.push(4.0);
-        model.sh0.push(GREY.map(|value| sh0_of(value + random.random_range(-0.02..0.02))));
+        model.sh0.push(GREY_RGB.map(|value| sh0_of(value + random.random_range(-0.02..0.02))));
     }
-    let is_left = |row: usize| row < SIDE * SIDE / 2;
+    let is_left = |row: usize| row < SHEET_SIDE * SHEET_SIDE / 2;
     model.labels = Some((0..model.len()).map(|row| if is_left(row) { 3 } else { 0 }).collect());
     model.label_confidence = Some(vec![0.95; model.len()]);
-    let mut cutting = Cutting::new(&model).expect("a tree");
+    let mut cutting = GraphCut::new(&model).expect("a tree");
     cutting.add(&[seed(floor(4, 12), 3), seed(floor(20, 12), 0)]);
     let found = cutting.cut().expect("a cut");
     let wrong = (0..model.len()).filter(|&row| (found[row] == 3) != is_left(row)).count();
     assert_eq!(wrong, 0, "the border of the votes is kept");
 
-    // Rows of the label that strokes give to nobody lose it; those of other labels keep theirs.
+    // Rows lose the strokes' labels if no object claims them; other labels stay.
     let mut other = model.clone();
     let labels = other.labels.as_mut().expect("labels");
     (labels[0], labels[1]) = (9, 3);
@@ -222,7 +222,7 @@ fn files_of_strokes_are_read_and_refused() {
 
     let stroke = |part: &str| on.replace(r#""radius": 3"#, part);
     for (text, expected) in [
-        (on.to_owned(), "no stroke is on what belongs to no object"),
+        (on.to_owned(), "no stroke is on the background"),
         (off.to_owned(), "no stroke is on an object"),
         (format!("{on}, {}", off.replace("[[1, 2]]", "[]")), "stroke 2: has 0 points"),
         (format!("{off}, {}", stroke(r#""radius": 1e9"#)), "stroke 2: has a radius of 1000000000"),

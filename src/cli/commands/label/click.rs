@@ -5,7 +5,7 @@ use crate::cli::support::parsers::{At, BoxAt, at, box_at};
 use crate::cli::support::scene::{find_view, open_photos};
 use crate::cli::support::{Context, near_plane, open_gpu, open_model};
 use crate::edit::add::add;
-use crate::edit::merge::Merged;
+use crate::edit::merge::MergedLabels;
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
 use crate::label::click::{Area, Click, Hints, ObjectFinder, Photos, Progress};
@@ -62,7 +62,7 @@ pub(super) fn run(args: &LabelArgs, scene: &Path, context: &Context) -> Result<(
     })?;
     drop(stage);
     let table = LabelTable::find_for_model(&args.model).map(|path| LabelTable::read(&path)).transpose()?;
-    let Merged { model, table, into: label } = add(&model, table, &rows, args.clicks.name.as_deref())?;
+    let MergedLabels { model, table, into: label } = add(&model, table, &rows, args.clicks.name.as_deref())?;
     export_model(&args.output, &model, table.as_ref(), args.write.options(&args.model, &args.output)?)?;
     let count = rows.iter().filter(|is_in| **is_in).count();
     let (output, seconds) = (args.output.display().to_string(), start.elapsed().as_secs_f64());

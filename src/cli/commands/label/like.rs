@@ -4,7 +4,7 @@ use super::LabelArgs;
 use crate::Result;
 use crate::cli::support::model_edit::open;
 use crate::cli::support::{Context, TableArg, open_model, require_labels};
-use crate::edit::carry::{Carried, carry};
+use crate::edit::carry::{CarriedLabels, carry};
 use crate::edit::rename::keep;
 use crate::edit::select::summarise;
 use crate::formats::export_model;
@@ -17,7 +17,7 @@ use std::path::Path;
 pub(super) fn run(args: &LabelArgs, labelled: &Path, context: &Context) -> Result<()> {
     let (source, known) = open(labelled, &TableArg::default())?;
     require_labels(labelled, source.labels.is_some())?;
-    let Carried { model, same, near, none } = carry(&open_model(&args.model)?, &source)?;
+    let CarriedLabels { model, same, near, none } = carry(&open_model(&args.model)?, &source)?;
     let rows = summarise(&model);
     let there: BTreeSet<u32> = rows.iter().map(|row| row.label).collect();
     let table = known.table.as_ref().map(|table| keep(table, |id| there.contains(&id)));

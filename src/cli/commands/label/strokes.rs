@@ -4,7 +4,7 @@ use super::LabelArgs;
 use crate::cli::support::scene::find_view;
 use crate::cli::support::{Context, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::edit::select::summarise;
-use crate::edit::strokes::{Cutting, Stroke, StrokesFile, claim, place};
+use crate::edit::strokes::{GraphCut, Stroke, StrokesFile, claim, stroke_title};
 use crate::files::label_table::LabelTable;
 use crate::formats::export_model;
 use crate::label::strokes::seeds;
@@ -22,7 +22,7 @@ pub(super) fn run(args: &LabelArgs, (scene, path): (&Path, &Path), context: &Con
     let (model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
     let dataset = open_scene(scene, &args.reading, None, [0.0; 3], false)?;
     let views = (1..).zip(&file.strokes).map(|(number, stroke)| match find_view(&dataset, &stroke.view) {
-        Err(Error::Usage { problem, .. }) => Err(Error::data(path, place(number), problem)),
+        Err(Error::Usage { problem, .. }) => Err(Error::data(path, stroke_title(number), problem)),
         view => Ok((stroke, view?)),
     });
     let strokes: Vec<(&Stroke, &View)> = views.collect::<Result<_>>()?;
@@ -30,7 +30,7 @@ pub(super) fn run(args: &LabelArgs, (scene, path): (&Path, &Path), context: &Con
     let start = Instant::now();
     let hit = seeds(open_gpu(context)?, &model, &strokes, near, path)?;
     let stage = Stage::new("cutting objects", 0);
-    let mut cutting = Cutting::new(&model)?;
+    let mut cutting = GraphCut::new(&model)?;
     cutting.add(&hit);
     let (found, labels) = (cutting.cut()?, cutting.labels());
     drop(stage);
