@@ -80,7 +80,7 @@ impl CoarseModel {
 }
 
 fn exposures(folder: &Path) -> Result<BTreeMap<String, ColourMatrix>> {
-    let path: PathBuf = folder.join(run_folder::EXPOSURES);
+    let path: PathBuf = folder.join(run_folder::EXPOSURES_FILE);
     if !path.is_file() {
         return Ok(BTreeMap::new());
     }

@@ -117,10 +117,10 @@ fn devices(trained: &[&TrainedBlock]) -> Vec<String> {
 
 /// Merges the label tables. A name with two ids, or an id with two names, is a problem.
 fn names(blocks: &Path, trained: &[&TrainedBlock], problems: &mut Vec<String>) -> Result<Option<LabelTable>> {
-    let coarse = LabelTable::of_folder(blocks)?;
+    let coarse = LabelTable::read_in_folder(blocks)?;
     let mut of_id = BTreeMap::new();
     let mut of_name: BTreeMap<String, u32> = BTreeMap::new();
-    let from = |folder: &Path| folder.join(label_table::FILE).display().to_string();
+    let from = |folder: &Path| folder.join(label_table::FILE_NAME).display().to_string();
     let tables = trained.iter().filter_map(|trained| Some((from(&trained.folder), trained.names.as_ref()?)));
     for (path, table) in tables.chain(coarse.as_ref().map(|table| (from(blocks), table))) {
         for entry in &table.labels {
@@ -217,11 +217,11 @@ fn joint(like: Option<Gaussians>, part: &Gaussians) -> Gaussians {
 /// Writes settings, label names and blocks next to the model, where other commands expect them.
 fn write_records(file: &BlocksFile, parts: &[MergePart], names: Option<&LabelTable>, out: &Path) -> Result<()> {
     if let Some(first) = parts.iter().find_map(MergePart::trained) {
-        let from = first.folder.join(run_folder::CONFIG);
+        let from = first.folder.join(run_folder::CONFIG_FILE);
         let text = crate::files::read::text(&from)?;
-        atomic::write(out.join(run_folder::CONFIG), |to| to.write_all(text.as_bytes()))?;
+        atomic::write(out.join(run_folder::CONFIG_FILE), |to| to.write_all(text.as_bytes()))?;
     }
-    LabelTable::put(names, &out.join(label_table::FILE))?;
+    LabelTable::write_or_remove(names, &out.join(label_table::FILE_NAME))?;
     let text = file.text()?;
     atomic::write(out.join(block_file::BLOCKS_FILE), |to| to.write_all(&text))
 }

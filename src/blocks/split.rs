@@ -51,7 +51,7 @@ pub fn split(plan: &Plan, out: &Path) -> Result<()> {
         plan.file(index, block, crc).write(&folder)?;
     }
     write_model(out.join(REST_MODEL_FILE), &rest)?;
-    LabelTable::put(plan.coarse.names.as_ref(), &out.join(crate::files::label_table::FILE))?;
+    LabelTable::write_or_remove(plan.coarse.names.as_ref(), &out.join(crate::files::label_table::FILE_NAME))?;
     atomic::write(out.join(BLOCKS_FILE), |to| to.write_all(&text))
 }
 

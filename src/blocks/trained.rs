@@ -68,7 +68,7 @@ impl TrainedBlock {
             let text = "was trained for another block or split; train it again in an empty folder";
             return Err(problem(text.to_owned(), false));
         }
-        let (metrics, config) = (folder.join(summary::METRICS_FILE), folder.join(run_folder::CONFIG));
+        let (metrics, config) = (folder.join(summary::METRICS_FILE), folder.join(run_folder::CONFIG_FILE));
         if !metrics.is_file() || !config.is_file() {
             return Err(missing("the run is not finished"));
         }
@@ -91,7 +91,7 @@ impl TrainedBlock {
             model,
             steps,
             device: last.device,
-            names: LabelTable::of_folder(folder).map_err(odd)?,
+            names: LabelTable::read_in_folder(folder).map_err(odd)?,
             // Compare the version only: each part may come from another commit.
             labelgs: last.labelgs.split(' ').next().unwrap_or_default().to_owned(),
             settings,

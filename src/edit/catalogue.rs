@@ -48,7 +48,7 @@ impl Catalogue {
                     ids.extend((*first..=*last).take(self.gaussians.len() + LISTED_MAX + 1));
                 }
                 Pick::Name(name) => {
-                    let found = self.table.as_ref().and_then(|table| table.by_name(name));
+                    let found = self.table.as_ref().and_then(|table| table.id_of(name));
                     ids.insert(found.ok_or_else(|| Error::usage(argument, self.unknown_name(name)))?);
                 }
             }

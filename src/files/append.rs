@@ -1,23 +1,23 @@
-//! A file of lines that grows during a run. Unlike all other outputs it is not renamed at its end: a kill may leave an
+//! A file of lines that grows during a run. Unlike all other outputs, it is written in place: a kill may leave an
 //! incomplete last line, which readers drop.
 
-use super::atomic::Fallible;
+use super::atomic::FaultyFile;
 use labelgs_scene::lab::fault;
 use labelgs_scene::{Error, Result};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// The open file. Its writes end with whole lines, or leave it as it was.
+/// The open file. A failed write leaves the file as it was.
 #[derive(Debug)]
-pub struct Lines {
+pub struct LineFile {
     path: PathBuf,
     file: File,
     bytes: u64,
 }
 
-impl Lines {
-    /// Opens or makes a file and keeps its first `bytes`.
+impl LineFile {
+    /// Opens or creates a file and keeps its first `bytes`.
     pub fn open(path: &Path, bytes: u64) -> Result<Self> {
         let open = || {
             fault::of_file("write")?;
@@ -36,12 +36,12 @@ impl Lines {
         Ok(())
     }
 
-    /// Adds a line with one write, so that other programs see it at once.
+    /// Appends a line in a single write, so that other programs see it at once.
     pub fn add(&mut self, line: &str) -> Result<()> {
         let text = format!("{line}\n");
-        let written = self.at_end().and_then(|()| Fallible(&self.file).write_all(text.as_bytes()));
+        let written = self.at_end().and_then(|()| FaultyFile(&self.file).write_all(text.as_bytes()));
         if let Err(error) = written {
-            // What was written of the line would spoil the next one.
+            // Remove the partial line, which would corrupt the next one.
             let _ = self.file.set_len(self.bytes);
             return Err(Error::write(&self.path)(error));
         }
@@ -49,7 +49,7 @@ impl Lines {
         Ok(())
     }
 
-    /// Waits until all lines are on the disk. If the file was deleted meanwhile, makes it again.
+    /// Waits until all lines are on the disk. Recreates the file if it was deleted in the meantime.
     pub fn sync(&mut self) -> Result<()> {
         let mut all = || {
             if !self.path.exists() {

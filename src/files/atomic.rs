@@ -11,42 +11,43 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Duration;
 
-const PREFIX: &str = ".labelgs-";
-const SUFFIX: &str = ".tmp";
+const TEMPORARY_PREFIX: &str = ".labelgs-";
+const TEMPORARY_SUFFIX: &str = ".tmp";
 
 /// Writes `path` through `body`, atomically: fills, flushes and syncs a temporary file in the same folder, renames it,
-/// and syncs the folder. Makes missing folders. Follows a symbolic link; writes to a device or pipe directly. On an
-/// error the previous file is untouched.
+/// and syncs the folder. Creates missing folders. Follows a symbolic link; writes to a device or pipe directly. On an
+/// error, the previous file is untouched.
 pub fn write(path: impl AsRef<Path>, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let path = path.as_ref();
     write_inner(path, body).map_err(Error::write(path))
 }
 
-/// Writes `path` as [`write()`] does, by a body that fills a file by its name, such as another program. A pipe or a device is an error.
+/// Writes `path` as [`write()`] does, but `body` gets the name of the file to fill, for example for another program. A
+/// pipe or device is an error.
 pub fn write_by_name(path: impl AsRef<Path>, body: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
     let path = path.as_ref();
     let place = || {
         let target = follow(path)?;
         if fs::metadata(&target).is_ok_and(|found| !found.is_file()) {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no ordinary file"));
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
         }
         replace(&target, |temporary| body(temporary.path()))
     };
     place().map_err(Error::write(path))
 }
 
-/// Writes a value as JSON with indentation, atomically.
+/// Writes a value as indented JSON, atomically.
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(format!("JSON: {error}")))?;
     write(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// Removes a file, if it is there.
+/// Removes a file if it exists.
 pub fn remove(path: &Path) -> Result<()> {
     if path.is_file() { fs::remove_file(path).map_err(Error::write(path)) } else { Ok(()) }
 }
 
-/// Refuses a folder that is not empty: a reader would take old and new files for one set. A missing folder is fine.
+/// Refuses a folder that is not empty, because readers would mix old and new files. A missing folder is fine.
 /// `argument` is the flag that named it.
 pub fn require_empty(argument: &str, folder: &Path) -> Result<()> {
     match fs::read_dir(folder) {
@@ -69,7 +70,7 @@ fn write_inner(path: &Path, body: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     replace(&target, |temporary| fill(temporary.as_file(), body))
 }
 
-/// Puts a file that `fill` has filled in the place of another one.
+/// Fills a temporary file with `fill` and renames it to `target`.
 fn replace(target: &Path, fill: impl FnOnce(&tempfile::NamedTempFile) -> io::Result<()>) -> io::Result<()> {
     let folder = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -89,11 +90,11 @@ fn replace(target: &Path, fill: impl FnOnce(&tempfile::NamedTempFile) -> io::Res
     sync_folder(folder)
 }
 
-/// Returns the file at the end of a chain of symbolic links, so that a rename replaces the file and not the link. The
-/// file may be missing. Links of the system to pipes (`/dev/stdout`) have no path to follow and stay as they are.
+/// Resolves a chain of symbolic links, so that a rename replaces the file and not the link. The file may be missing.
+/// The system's links to pipes (`/dev/stdout`) have no path to follow and stay as they are.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     let mut at = path.to_owned();
-    // Linux follows as many.
+    // Linux follows at most as many.
     for _ in 0..40 {
         match (fs::symlink_metadata(&at), fs::metadata(&at)) {
             (Ok(found), target) if found.is_symlink() && target.as_ref().map_or(true, fs::Metadata::is_file) => {
@@ -107,12 +108,12 @@ fn follow(path: &Path) -> io::Result<PathBuf> {
 }
 
 fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let prefix = format!("{PREFIX}{}-", std::process::id());
+    let prefix = format!("{TEMPORARY_PREFIX}{}-", std::process::id());
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(SUFFIX);
+    builder.prefix(&prefix).suffix(TEMPORARY_SUFFIX);
     #[cfg(unix)]
     {
-        // The crate makes private files. Outputs are ordinary files, so the umask decides.
+        // The crate creates private files. Outputs are ordinary files, so the umask decides.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -120,23 +121,23 @@ fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
 }
 
 fn fill(file: &File, body: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let mut buffered = BufWriter::with_capacity(1 << 18, Fallible(file));
+    let mut buffered = BufWriter::with_capacity(1 << 18, FaultyFile(file));
     body(&mut buffered)?;
     // Dropping a BufWriter hides the error of its last write, so flush here.
     buffered.flush()
 }
 
-/// A file whose writes can be made to fail, for tests.
-pub struct Fallible<'a>(pub &'a File);
+/// A file whose writes tests can make fail.
+pub struct FaultyFile<'a>(pub &'a File);
 
-impl Write for Fallible<'_> {
+impl Write for FaultyFile<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match fault::of_transfer("write") {
             Ok(false) => self.0.write(bytes),
             Ok(true) => self.0.write(&bytes[..bytes.len().min(1)]),
             Err(error) => {
                 if error.kind() == io::ErrorKind::StorageFull {
-                    // A full disk takes a part of a write.
+                    // A full disk accepts only a part of a write.
                     let _ = self.0.write(&bytes[..bytes.len() / 2]);
                 }
                 Err(error)
@@ -171,11 +172,11 @@ fn sync_folder(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Least age of a temporary file before a command that has not locked the folder removes it. On a shared disk, its
+/// Minimum age of a temporary file before a command without a lock on the folder removes it. On a shared disk, its
 /// process may run on another computer.
 const STALE_AGE: Duration = Duration::from_secs(3600);
 
-/// Removes temporary files of killed commands from a folder, at the first write of this process there.
+/// Removes temporary files of killed commands from a folder, at this process's first write there.
 fn clean_once(folder: &Path) {
     static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let is_new = CLEANED.lock().is_ok_and(|mut cleaned| cleaned.insert(folder.to_owned()));
@@ -184,8 +185,8 @@ fn clean_once(folder: &Path) {
     }
 }
 
-/// Removes temporary files of killed processes of this program from `folder` if they are at least `unchanged` old;
-/// returns their number. Keeps files of running processes, and all files on systems without `/proc`.
+/// Removes temporary files that killed labelgs processes left in `folder` and that are at least `unchanged` old.
+/// Returns their number. Keeps files of running processes, and all files on systems without `/proc`.
 pub fn remove_stale(folder: impl AsRef<Path>, unchanged: Duration) -> usize {
     let processes = Path::new("/proc");
     if !processes.join("self").exists() {
@@ -196,7 +197,7 @@ pub fn remove_stale(folder: impl AsRef<Path>, unchanged: Duration) -> usize {
         let name = entry.file_name();
         let process = name
             .to_str()
-            .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.split_once('-'))
+            .and_then(|name| name.strip_prefix(TEMPORARY_PREFIX)?.strip_suffix(TEMPORARY_SUFFIX)?.split_once('-'))
             .and_then(|(process, _)| process.parse::<u32>().ok());
         let is_dead = process.is_some_and(|process| !processes.join(process.to_string()).exists());
         let age = || entry.metadata().ok()?.modified().ok()?.elapsed().ok();

@@ -1,4 +1,4 @@
-//! Files with one depth map: 16-bit PNG, EXR, NPY or PFM. Values stay as stored.
+//! Depth map files: 16-bit PNG, EXR, NPY or PFM. Values stay as stored.
 
 use super::image::{PIXELS_MAX, check_length, check_png_length, check_size};
 use super::{npy, read};
@@ -7,8 +7,9 @@ use labelgs_scene::{DepthMap, Error, Result};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Extensions of depth files in order of preference. PNG is last, because it is often only a picture of the other file.
-pub const EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
+/// Extensions of depth files in order of preference. PNG comes last, because it is often only a picture of another
+/// file.
+pub const DEPTH_EXTENSIONS: [&str; 4] = ["exr", "npy", "pfm", "png"];
 
 /// Reads a depth map; the extension gives the format.
 pub fn read_depth(path: &Path) -> Result<DepthMap> {
@@ -56,7 +57,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let (mut samples, mut first) = (0, None);
     for header in &header.headers {
-        // The crate chooses the layer and takes memory for all its channels.
+        // The crate chooses the layer and allocates memory for all its channels.
         let (size, channels) = ((side(header.layer_size.x()), side(header.layer_size.y())), header.channels.list.len());
         check_size(path, size)?;
         check_length(path, size, channels as u64)?;
@@ -66,7 +67,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     if samples > PIXELS_MAX {
         return Err(refuse(&format!("{samples} samples in all channels; up to {PIXELS_MAX} are supported")));
     }
-    let Some((width, height)) = first else { return Err(refuse(&"it has no picture")) };
+    let Some((width, height)) = first else { return Err(refuse(&"it has no image")) };
     let layer = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = layer.all_attributes().from_buffered(Cursor::new(&bytes)).map_err(|error| refuse(&error))?;
     let channels = &image.layer_data.channel_data.list;
@@ -80,7 +81,7 @@ fn read_exr(path: &Path) -> Result<DepthMap> {
     };
     let values: Vec<f32> = channel.sample_data.values_as_f32().collect();
     if values.len() as u64 != u64::from(width) * u64::from(height) {
-        return Err(refuse(&"the channel has another size than its picture"));
+        return Err(refuse(&"the channel and its image differ in size"));
     }
     Ok(DepthMap { width, height, values })
 }
@@ -102,7 +103,7 @@ fn read_pfm(path: &Path) -> Result<DepthMap> {
     let mut word = || {
         let start = at + bytes[at..].iter().position(|byte| !byte.is_ascii_whitespace())?;
         let end = start + bytes[start..].iter().take(32).position(u8::is_ascii_whitespace)?;
-        // A word ends at one white space. After the scale this is the last byte of the header.
+        // A word ends at a single white space. After the scale, that is the last byte of the header.
         at = end + 1;
         std::str::from_utf8(&bytes[start..end]).ok()
     };

@@ -1,6 +1,6 @@
 //! Image files: reads photos, writes PNG and EXR.
 
-use super::{atomic, kind, read};
+use super::{atomic, content, read};
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use image::{ImageDecoder, ImageReader};
 use labelgs_scene::view::alpha_of;
@@ -22,13 +22,13 @@ pub fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
     Ok(())
 }
 
-/// Most bytes that one byte of deflate expands to. Headers are not subtracted, because they are a few bytes.
+/// Largest expansion of a byte by deflate. Headers are not subtracted, because they are only a few bytes.
 const DEFLATE_MAX: u64 = 1032;
-/// Most samples per byte in the other formats. A JPEG has at least one bit for each block of 64 samples, times the
-/// number of interleaved components.
+/// Most samples per byte in the other formats. A JPEG has at least one bit per block of 64 samples, times the number of
+/// interleaved components.
 const SAMPLES_MAX: u64 = 8192;
 
-/// Refuses a PNG with `bits` per pixel whose file is too short for its pixels, before memory is allocated.
+/// Refuses a PNG with `bits` per pixel whose file is too short for its pixels, before allocating memory.
 pub fn check_png_length(path: &Path, (width, height): (u32, u32), bits: u32) -> Result<()> {
     let bytes = (u64::from(width) * u64::from(bits)).div_ceil(8) * u64::from(height);
     if bytes <= (file_length(path)? + 64) * DEFLATE_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
@@ -40,7 +40,7 @@ pub fn check_length(path: &Path, (width, height): (u32, u32), channels: u64) -> 
     if samples <= (file_length(path)? + 64) * SAMPLES_MAX { Ok(()) } else { Err(too_short(path, (width, height))) }
 }
 
-/// Refuses a palette whose length is no multiple of 3: the decoder would read beyond its end.
+/// Refuses a palette whose length is not a multiple of 3: the decoder would read beyond its end.
 fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
     let reader = png::Decoder::new(Cursor::new(bytes)).read_info();
     let reader = reader.map_err(|error| Error::data(path, "", format!("cannot be decoded: {error}")))?;
@@ -63,7 +63,7 @@ fn too_short(path: &Path, (width, height): (u32, u32)) -> Error {
 }
 
 fn reader<R: BufRead + Seek>(path: &Path, file: R) -> Result<ImageReader<R>> {
-    // The first bytes give the format, so that a PNG named .jpg works.
+    // Detect the format from the first bytes, so that a PNG named .jpg works.
     let mut reader = ImageReader::new(file).with_guessed_format().map_err(Error::read(path))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(PIXELS_MAX * 16);
@@ -81,44 +81,43 @@ pub fn photo_size(path: impl AsRef<Path>) -> Result<(u32, u32)> {
     })
 }
 
-/// Says what a file is that cannot be decoded, and what to do.
+/// Explains why a file cannot be decoded and what to do.
 fn undecodable(path: &Path, error: &image::ImageError) -> Error {
-    let problem = match kind::of_file(path).ok().flatten() {
-        Some(content) if !["a PNG", "a JPEG"].contains(&content.what) => content.told("a PNG or JPEG"),
+    let problem = match content::identify_file(path).ok().flatten() {
+        Some(content) if !["a PNG", "a JPEG"].contains(&content.what) => content.mismatch("a PNG or JPEG"),
         Some(_) => format!("cannot be decoded: {error}; copy it again, or leave it out of the scene"),
         None => format!("cannot be decoded: it is neither PNG nor JPEG ({error}); convert it, or leave it out"),
     };
     Error::data(path, "", problem)
 }
 
-/// Reads a PNG or JPEG as 8-bit RGB with alpha 255. Transparency is blended over `background` (R, G, B, 0 to 1). Grey
-/// and 16-bit photos are converted. An EXIF orientation is ignored as in COLMAP, because poses belong to the stored
-/// pixels.
+/// Reads a PNG or JPEG as 8-bit RGB with alpha 255. Blends transparency over `background` (R, G, B, 0 to 1). Converts
+/// grey and 16-bit photos. Ignores an EXIF orientation as COLMAP does, because poses belong to the stored pixels.
 pub fn read_photo(path: impl AsRef<Path>, background: [f32; 3]) -> Result<Photo> {
     let picture = decode(path.as_ref())?;
     let transparent = picture.color().has_alpha();
-    let mut photo = as_rgba(picture);
+    let mut photo = to_rgba(picture);
     if transparent {
         let background = background.map(|value| f64::from(value) * 255.0);
-        photo.rgba.iter_mut().for_each(|texel| *texel = over(*texel, background));
+        photo.rgba.iter_mut().for_each(|texel| *texel = blend_over(*texel, background));
     }
     Ok(photo)
 }
 
 /// Like [`read_photo`] over black, and keeps the opacity of transparent photos.
 pub fn read_open_photo(path: &Path) -> Result<Photo> {
-    let mut photo = as_rgba(decode(path)?);
+    let mut photo = to_rgba(decode(path)?);
     for texel in &mut photo.rgba {
         let opacity = f64::from(texel[3]) / 255.0;
-        *texel = over(*texel, [0.0; 3]);
+        *texel = blend_over(*texel, [0.0; 3]);
         texel[3] = alpha_of(opacity);
     }
     Ok(photo)
 }
 
-/// Reads a PNG or JPEG as 8-bit RGBA. Alpha is opacity as stored, or 255 without an alpha channel.
+/// Reads a PNG or JPEG as 8-bit RGBA. Alpha is the stored opacity, or 255 without an alpha channel.
 pub fn read_rgba(path: impl AsRef<Path>) -> Result<Photo> {
-    Ok(as_rgba(decode(path.as_ref())?))
+    Ok(to_rgba(decode(path.as_ref())?))
 }
 
 /// Reads a PNG or JPEG as 8-bit grey: width, height, row-major values. Colours become their luminance.
@@ -135,7 +134,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let decoder = reader.into_decoder().map_err(undecodable)?;
     let (size, bits) = (decoder.dimensions(), u32::from(decoder.color_type().bits_per_pixel()));
     check_size(path, size)?;
-    // An 8-bit result may come from packed grey or a palette of two colours.
+    // An 8-bit result may come from packed grey or a two-colour palette.
     let packed = if decoder.color_type().bytes_per_pixel() == decoder.color_type().channel_count() { 1 } else { bits };
     if png {
         check_png_length(path, size, packed)?;
@@ -146,7 +145,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     image::DynamicImage::from_decoder(decoder).map_err(undecodable)
 }
 
-fn as_rgba(picture: image::DynamicImage) -> Photo {
+fn to_rgba(picture: image::DynamicImage) -> Photo {
     let pixels = picture.into_rgba8();
     let (width, height) = pixels.dimensions();
     let rgba = bytemuck::allocation::try_cast_vec(pixels.into_raw())
@@ -154,7 +153,7 @@ fn as_rgba(picture: image::DynamicImage) -> Photo {
     Photo { width, height, rgba }
 }
 
-fn over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {
+fn blend_over([r, g, b, a]: [u8; 4], background: [f64; 3]) -> [u8; 4] {
     let alpha = f64::from(a) / 255.0;
     let blend = |c: u8, b: f64| (f64::from(c) * alpha + b * (1.0 - alpha)).round().clamp(0.0, 255.0) as u8;
     [blend(r, background[0]), blend(g, background[1]), blend(b, background[2]), 255]
@@ -192,17 +191,17 @@ fn write_png(path: &Path, size: (u32, u32), layout: Layout, bytes: &[u8]) -> Res
     atomic::write(path, |out| Ok(encode_png(out, size, layout, Compression::default(), bytes)?))
 }
 
-/// Returns 8-bit RGB as the bytes of a PNG, compressed as fast as possible.
+/// Encodes 8-bit RGB as a PNG, compressed as fast as possible.
 pub fn png_rgb8(size: (u32, u32), pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
     fast_png(size, RGB8, pixels.as_flattened())
 }
 
-/// Returns 8-bit RGB with opacity as the bytes of a PNG, compressed as fast as possible.
+/// Encodes 8-bit RGB with opacity as a PNG, compressed as fast as possible.
 pub fn png_rgba8(size: (u32, u32), pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
     fast_png(size, RGBA8, pixels.as_flattened())
 }
 
-/// Returns 16-bit grey as the bytes of a PNG, compressed as fast as possible.
+/// Encodes 16-bit grey as a PNG, compressed as fast as possible.
 pub fn png_grey16(size: (u32, u32), pixels: &[u16]) -> Result<Vec<u8>> {
     fast_png(size, GREY16, &big_endian(pixels))
 }
@@ -233,7 +232,7 @@ fn big_endian(pixels: &[u16]) -> Vec<u8> {
     pixels.iter().flat_map(|value| value.to_be_bytes()).collect()
 }
 
-/// Returns 8-bit RGB as the bytes of a JPEG, for slow lines.
+/// Encodes 8-bit RGB as a JPEG, for slow connections.
 pub fn jpeg_rgb8((width, height): (u32, u32), pixels: &[[u8; 3]], quality: u8) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     let written = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, quality).encode(
@@ -265,7 +264,7 @@ pub fn write_exr_uint(path: impl AsRef<Path>, width: u32, height: u32, pixels: &
 fn write_exr(path: &Path, (width, height): (u32, u32), channels: Vec<(&'static str, FlatSamples)>) -> Result<()> {
     let expected = u64::from(width) * u64::from(height);
     if channels.iter().any(|(_, samples)| samples.len() as u64 != expected) {
-        return Err(Error::Bug(format!("{} does not get {width} x {height} pixels", path.display())));
+        return Err(Error::Bug(format!("{} gets the wrong number of pixels for {width} x {height}", path.display())));
     }
     let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples));
     let layer = Layer::new(

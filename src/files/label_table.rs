@@ -1,6 +1,6 @@
-//! `labels.json`: names, colours and counts of the ids in a folder of masks or in a model.
+//! `labels.json`: names, colours and counts of the ids in a mask folder or a model.
 //!
-//! It lies in a folder of masks, in the folder of a run, or beside a single PLY as `NAME.labels.json`.
+//! The file is in the mask folder or the run folder, or beside a single PLY as `NAME.labels.json`.
 
 use super::{atomic, read, run_folder};
 use labelgs_scene::labels::{LABEL_MAX, MODEL_LABEL_MAX, label_colour};
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Name of the file in a folder.
-pub const FILE: &str = "labels.json";
+pub const FILE_NAME: &str = "labels.json";
 /// Version of the layout.
 const SCHEMA_VERSION: u32 = 1;
 
@@ -20,14 +20,14 @@ fn schema_version() -> u32 {
     SCHEMA_VERSION
 }
 
-/// Returns `name`, with the first number appended that makes it unique.
+/// Returns `name`, with the first number appended that makes the name unique.
 pub fn unique_name(name: String, taken: &mut BTreeSet<String>) -> String {
     unique(name, " ", taken)
 }
 
-/// One object. A file needs the id only; the colour of an entry without one is that of [`LabelEntry::new`].
+/// One object. A file only needs the id; the default colour is that of [`LabelEntry::new`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Listed")]
+#[serde(from = "StoredEntry")]
 pub struct LabelEntry {
     /// Id in masks, 1 to 65535, or in models, 1 to 2147483647.
     pub id: u32,
@@ -41,16 +41,16 @@ pub struct LabelEntry {
     pub source: Option<String>,
     /// Number of pixels over all masks; 0 without masks.
     pub pixels: u64,
-    /// Number of masks that show it.
+    /// Number of masks that contain the object.
     pub views: u32,
-    /// Keys that labelgs does not know. They are kept.
+    /// Unknown keys, which are preserved.
     #[serde(flatten)]
     pub others: BTreeMap<String, Value>,
 }
 
-/// An entry as a file has it.
+/// An entry as stored in a file.
 #[derive(Deserialize)]
-struct Listed {
+struct StoredEntry {
     id: u32,
     #[serde(default)]
     name: Option<String>,
@@ -66,16 +66,16 @@ struct Listed {
     others: BTreeMap<String, Value>,
 }
 
-impl From<Listed> for LabelEntry {
-    fn from(listed: Listed) -> Self {
-        let Listed { id, name, colour, source, pixels, views, others } = listed;
+impl From<StoredEntry> for LabelEntry {
+    fn from(listed: StoredEntry) -> Self {
+        let StoredEntry { id, name, colour, source, pixels, views, others } = listed;
         let colour = colour.unwrap_or_else(|| label_colour(id));
         Self { id, name, colour, source, pixels, views, others }
     }
 }
 
 impl LabelEntry {
-    /// Makes an entry with only an id.
+    /// Creates an entry with only an id.
     pub fn new(id: u32) -> Self {
         Self { id, name: None, colour: label_colour(id), source: None, pixels: 0, views: 0, others: BTreeMap::new() }
     }
@@ -84,7 +84,7 @@ impl LabelEntry {
 /// A table of objects, sorted by id.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LabelTable {
-    /// Version of the layout; 1 in a file without it.
+    /// Version of the layout. A file without it has version 1.
     #[serde(default = "schema_version")]
     pub schema_version: u32,
     /// One entry per id.
@@ -92,7 +92,7 @@ pub struct LabelTable {
 }
 
 impl LabelTable {
-    /// Makes a table of these entries, sorted by id.
+    /// Creates a table of these entries, sorted by id.
     pub fn new(mut labels: Vec<LabelEntry>) -> Self {
         labels.sort_by_key(|entry| entry.id);
         Self { schema_version: SCHEMA_VERSION, labels }
@@ -103,14 +103,14 @@ impl LabelTable {
         Self::parse(path, read::text(path)?.as_bytes())
     }
 
-    /// Like [`Self::read`], from bytes of the file `path`.
+    /// Like [`Self::read`], from the bytes of the file `path`.
     pub fn parse(path: &Path, text: &[u8]) -> Result<Self> {
         let expected =
             r#"expected {"labels": [{"id": 1, "name": "cup"}]}, where "colour": [r, g, b] from 0 to 255 may be added"#;
         read::parse_json::<Self>(path, text, expected)?.checked(path)
     }
 
-    /// Returns the table sorted, if it obeys the rules of [`Self::read`]; `path` is the file it is from.
+    /// Returns the table sorted if it obeys the rules of [`Self::read`]. `path` is its file, for messages.
     pub fn checked(&self, path: &Path) -> Result<Self> {
         read::require_version(path, self.schema_version, SCHEMA_VERSION)?;
         let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
@@ -129,9 +129,9 @@ impl LabelTable {
         Ok(Self::new(self.labels.clone()))
     }
 
-    /// Reads the table in a folder of masks, if there is one.
-    pub fn of_folder(folder: &Path) -> Result<Option<Self>> {
-        let path = folder.join(FILE);
+    /// Reads the table of a mask folder, if there is one.
+    pub fn read_in_folder(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(FILE_NAME);
         if !path.is_file() {
             return Ok(None);
         }
@@ -142,23 +142,23 @@ impl LabelTable {
                 Err(Error::data(&path, format!("label {}", entry.id), problem))
             }
             None => {
-                table.warn_of_others(&path);
+                table.warn_of_unknown_keys(&path);
                 Ok(Some(table))
             }
         }
     }
 
-    /// Names keys without a meaning, which may be misspelt ones.
-    fn warn_of_others(&self, path: &Path) {
+    /// Warns about unknown keys, which may be misspelt.
+    fn warn_of_unknown_keys(&self, path: &Path) {
         let keys: BTreeSet<&str> =
             self.labels.iter().flat_map(|entry| entry.others.keys()).map(String::as_str).collect();
         if !keys.is_empty() {
             let keys = keys.into_iter().collect::<Vec<_>>().join(", ");
-            tracing::warn!("{}: keeps keys that labelgs does not know and does not use: {keys}", path.display());
+            tracing::warn!("{}: ignores unknown keys, but keeps them: {keys}", path.display());
         }
     }
 
-    /// Writes the table, atomically.
+    /// Writes the table atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         atomic::write_json(path, self)
     }
@@ -174,28 +174,28 @@ impl LabelTable {
     }
 
     /// Returns the id with this name, ignoring case.
-    pub fn by_name(&self, name: &str) -> Option<u32> {
+    pub fn id_of(&self, name: &str) -> Option<u32> {
         let found = |entry: &&LabelEntry| entry.name.as_ref().is_some_and(|own| own.eq_ignore_ascii_case(name));
         self.labels.iter().find(found).map(|entry| entry.id)
     }
 
-    /// Returns the path of the table of a model, if there is one: `NAME.labels.json` beside the PLY, else `labels.json`
-    /// in the folder of the run.
+    /// Returns the path of a model's table, if there is one: `NAME.labels.json` beside the PLY, or else `labels.json`
+    /// in the run folder.
     pub fn find_for_model(model: &Path) -> Option<PathBuf> {
-        let of_run = run_folder::of_model(model).map(|run| run.join(FILE));
-        [Some(Self::beside(model)), of_run].into_iter().flatten().find(|path| path.is_file())
+        let of_run = run_folder::find_for_model(model).map(|run| run.join(FILE_NAME));
+        [Some(Self::path_beside(model)), of_run].into_iter().flatten().find(|path| path.is_file())
     }
 
-    /// Writes the table to `path`. Without a table it removes the file, whose names would be wrong.
-    pub fn put(table: Option<&Self>, path: &Path) -> Result<()> {
+    /// Writes the table to `path`. Without a table, removes the file, because its names would be wrong.
+    pub fn write_or_remove(table: Option<&Self>, path: &Path) -> Result<()> {
         match table {
             Some(table) => table.write(path),
             None => atomic::remove(path),
         }
     }
 
-    /// Returns the path of the table for a PLY outside of the folder of a run.
-    pub fn beside(model: &Path) -> PathBuf {
-        model.with_extension(FILE)
+    /// Returns the path of the table for a PLY outside a run folder.
+    pub fn path_beside(model: &Path) -> PathBuf {
+        model.with_extension(FILE_NAME)
     }
 }

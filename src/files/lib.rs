@@ -1,14 +1,14 @@
 //! Access to files: bounded reads, atomic writes, images, names, and the table of labels.
 //!
-//! All reads go through [`read`] and all writes through [`atomic`] or [`append`], so that injected faults reach each of them
-//! and no crash leaves a partial file.
+//! All reads go through [`read`] and all writes through [`atomic`] or [`append`], so that tests can inject faults into
+//! each of them and no crash leaves a partial file.
 
-pub mod all;
 pub mod append;
 pub mod atomic;
+pub mod content;
 pub mod depth_file;
+pub mod error_list;
 pub mod image;
-pub mod kind;
 pub mod label_table;
 pub mod names;
 pub mod npy;

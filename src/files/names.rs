@@ -1,7 +1,7 @@
-//! Names of files as they match on other systems.
+//! File names that match across systems.
 //!
-//! macOS decomposes letters with accents, Windows ignores case, and programs there write names in another case than
-//! the file has. A folder that was copied to Linux then has files that are there and are not found.
+//! macOS decomposes accented letters, Windows ignores case, and programs there may spell names with another case than
+//! the file has. After a folder is copied to Linux, such names no longer find their files.
 
 use super::read;
 use labelgs_scene::Result;
@@ -9,24 +9,24 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 use unicode_normalization::UnicodeNormalization;
 
-/// Largest depth of folders; it also ends links to a parent.
+/// Maximum depth of folders; it also stops at links to a parent.
 const DEPTH_MAX: usize = 8;
 
-/// Most names in a message; `-v` prints all.
+/// Most names in a message; `-v` prints all of them.
 const SHOWN_MAX: usize = 4;
 
-/// Returns the key by which two spellings of one name match: composed, in lower case.
+/// Returns the key by which two spellings of a name match: composed, in lower case.
 pub fn folded(name: &str) -> String {
     name.nfc().collect::<String>().to_lowercase()
 }
 
-/// Returns the first few names, for messages.
+/// Joins the first few names for messages.
 pub fn shortened(names: &[impl AsRef<str>]) -> String {
     let shown = names.iter().take(SHOWN_MAX).map(AsRef::as_ref).collect::<Vec<&str>>().join(", ");
     if names.len() > SHOWN_MAX { format!("{shown}, ...") } else { shown }
 }
 
-/// Lists the files below a folder, sorted, by relative path with `/`. Hidden files are left out.
+/// Lists the files below a folder, sorted, as relative paths with `/`. Skips hidden files.
 pub fn below(root: &Path) -> Result<Vec<String>> {
     let mut found = Vec::new();
     walk(root, "", 0, &mut found)?;
@@ -49,15 +49,15 @@ fn walk(folder: &Path, prefix: &str, depth: usize, found: &mut Vec<String>) -> R
     Ok(())
 }
 
-/// Returns for each owner the first of its keys that is in `there`; for an owner without one, the only name in `there`
-/// that matches a key of this owner alone.
+/// Assigns each owner the first of its keys that is in `there`. An owner without one gets the only name in `there` that
+/// matches a key of this owner alone.
 pub fn claim(keys: &[Vec<String>], there: &BTreeSet<&str>) -> Vec<Option<String>> {
     let exact = |keys: &Vec<String>| keys.iter().find(|key| there.contains(key.as_str())).cloned();
     let mut found: Vec<Option<String>> = keys.iter().map(exact).collect();
     if found.iter().all(Option::is_some) {
         return found;
     }
-    // The name of each key; `None` if several names share it.
+    // The name of each key, or `None` if several names share the key.
     let mut by_key: HashMap<String, Option<&str>> = HashMap::new();
     for &name in there {
         by_key.entry(folded(name)).and_modify(|only| *only = None).or_insert(Some(name));

@@ -6,8 +6,8 @@ use super::read;
 use labelgs_scene::{Error, Result};
 use std::path::Path;
 
-/// Reads an array of `N` dimensions: its shape and values. `what` names the content in messages, `axes` the shape that
-/// it should have.
+/// Reads an array of `N` dimensions: its shape and values. In messages, `what` names the content and `axes` the
+/// expected shape.
 pub fn read<const N: usize>(path: &Path, what: &str, axes: &str) -> Result<([usize; N], Vec<f64>)> {
     let refuse = |cause: &str| Error::data(path, "", format!("is not a readable NPY {what}: {cause}"));
     let bytes = read::bytes(path)?;
@@ -54,7 +54,7 @@ pub fn read<const N: usize>(path: &Path, what: &str, axes: &str) -> Result<([usi
         }
     };
     if data.len() != count * each {
-        return Err(refuse(&format!("{count} numbers need {} bytes, it has {}", count * each, data.len())));
+        return Err(refuse(&format!("{count} numbers need {} bytes, the file has {}", count * each, data.len())));
     }
     let value = |number: &[u8]| {
         let mut eight = [0_u8; 8];

@@ -1,11 +1,11 @@
-//! The files in a folder that belong to photos by their names, such as masks and depth maps.
+//! The files in a folder that belong to photos by name, such as masks and depth maps.
 
 use super::names::{below, claim};
 use labelgs_scene::Result;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-/// A folder in which the file of a photo is found by the name of the photo.
+/// A folder whose files are found by photo name.
 #[derive(Debug)]
 pub struct PhotoFiles {
     /// The folder.
@@ -14,7 +14,7 @@ pub struct PhotoFiles {
 }
 
 impl PhotoFiles {
-    /// Finds the files of `photos`, all of a scene, by [`photo_keys`]. Of several extensions the first is preferred.
+    /// Finds the files of `photos`, which are all photos of a scene, by [`photo_keys`]. Prefers earlier extensions.
     pub fn new(folder: &Path, photos: &[&str], extensions: &[&str]) -> Result<Self> {
         let keys = photo_keys(photos);
         let own = |key: &String| {
@@ -22,7 +22,7 @@ impl PhotoFiles {
             files.into_iter().find(|path| path.is_file())
         };
         let mut found: Vec<Option<PathBuf>> = keys.iter().map(|keys| keys.iter().find_map(own)).collect();
-        // A folder is listed only where a file is missing, because it may be large.
+        // List a folder only if a file is missing, because the folder may be large.
         if found.iter().any(Option::is_none) {
             let files = below(folder)?;
             let of = |&extension| files.iter().filter_map(move |file| Some((key_of(file, extension)?, file)));
@@ -48,9 +48,9 @@ impl PhotoFiles {
     }
 }
 
-/// Returns the possible names of the file of each photo, without extension, in order of preference: the photo's name
-/// without its extension, with it, cut at the first dot of the file name as Gaussian Grouping does, and the first two
-/// without folders. The last three need a name that no other photo shares.
+/// Returns the possible names of each photo's file, without extension, in order of preference: the photo's name without
+/// its extension, with it, cut at the first dot of the file name as Gaussian Grouping does, and the first two without
+/// folders. The last three only count if no other photo shares the name.
 pub fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
     let (mut stems, mut cuts) = (HashMap::new(), HashMap::new());
     for &photo in photos {
@@ -66,7 +66,7 @@ pub fn photo_keys(photos: &[&str]) -> Vec<Vec<String>> {
             found.extend(path.file_name().map(PathBuf::from));
         }
         let mut keys: Vec<String> = found.iter().map(|key| key.to_string_lossy().replace('\\', "/")).collect();
-        // DEVA removes the last four characters, whatever the extension is: `a.jpeg` becomes `a..png`.
+        // DEVA removes the last four characters, whatever the extension: `a.jpeg` becomes `a..png`.
         let cut = photo.len().checked_sub(4).and_then(|at| photo.get(..at));
         keys.extend(cut.filter(|cut| cut.ends_with('.')).map(str::to_owned));
         keys
@@ -84,7 +84,7 @@ fn cut_at_first_dot(name: &str) -> PathBuf {
     path.with_file_name(file.split('.').next().unwrap_or_default())
 }
 
-/// Returns `name` without this extension (any case), or `None` for other files.
+/// Returns `name` without this extension (in any case), or `None` for other files.
 pub fn key_of<'a>(name: &'a str, extension: &str) -> Option<&'a str> {
     let at = name.len().checked_sub(extension.len() + 1)?;
     let ending = name.get(at..)?.strip_prefix('.')?;

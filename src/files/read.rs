@@ -1,5 +1,5 @@
-//! File reading. Every reader opens and reads files through this module, so that [faults](labelgs_scene::lab::fault) reach all
-//! of them.
+//! File reading. Every reader opens and reads files through this module, so that [faults](labelgs_scene::lab::fault)
+//! can be injected into all of them.
 
 #![expect(clippy::disallowed_methods, reason = "the place that opens files for reading")]
 
@@ -10,13 +10,13 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// An open file whose reads can be made to fail on purpose.
+/// An open file whose reads tests can make fail.
 #[derive(Debug)]
 pub struct Source(File);
 
 impl Source {
-    /// Reads a file that is open already.
-    pub fn of(file: File) -> Self {
+    /// Wraps a file that is already open.
+    pub fn from_file(file: File) -> Self {
         Self(file)
     }
 
@@ -34,7 +34,7 @@ impl Read for Source {
             self.0.read(&mut buffer[..most])
         };
         loop {
-            // Some decoders do not retry after an interrupting signal.
+            // Some decoders do not retry after a signal interrupts a read.
             match once() {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 other => return other,
@@ -54,7 +54,7 @@ fn source(path: &Path) -> io::Result<Source> {
     Ok(Source(File::open(path)?))
 }
 
-/// Opens a file to read with a buffer.
+/// Opens a file for buffered reading.
 pub fn open(path: &Path) -> Result<BufReader<Source>> {
     let file = source(path).map_err(Error::read(path))?;
     Ok(BufReader::with_capacity(1 << 16, file))
@@ -71,49 +71,49 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     all().map_err(Error::read(path))
 }
 
-/// Removes the mark that editors of Windows write before UTF-8 text; refuses that of UTF-16.
-pub fn without_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
-    const MARK: &[u8] = b"\xEF\xBB\xBF";
+/// Removes a UTF-8 byte order mark, which Windows editors write. Refuses UTF-16.
+pub fn strip_byte_order_mark(path: &Path, text: &mut Vec<u8>) -> Result<()> {
+    const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
     if text.starts_with(b"\xFF\xFE") || text.starts_with(b"\xFE\xFF") {
         return Err(Error::data(path, "", "is UTF-16 text; save it as UTF-8"));
     }
-    if text.starts_with(MARK) {
-        text.drain(..MARK.len());
+    if text.starts_with(BYTE_ORDER_MARK) {
+        text.drain(..BYTE_ORDER_MARK.len());
     }
     Ok(())
 }
 
-/// Reads a file of UTF-8 text. A byte order mark is left out.
+/// Reads a UTF-8 text file without its byte order mark.
 pub fn text(path: &Path) -> Result<String> {
     let mut bytes = bytes(path)?;
-    without_mark(path, &mut bytes)?;
+    strip_byte_order_mark(path, &mut bytes)?;
     String::from_utf8(bytes).map_err(|error| {
         Error::data(path, format!("byte {}", error.utf8_error().valid_up_to()), "is not UTF-8 text; save it as UTF-8")
     })
 }
 
-/// Reads a file of JSON. `expected` says in errors what it should hold.
+/// Reads a JSON file. `expected` describes the content in errors.
 pub fn json<T: DeserializeOwned>(path: &Path, expected: &str) -> Result<T> {
     parse_json(path, text(path)?.as_bytes(), expected)
 }
 
-/// The same from the bytes of a file.
+/// Like [`json`], from the bytes of a file.
 pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &str) -> Result<T> {
     serde_json::from_slice(text).map_err(|error| {
         let text = error.to_string();
         let (problem, _) = text.rsplit_once(" at line ").unwrap_or((&text, ""));
-        // What the parser quotes is a key of the file, not a setting.
+        // The parser quotes keys of the file, not settings.
         let problem = format!("{}; {expected}", problem.replace('`', "\""));
         Error::data(path, format!("line {}", error.line()), problem)
     })
 }
 
-/// Refuses a file whose layout has another version than the known one.
+/// Refuses a file with another layout version than the known one.
 pub fn require_version(path: &Path, found: u32, known: u32) -> Result<()> {
     if found == known {
         return Ok(());
     }
-    Err(Error::data(path, "schema_version", format!("has version {found}, labelgs reads {known}")))
+    Err(Error::data(path, "schema_version", format!("has version {found}; labelgs reads {known}")))
 }
 
 /// Lists the paths in a folder, in no particular order.
@@ -125,7 +125,7 @@ pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     all().map_err(Error::read(path))
 }
 
-/// Returns the memory that programs can still get without swapping, bytes, where Linux tells.
+/// Returns the memory that programs can still get without swapping, bytes, or `None` if the system does not report it.
 pub fn free_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;

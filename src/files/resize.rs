@@ -1,10 +1,9 @@
-//! Photos at a smaller size: each pixel is an exact area mean.
+//! Downscales photos: each pixel is an exact area mean.
 
 use labelgs_scene::Photo;
 use rayon::prelude::*;
 
-/// Returns the size limited to `longest` px at the longest side. It is the only rounding rule for cameras, photos and
-/// masks.
+/// Limits a size to `longest` px on its longest side. Cameras, photos and masks all round by this rule.
 pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, u32) {
     let Some(longest) = longest.filter(|&longest| longest < width.max(height)) else { return (width, height) };
     let scale = f64::from(longest) / f64::from(width.max(height));
@@ -12,7 +11,7 @@ pub fn bounded_size((width, height): (u32, u32), longest: Option<u32>) -> (u32, 
     (side(width), side(height))
 }
 
-/// Returns true if the sizes differ by a scale only: the larger one shrunk to the smaller agrees within 1 px.
+/// Returns true if the sizes differ only by scale: the larger one shrunk to the smaller agrees within 1 px.
 pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     let along = |from: (u32, u32), to: (u32, u32)| {
         let height = f64::from(from.1) * f64::from(to.0) / f64::from(from.0);
@@ -23,7 +22,7 @@ pub fn same_aspect(a: (u32, u32), b: (u32, u32)) -> bool {
     if smaller_first { along(b, a) } else { along(a, b) }
 }
 
-/// Says what is wrong if no scale brings a picture to the size of another. Each comes with its name.
+/// Returns the message for an image that no scale brings to the size of another. Each size comes with a name.
 pub fn aspect_problem((what, size): (&str, (u32, u32)), (of, other): (&str, (u32, u32))) -> Option<String> {
     let text = || {
         let ((width, height), (other_width, other_height)) = (size, other);
@@ -32,7 +31,7 @@ pub fn aspect_problem((what, size): (&str, (u32, u32)), (of, other): (&str, (u32
     (size.0 == 0 || size.1 == 0 || !same_aspect(size, other)).then(text)
 }
 
-/// Returns the first source pixel of each target pixel along one side, and the weights from there on, which sum to 1.
+/// Returns the first source pixel of each target pixel along one side, and the weights from there on, with sum 1.
 fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
     let ratio = f64::from(from) / f64::from(to);
     let span = |index: u32| {
@@ -46,7 +45,7 @@ fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
 }
 
 /// Shrinks the photo to `width` x `height` px. Each target pixel is the exact area mean over the source pixels with
-/// weight. It has weight if they cover at least half of its area.
+/// weight. The target pixel has weight if they cover at least half of its area.
 pub fn shrink_photo(photo: &Photo, width: u32, height: u32) -> Photo {
     if (width, height) == (photo.width, photo.height) {
         return photo.clone();

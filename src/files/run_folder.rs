@@ -1,21 +1,21 @@
-//! The folder of a training run, found from its model, and its lock.
+//! Finds the folder of a training run from its model, and locks it.
 
 use labelgs_scene::{Error, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
-/// File with the settings of the run, in TOML.
-pub const CONFIG: &str = "config.toml";
-/// Name of the file with the exposures of the photos.
-pub const EXPOSURES: &str = "exposures.json";
-/// Name of the folder with the reconstruction of refined poses.
-pub const REFINED: &str = "refined";
-/// File that is locked while a run writes into the folder.
-const LOCK: &str = ".labelgs-lock";
+/// TOML file with the settings of the run.
+pub const CONFIG_FILE: &str = "config.toml";
+/// File with the exposures of the photos.
+pub const EXPOSURES_FILE: &str = "exposures.json";
+/// Folder with the refined poses as a COLMAP model.
+pub const REFINED_FOLDER: &str = "refined";
+/// File that is locked while a run writes to the folder.
+const LOCK_FILE: &str = ".labelgs-lock";
 
-/// Returns the folder of the run that a model belongs to: `RUN` for `RUN` itself and for
-/// `RUN/point_cloud/iteration_N/point_cloud.ply`; none for a PLY elsewhere.
-pub fn of_model(model: &Path) -> Option<PathBuf> {
+/// Returns the run folder of a model: `RUN` for `RUN` itself and for `RUN/point_cloud/iteration_N/point_cloud.ply`,
+/// `None` for a PLY elsewhere.
+pub fn find_for_model(model: &Path) -> Option<PathBuf> {
     if model.is_dir() {
         return Some(model.to_owned());
     }
@@ -27,8 +27,8 @@ pub fn of_model(model: &Path) -> Option<PathBuf> {
     (is_step && models.file_name()? == "point_cloud").then(|| models.parent().map(Path::to_owned)).flatten()
 }
 
-/// A lock on a folder, held until it is dropped or the process ends in any way. On file systems without locks it does
-/// nothing.
+/// A lock on a folder, held until the value is dropped or the process ends in any way. It has no effect on file systems
+/// without locks.
 #[derive(Debug)]
 pub struct Lock {
     folder: PathBuf,
@@ -39,19 +39,19 @@ pub struct Lock {
 impl Lock {
     /// Locks an existing folder. Fails if another process holds it.
     pub fn take(folder: &Path) -> Result<Self> {
-        let path = folder.join(LOCK);
+        let path = folder.join(LOCK_FILE);
         let file = File::options().create(true).append(true).open(&path).map_err(Error::write(&path))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
-                let problem = "another labelgs trains into this folder; wait for it, or choose another folder";
+                let problem = "another labelgs process trains into this folder; wait for it, or choose another folder";
                 Err(Error::write(folder)(std::io::Error::new(std::io::ErrorKind::ResourceBusy, problem)))
             }
             Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { folder: folder.to_owned(), file }),
         }
     }
 
-    /// Keeps the lock; call it before each write. If the folder was deleted, makes and locks it again. Fails if another
-    /// process was faster. A failure to make the folder shows in the next write.
+    /// Keeps the lock; call this before each write. If the folder was deleted, recreates and locks it. Fails if another
+    /// process was faster. If the folder cannot be created, the next write fails.
     pub fn hold(&mut self) -> Result<()> {
         if self.is_there() || std::fs::create_dir_all(&self.folder).is_err() {
             return Ok(());
@@ -68,12 +68,12 @@ impl Lock {
     #[cfg(unix)]
     fn is_there(&self) -> bool {
         use std::os::unix::fs::MetadataExt;
-        let [own, found] = [self.file.metadata(), std::fs::metadata(self.folder.join(LOCK))];
+        let [own, found] = [self.file.metadata(), std::fs::metadata(self.folder.join(LOCK_FILE))];
         let identity = |found: std::io::Result<std::fs::Metadata>| found.ok().map(|it| (it.dev(), it.ino()));
         identity(own) == identity(found)
     }
 
-    /// Other systems do not delete open files.
+    /// Other systems refuse to delete open files.
     #[cfg(not(unix))]
     fn is_there(&self) -> bool {
         true

@@ -1,4 +1,4 @@
-//! Videos, which ffmpeg encodes: a program of its own, so that no encoder is linked.
+//! Encodes videos with ffmpeg, a separate program, so that no encoder is linked.
 
 use super::atomic;
 use labelgs_scene::{Error, Result};
@@ -8,38 +8,38 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
-/// Name of the encoder.
-const ENCODER: &str = "ffmpeg";
-/// Most bytes of its messages that are kept.
-const SAID_MAX: u64 = 4096;
+/// Name of the encoder program.
+const ENCODER_NAME: &str = "ffmpeg";
+/// Most bytes kept of the encoder's messages.
+const MESSAGE_BYTES_MAX: u64 = 4096;
 
-/// Takes the pixels of the next frame, row-major.
-pub type Frames<'a> = dyn FnMut(&[[u8; 3]]) -> Result<()> + 'a;
+/// Receives the pixels of the next frame, row-major.
+pub type FrameSink<'a> = dyn FnMut(&[[u8; 3]]) -> Result<()> + 'a;
 
-/// Returns the encoder on the search path, to be asked for before any work.
-pub fn encoder(path: &Path) -> Result<PathBuf> {
-    let name = format!("{ENCODER}{}", env::consts::EXE_SUFFIX);
+/// Finds the encoder on the search path. Call this before any expensive work.
+pub fn find_encoder(path: &Path) -> Result<PathBuf> {
+    let name = format!("{ENCODER_NAME}{}", env::consts::EXE_SUFFIX);
     let folders = env::var_os("PATH").unwrap_or_default();
     env::split_paths(&folders).map(|folder| folder.join(&name)).find(|file| file.is_file()).ok_or_else(|| {
         let problem = format!(
-            "{ENCODER}, which makes videos, is in no folder of PATH; install it (on Debian and Ubuntu: apt-get install \
-             {ENCODER}), or name a folder, which gets a PNG for each frame"
+            "{ENCODER_NAME} makes videos, but is in no folder of PATH; install it (on Debian and Ubuntu: apt-get install \
+             {ENCODER_NAME}), or name a folder, which gets a PNG for each frame"
         );
         Error::write(path)(io::Error::new(ErrorKind::NotFound, problem))
     })
 }
 
-/// Writes an MP4 of frames of a size, px, both sides even, that `draw` gives one after the other; atomically. Colours are stored
-/// at half the width and height (yuv420p), which every player shows.
+/// Writes an MP4 atomically. `draw` supplies the frames in order. The size, px, has even sides. Colours are stored at
+/// half the width and height (yuv420p), which every player supports.
 pub fn write(
     path: &Path,
     size: (u32, u32),
     per_second: f64,
-    draw: impl FnOnce(&mut Frames) -> Result<()>,
+    draw: impl FnOnce(&mut FrameSink) -> Result<()>,
 ) -> Result<()> {
-    let program = encoder(path)?;
+    let program = find_encoder(path)?;
     if !(size.0.is_multiple_of(2) && size.1.is_multiple_of(2)) {
-        return Err(Error::Bug(format!("a video of {} x {} px; sides are even", size.0, size.1)));
+        return Err(Error::Bug(format!("a video of {} x {} px; sides must be even", size.0, size.1)));
     }
     let mut failed = None;
     let done = atomic::write_by_name(path, |file| {
@@ -50,7 +50,7 @@ pub fn write(
             is_broken = pushed.is_err();
             pushed.map_err(Error::write(path))
         });
-        // An encoder that takes no frames any more has said why.
+        // An encoder that accepts no more frames has reported why.
         match drawn {
             Err(error) if !is_broken => {
                 failed = Some(error);
@@ -62,7 +62,7 @@ pub fn write(
     failed.map_or(done, Err)
 }
 
-/// A running encoder, which is ended if it is dropped before its end.
+/// A running encoder, which is stopped if it is dropped early.
 struct Encoding {
     child: Child,
     frames: Option<ChildStdin>,
@@ -81,11 +81,11 @@ impl Encoding {
             io::Error::new(error.kind(), format!("{} cannot be started: {error}", program.display()))
         })?;
         let frames = child.stdin.take();
-        // Read at once, so that it never waits for its messages to be read.
+        // Read the messages at once, so that the encoder never blocks on them.
         let said = child.stderr.take().map(|mut from| {
             thread::spawn(move || {
                 let mut text = Vec::new();
-                let _ = (&mut from).take(SAID_MAX).read_to_end(&mut text);
+                let _ = (&mut from).take(MESSAGE_BYTES_MAX).read_to_end(&mut text);
                 let _ = io::copy(&mut from, &mut io::sink());
                 text
             })
@@ -97,9 +97,9 @@ impl Encoding {
         self.frames.as_mut().map_or(Ok(()), |to| to.write_all(pixels.as_flattened()))
     }
 
-    /// Waits for the end of the encoder.
+    /// Waits for the encoder to finish.
     fn finish(&mut self) -> io::Result<()> {
-        // The end of the frames.
+        // Close the input: no more frames follow.
         self.frames = None;
         let status = self.child.wait()?;
         let said = self.said.take().and_then(|said| said.join().ok()).unwrap_or_default();
@@ -107,14 +107,14 @@ impl Encoding {
             return Ok(());
         }
         let said = String::from_utf8_lossy(&said).split_whitespace().collect::<Vec<_>>().join(" ");
-        Err(io::Error::other(format!("{ENCODER} failed ({status}): {said}")))
+        Err(io::Error::other(format!("{ENCODER_NAME} failed ({status}): {said}")))
     }
 }
 
 impl Drop for Encoding {
     fn drop(&mut self) {
         self.frames = None;
-        // Of a child that has ended already, both do nothing.
+        // If the child has already ended, both calls have no effect.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

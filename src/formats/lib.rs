@@ -21,7 +21,7 @@ mod usd;
 pub mod values;
 
 use labelgs_files::label_table::LabelTable;
-use labelgs_files::{atomic, kind};
+use labelgs_files::{atomic, content};
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Error, Gaussians, Result};
 use std::path::Path;
@@ -80,22 +80,24 @@ fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
     if !path.is_file() {
         return Ok(FORMATS[0]);
     }
-    let content = kind::of_file(path)?;
+    let content = content::identify_file(path)?;
     let own = |format: &&'static ModelFormat| content.is_some_and(|content| format.contents.contains(&content.what));
     if let Some(format) = FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
         return Ok(format);
     }
     let problem = unknown_ending(path);
-    let what = content.map_or(String::new(), |content| format!(" and the file {}", content.told("a model")));
+    let what = content.map_or(String::new(), |content| format!(" and the file {}", content.mismatch("a model")));
     let cure = "give the file the extension of its format, or export it in one of these";
     Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", endings(|_| true))))
 }
 
 /// Returns the error of a reader, or what the file is instead if its first bytes tell.
 fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
-    let content = if path.is_file() { kind::of_file(path).ok().flatten() } else { None };
+    let content = if path.is_file() { content::identify_file(path).ok().flatten() } else { None };
     match content.filter(|content| !format.contents.contains(&content.what)) {
-        Some(content) => Error::data(path, "byte 0", content.told(&format!("a file of the format {}", format.name))),
+        Some(content) => {
+            Error::data(path, "byte 0", content.mismatch(&format!("a file of the format {}", format.name)))
+        }
         None => error,
     }
 }
@@ -177,7 +179,7 @@ fn write(
     if with_table {
         match (writer.checksum, export.labels()) {
             (Some(checksum), Some(labels)) => side_labels::write(path, &export, labels, checksum(&export))?,
-            _ => LabelTable::put(names, &LabelTable::beside(path))?,
+            _ => LabelTable::write_or_remove(names, &LabelTable::path_beside(path))?,
         }
     }
     Ok((model.len() - rows.len()) as u64)

@@ -43,12 +43,12 @@ pub(super) fn write(path: &Path, export: &Export, labels: &[u32], checksum: u32)
     let unnamed = LabelTable::new(known.into_iter().map(LabelEntry::new).collect());
     let gaussians = PerGaussian { count: export.rows.len() as u64, positions_crc32: checksum, ids };
     let written = Written { table: export.names.unwrap_or(&unnamed), gaussians };
-    atomic::write_json(&LabelTable::beside(path), &written)
+    atomic::write_json(&LabelTable::path_beside(path), &written)
 }
 
 /// Returns the labels beside the model at `path`, if they are of its `count` Gaussians; else adds a note.
 pub(super) fn read(path: &Path, count: usize, checksum: u32, notes: &mut Vec<String>) -> Result<Option<Vec<u32>>> {
-    let beside = LabelTable::beside(path);
+    let beside = LabelTable::path_beside(path);
     if !beside.is_file() {
         return Ok(None);
     }

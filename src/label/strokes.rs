@@ -1,6 +1,6 @@
 //! Finds the Gaussians that strokes over photos hit.
 
-use crate::edit::strokes::{Seed, Stroke, place};
+use crate::edit::strokes::{Seed, Stroke, stroke_title};
 use crate::engine::{Engine, EngineSize};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -36,7 +36,7 @@ pub fn seeds(
             let rendered = render(&mut engine, &view.camera, &RenderOptions::for_main(near))?;
             shown.insert(&view.name, rendered.top_id);
         }
-        let wrong = |problem: String| Error::data(file, place(number), problem);
+        let wrong = |problem: String| Error::data(file, stroke_title(number), problem);
         let pixels =
             stroke.pixels(view.camera.size()).map_err(|problem| wrong(format!("{problem} ({})", view.name)))?;
         let top = &shown[view.name.as_str()];

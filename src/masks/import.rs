@@ -7,8 +7,8 @@ use super::decode::{Decoded, Shared, decode};
 use super::detect::{Content, Reading, detect};
 use super::soft_edges::{self, Edges};
 use super::{Format, ImportOptions, ObjectPer, Overlap, names, shortened};
-use labelgs_files::all::all_or_one_error;
-use labelgs_files::label_table::{FILE, LabelEntry, LabelTable, unique_name};
+use labelgs_files::error_list::all_or_one_error;
+use labelgs_files::label_table::{FILE_NAME, LabelEntry, LabelTable, unique_name};
 use labelgs_files::{atomic, image};
 use labelgs_scene::labels::LABEL_MAX;
 use labelgs_scene::stage::Stage;
@@ -117,7 +117,7 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let written = with_mask.par_iter().map(|photo| stage.counted(|| write(photo)));
     written.collect::<Vec<Result<()>>>().into_iter().collect::<Result<()>>()?;
     let table = LabelTable::new(labels);
-    table.write(&output.join(FILE))?;
+    table.write(&output.join(FILE_NAME))?;
 
     let without = (0..views.len()).filter(|&at| !reading.has_mask(at));
     let mut notes = notes(&reading, &surveys, &table);

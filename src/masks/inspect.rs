@@ -4,7 +4,7 @@ use super::check::{Finding, Look, Problem, findings, held_out};
 use super::mask::{read_header, read_mask};
 use super::mask_folder::masks_of_photos;
 use super::names;
-use labelgs_files::label_table::FILE;
+use labelgs_files::label_table::FILE_NAME;
 use labelgs_files::names::below;
 use labelgs_files::resize::aspect_problem;
 use labelgs_scene::sampling::every;
@@ -71,7 +71,8 @@ fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Find
 
 fn misnamed(folder: &Path, used: &[Option<&Path>]) -> Result<Vec<Finding>> {
     let used: BTreeSet<&Path> = used.iter().copied().flatten().collect();
-    let unused = below(folder)?.into_iter().filter(|file| file != FILE && !used.contains(folder.join(file).as_path()));
+    let unused =
+        below(folder)?.into_iter().filter(|file| file != FILE_NAME && !used.contains(folder.join(file).as_path()));
     let finding = |file| Finding::of_scene(Problem::Misnamed, format!("{file} belongs to no photo"));
     Ok(unused.map(finding).collect())
 }

@@ -47,7 +47,7 @@ pub fn has_lists(folder: &Path) -> Result<bool> {
     if files.iter().any(|file| png_key(file).is_some()) {
         return Ok(false);
     }
-    let list = files.iter().find(|file| file.ends_with(LIST) && !file.ends_with(label_table::FILE));
+    let list = files.iter().find(|file| file.ends_with(LIST) && !file.ends_with(label_table::FILE_NAME));
     list.map_or(Ok(false), |file| is_list(&folder.join(file)))
 }
 

@@ -23,8 +23,8 @@ impl Run<'_> {
     pub(super) fn write_records(&self) -> Result<()> {
         let out = &self.request.output;
         let text = self.settings.dump(&self.facts)?;
-        atomic::write(out.join(run_folder::CONFIG), |file| file.write_all(text.as_bytes()))?;
-        LabelTable::put(self.names.as_ref(), &out.join(label_table::FILE))?;
+        atomic::write(out.join(run_folder::CONFIG_FILE), |file| file.write_all(text.as_bytes()))?;
+        LabelTable::write_or_remove(self.names.as_ref(), &out.join(label_table::FILE_NAME))?;
         let cameras: Vec<_> = self.dataset.all().into_iter().map(|view| (view.name.as_str(), &view.camera)).collect();
         models::save_cameras(out, &cameras)
     }
@@ -33,7 +33,7 @@ impl Run<'_> {
     pub(super) fn hold_records(&mut self) -> Result<()> {
         self.hold_folder()?;
         let out = &self.request.output;
-        if !out.join(run_folder::CONFIG).exists() {
+        if !out.join(run_folder::CONFIG_FILE).exists() {
             tracing::warn!("{} was deleted; settings, labels and cameras are written again", out.display());
             self.write_records()?;
         }
@@ -138,7 +138,7 @@ impl Run<'_> {
             return Ok(());
         }
         let found = serde_json::json!({ "schema_version": 2, "matrices": matrices });
-        atomic::write_json(&self.request.output.join(run_folder::EXPOSURES), &found)
+        atomic::write_json(&self.request.output.join(run_folder::EXPOSURES_FILE), &found)
     }
 
     /// Writes the refined poses, if there are any, as a reconstruction and in the run's cameras. Held-out views keep
@@ -159,7 +159,7 @@ impl Run<'_> {
             "poses: on average, axes turned by {turned:.3} degrees and cameras moved by {:.2} % of their radius",
             100.0 * moved / self.dataset.extent()
         );
-        colmap::write::model(&out.join(run_folder::REFINED), &cameras, &self.dataset.points)?;
+        colmap::write::model(&out.join(run_folder::REFINED_FOLDER), &cameras, &self.dataset.points)?;
         models::save_cameras(out, &cameras)
     }
 

@@ -80,7 +80,7 @@ pub(super) fn prepare(request: &Request, is_again: bool) -> Result<RunSetup> {
     block::settle(block.as_ref(), resumed.as_ref(), out)?;
     let models = Models::new(out, resumed.as_ref().map_or(0, |resumed| resumed.state.step))?;
     let inputs = resumed.as_ref().map_or(&request.inputs, |resumed| &resumed.record.inputs).clone();
-    let names = inputs.masks.as_deref().map(LabelTable::of_folder).transpose()?.flatten();
+    let names = inputs.masks.as_deref().map(LabelTable::read_in_folder).transpose()?.flatten();
     let dataset = read_scene(request, &settings, &inputs, block.as_ref())?;
     if resumed.is_none() {
         warn_of_surroundings(&settings, &dataset)?;

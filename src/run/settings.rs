@@ -115,7 +115,9 @@ impl Settings {
 
     /// Reads the settings of the run that a model belongs to. Returns `None` if the model is not in a run folder.
     pub fn for_model(model: &Path) -> Result<Option<Self>> {
-        let file = run_folder::of_model(model).map(|run| run.join(run_folder::CONFIG)).filter(|file| file.is_file());
+        let file = run_folder::find_for_model(model)
+            .map(|run| run.join(run_folder::CONFIG_FILE))
+            .filter(|file| file.is_file());
         let Some(file) = file else { return Ok(None) };
         // Accept keys of other labelgs versions: they must not make a model unreadable.
         let text = files::read::text(&file)?;

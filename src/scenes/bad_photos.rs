@@ -1,7 +1,7 @@
 //! Undecodable photos: a training can skip a few; many mean a damaged data set.
 
 use super::LoadOptions;
-use labelgs_files::all::listed;
+use labelgs_files::error_list::listed;
 use labelgs_scene::{Error, Result, Setting};
 use std::path::Path;
 

@@ -108,7 +108,7 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
 /// Reads the views in the `cameras.json` of the run that a model belongs to, of any 3DGS trainer, without photos. Returns none
 /// if there is no such file.
 pub fn views_of_model(model: &Path) -> Result<Vec<View>> {
-    let path = run_folder::of_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
+    let path = run_folder::find_for_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
     let Some(path) = path else { return Ok(Vec::new()) };
     let expected = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
                     to go on without";

@@ -5,7 +5,7 @@
 use super::lookup::Lookup;
 use super::resample::resample_nearest;
 use super::window::{Window, windows};
-use labelgs_files::depth_file::{EXTENSIONS, read_depth};
+use labelgs_files::depth_file::{DEPTH_EXTENSIONS, read_depth};
 use labelgs_files::names::shortened;
 use labelgs_files::photo_files::PhotoFiles;
 use labelgs_files::resize::aspect_problem;
@@ -27,7 +27,7 @@ impl DepthFolder {
         }
         let windows = windows(scene, lookup)?;
         let photos: BTreeSet<&str> = windows.values().map(|window| window.photo.as_str()).collect();
-        let files = PhotoFiles::new(folder, &photos.into_iter().collect::<Vec<_>>(), &EXTENSIONS)?;
+        let files = PhotoFiles::new(folder, &photos.into_iter().collect::<Vec<_>>(), &DEPTH_EXTENSIONS)?;
         Ok(Self { files, windows })
     }
 
@@ -43,7 +43,7 @@ impl DepthFolder {
             without.len(),
             views.len(),
             shortened(&without),
-            EXTENSIONS.join(", .")
+            DEPTH_EXTENSIONS.join(", .")
         );
         Err(Error::data(&self.files.folder, "", problem))
     }

@@ -6,7 +6,7 @@ use super::lookup::Lookup;
 use super::photo_finder::count_photos;
 use super::split::Split;
 use super::{colmap, llff, metashape, transforms};
-use labelgs_files::kind::{self, Content};
+use labelgs_files::content::{self, Content};
 use labelgs_files::names::shortened;
 use labelgs_scene::words::counted;
 use labelgs_scene::{Error, Flaw, Result, Setting};
@@ -55,7 +55,7 @@ fn list_file(place: &Place, scene: &Path) -> Result<Listing> {
     match extension.as_deref() {
         Some("npy") => llff::list_file(place, scene),
         Some("xml") => metashape::list_file(place, scene),
-        _ => match kind::of_file(scene)? {
+        _ => match content::identify_file(scene)? {
             Some(content) => Err(Error::data(scene, "", no_scene(content))),
             None => transforms::list_file(place, scene),
         },

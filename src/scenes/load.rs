@@ -4,7 +4,7 @@ use super::listing::{Listed, Listing};
 use super::photo_store::PhotoStore;
 use super::recipe::{MadeView, MadeViews, Recipe};
 use super::{LoadOptions, bad_photos, frame_check, init, mask_notes, missing, stray};
-use labelgs_files::all::all_or_one_error;
+use labelgs_files::error_list::all_or_one_error;
 use labelgs_files::names::shortened;
 use labelgs_files::photo_files::PhotoFiles;
 use labelgs_masks::mask_folder::masks_of_photos;

@@ -6,7 +6,7 @@
 
 use super::LoadOptions;
 use super::recipe::{MadeView, Recipe};
-use labelgs_files::scratch::{Place, Scratch};
+use labelgs_files::scratch::{Scratch, ScratchOffset};
 use labelgs_scene::pixels::{Picture, Source};
 use labelgs_scene::{Error, LabelMap, Photo, Pixels, Result, Setting, View};
 use std::marker::PhantomData;
@@ -191,7 +191,7 @@ struct Waiting<T> {
     files: Arc<Files>,
     origin: Origin,
     /// Place in the temporary file, if it took them.
-    place: Option<Place>,
+    place: Option<ScratchOffset>,
     size: (u32, u32),
     crc: u32,
     kind: PhantomData<T>,
@@ -212,7 +212,7 @@ impl<T: Kept> Source<T> for Waiting<T> {
 
 impl<T: Kept> Waiting<T> {
     /// Reads the temporary file. A disk that returns other bytes than it got costs time, not bits.
-    fn read(&self, place: Place) -> Option<T> {
+    fn read(&self, place: ScratchOffset) -> Option<T> {
         let scratch = self.files.scratch.as_ref()?;
         let found = T::filled(self.size, |bytes| scratch.read(place, bytes));
         let problem = match found {
@@ -220,7 +220,7 @@ impl<T: Kept> Waiting<T> {
             Ok(_) => "has other bytes than were written".to_owned(),
             Err(error) => format!("cannot be read: {error}"),
         };
-        if !scratch.is_given_up() && !self.files.was_damaged.swap(true, Relaxed) {
+        if !scratch.has_failed() && !self.files.was_damaged.swap(true, Relaxed) {
             tracing::warn!("the temporary file of photos {problem}; such photos are decoded again");
         }
         None

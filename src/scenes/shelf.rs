@@ -1,7 +1,7 @@
 //! Arrays of one kind for all views, such as depth maps, within a budget of memory.
 
 use super::PHOTO_MEMORY;
-use labelgs_files::scratch::{Place, Scratch, system_folder};
+use labelgs_files::scratch::{Scratch, ScratchOffset, system_folder};
 use labelgs_scene::pixels::Source;
 use labelgs_scene::{Error, Pixels, Result};
 use std::sync::Arc;
@@ -49,7 +49,7 @@ impl Shelf {
 #[derive(Debug)]
 struct Waiting {
     scratch: Arc<Scratch>,
-    place: Place,
+    place: ScratchOffset,
     count: usize,
 }
 

@@ -69,7 +69,7 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         }
         after_view(index as u32 + 1)?;
     }
-    table.write(&folder.join("masks").join(label_table::FILE))?;
+    table.write(&folder.join("masks").join(label_table::FILE_NAME))?;
     Ok(Summary { scene: folder.to_owned(), views: options.views, points: seen.len(), objects: table.labels })
 }
 

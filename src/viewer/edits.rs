@@ -46,7 +46,7 @@ impl<'a> Work<'a> {
     /// Starts with a model. Files go to the folder `edits` of its run, or to one beside it.
     pub(super) fn new(typed: &Path, model: Gaussians, table: Option<LabelTable>, words: &'a dyn Words) -> Self {
         let stem = typed.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let folder = match run_folder::of_model(typed) {
+        let folder = match run_folder::find_for_model(typed) {
             Some(_) if typed.is_dir() => typed.join("edits"),
             Some(run) => run.join("edits"),
             None => typed.with_file_name(format!("{stem}-edits")),

@@ -68,7 +68,7 @@ fn model(folder: &Path) -> PathBuf {
     let path = folder.join("model.ply");
     let places = [0.0, 1.0, 1.2, 3.0, 3.2, 9.0].map(|x| [x, 0.0, 0.0]);
     balls(&path, &places, &[0, 1, 1, 3, 3, 3]);
-    table().write(&LabelTable::beside(&path)).expect("written");
+    table().write(&LabelTable::path_beside(&path)).expect("written");
     path
 }
 
@@ -114,7 +114,7 @@ fn names_choose_labels_and_go_with_them() {
     assert_eq!(names(&beside), [(3, "ladle".to_owned())]);
 
     // Writing a model without names removes the names of an earlier model.
-    std::fs::remove_file(LabelTable::beside(&model)).expect("removed");
+    std::fs::remove_file(LabelTable::path_beside(&model)).expect("removed");
     succeeds(&["extract", text(&model), "--labels", "1", "-o", text(&out)]);
     assert!(!beside.exists());
 }
@@ -182,15 +182,15 @@ fn the_near_plane_is_that_of_the_run() {
     let ply = run.join("point_cloud/iteration_5/point_cloud.ply");
     balls(&ply, &[[0.0; 3]], &[1]);
     assert_eq!(near_plane(&run, None).expect("default"), 0.2);
-    std::fs::write(run.join(run_folder::CONFIG), "near = 0.01\nsome_later_field = 3\n").expect("file");
+    std::fs::write(run.join(run_folder::CONFIG_FILE), "near = 0.01\nsome_later_field = 3\n").expect("file");
     assert_eq!(near_plane(&run, None).expect("of the run"), 0.01);
     assert_eq!(near_plane(&ply, None).expect("of the run"), 0.01);
     assert_eq!(near_plane(&ply, Some(0.5)).expect("typed"), 0.5);
     let bare = folder.path().join("bare.ply");
     balls(&bare, &[[0.0; 3]], &[1]);
     assert_eq!(near_plane(&bare, None).expect("default"), 0.2);
-    assert_eq!(run_folder::of_model(&run.join("a/b/c.ply")), None, "only models of steps are in a run");
-    std::fs::write(run.join(run_folder::CONFIG), "near = -1\n").expect("file");
+    assert_eq!(run_folder::find_for_model(&run.join("a/b/c.ply")), None, "only models of steps are in a run");
+    std::fs::write(run.join(run_folder::CONFIG_FILE), "near = -1\n").expect("file");
     let error = near_plane(&run, None).expect_err("negative");
     assert!(exit_status(&error) == 3 && error.to_string().contains("near"), "{error}");
 }
@@ -225,7 +225,7 @@ fn places_in_views_choose_labels() {
         succeeds(&[&args[..], choice].concat())["labels"].clone()
     };
     assert_eq!(extract(&["--at", &at(0, 0)]), json!([1]));
-    assert_eq!(names(&LabelTable::beside(&out)), [(1, "cup".to_owned())]);
+    assert_eq!(names(&LabelTable::path_beside(&out)), [(1, "cup".to_owned())]);
     assert_eq!(extract(&["--at", &at(1, 2), "--at", &at(3, 1), "--name", "cup"]), json!([1, 3, 4]));
     assert_eq!(extract(&["--labels", "1,3", "--at", &at(1, 2), "--not-at", &at(2, 1)]), json!([1, 4]));
     let (x, y) = pixel(0, 2);
@@ -250,7 +250,7 @@ fn places_in_views_choose_labels() {
     assert!(refused(&[&render[..], &["--at", &at(0, 2)]].concat()).contains("--without is needed"));
 
     // The near plane of the run is behind the scene: nothing is drawn, unless `--near` overrides it.
-    std::fs::write(run.join(run_folder::CONFIG), "near = 50.0\n").expect("file");
+    std::fs::write(run.join(run_folder::CONFIG_FILE), "near = 50.0\n").expect("file");
     succeeds(&render);
     assert_eq!(map(), Vec::<u16>::new());
     succeeds(&[&render[..], &["--near", "0.1"]].concat());
@@ -278,12 +278,12 @@ fn a_model_is_converted_by_the_ending() {
         assert_eq!((&result["gaussians"], &result["of"], &result["labels"]), (&6.into(), &6.into(), &json!([1, 3])));
         // The names are in the file itself, unless it is a PLY.
         if !name.ends_with(".ply") {
-            std::fs::remove_file(LabelTable::beside(Path::new(&at(name)))).expect("removed");
+            std::fs::remove_file(LabelTable::path_beside(Path::new(&at(name)))).expect("removed");
         }
         let part = at(&format!("part.{name}"));
         succeeds(&["extract", &at(name), "--labels", "spoon", "-o", &part]);
         assert_eq!(labels_of(Path::new(&part)), [3, 3, 3], "{name}");
-        assert_eq!(LabelTable::read(&LabelTable::beside(Path::new(&part))).expect("names").labels.len(), 1);
+        assert_eq!(LabelTable::read(&LabelTable::path_beside(Path::new(&part))).expect("names").labels.len(), 1);
     }
     let other = ["convert", &at("model.ply"), &at("v4.spz"), "--spz-version", "4", "--label-type", "none"];
     succeeds(&other);
@@ -318,7 +318,7 @@ fn models_are_cleaned_and_transformed_with_their_names() {
     let to = out.display().to_string();
     let result = succeeds(&["clean", &source, "--inside", "-0.5,-1,-1,3.1,1,1", "-o", &to]);
     assert_eq!((&result["dropped"]["outside"], labels_of(&out)), (&2.into(), vec![0, 1, 1, 3]));
-    let names = || LabelTable::read(&LabelTable::beside(&out)).expect("names");
+    let names = || LabelTable::read(&LabelTable::path_beside(&out)).expect("names");
     assert_eq!(names(), table());
     let result = succeeds(&["transform", &source, "--up", "-x", "--scale", "2", "--origin", "1,0,0", "-o", &to]);
     assert_eq!((&result["scale"], names()), (&2.0.into(), table()));

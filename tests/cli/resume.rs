@@ -381,7 +381,7 @@ fn a_deleted_folder_may_be_the_folder_of_another_run() {
     };
     let output = child.wait_with_output().expect("a child");
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
-    assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("another labelgs process trains into this folder"), "{}", stderr(&output));
     let foreign = files(&out).into_iter().filter(|path| !path.ends_with(".labelgs-lock"));
     let foreign: Vec<PathBuf> = foreign.collect();
     assert!(foreign.len() <= 1 && place.checkpoints("out").len() == foreign.len(), "{foreign:?}");

@@ -124,7 +124,7 @@ fn a_misspelt_object_is_answered_with_the_nearest_names() {
     };
     let table =
         LabelTable::new((1..=200).map(|id| LabelEntry { name: Some(name(id)), ..LabelEntry::new(id) }).collect());
-    table.write(&LabelTable::beside(&path)).expect("written");
+    table.write(&LabelTable::path_beside(&path)).expect("written");
     let out = folder.path().join("out.ply");
     for (typed, expected) in [
         ("barell", "no label is named barell; did you mean barrel? (labelgs list "),

@@ -142,7 +142,7 @@ fn a_disk_that_fails_costs_no_bit() {
     {
         let text = succeeded(&place.trained_with(Some(fault), fault, &few));
         assert!(text.contains("a fault on purpose"), "{fault}: {text}");
-        assert_eq!(text.contains("no space for what does not fit into memory"), is_told, "{fault}: {text}");
+        assert_eq!(text.contains("no space for data that does not fit into memory"), is_told, "{fault}: {text}");
         assert!(place.model(fault, 8) == place.model("whole", 8), "{fault}: the models differ");
     }
     // Reads after the scene was opened are those of the temporary file and of compiled pipelines.

@@ -77,7 +77,7 @@ impl EditArgs {
         options.first_view = options.first_view.map(|view| moved.map_or(view, |by| view.moved(&by)));
         let left_out = export_model(&self.output, model, table.as_ref(), options)?;
         let written = model.len() as u64 - left_out;
-        let beside = LabelTable::beside(&self.output);
+        let beside = LabelTable::path_beside(&self.output);
         let output = self.output.display();
         let mut result = json!({
             "schema_version": 1,

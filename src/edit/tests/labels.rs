@@ -182,8 +182,8 @@ fn a_name_is_given_once() {
     let known = Catalogue::new(&model, None);
     let made = give_name(&known, None, 4, "cup").expect("named");
     assert_eq!(named(&made), [(4, Some("cup"), 0, 0)]);
-    assert_eq!(give_name(&known, Some(table()), 4, "tray").expect("named").by_name("tray"), Some(4));
-    assert_eq!(give_name(&known, Some(table()), 2, "tray").expect("renamed").by_name("saucer"), None);
+    assert_eq!(give_name(&known, Some(table()), 4, "tray").expect("named").id_of("tray"), Some(4));
+    assert_eq!(give_name(&known, Some(table()), 2, "tray").expect("renamed").id_of("saucer"), None);
     assert!(give_name(&known, Some(table()), 4, "cup").expect_err("taken").to_string().contains("label 1"));
 }
 

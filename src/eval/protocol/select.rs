@@ -48,7 +48,7 @@ fn no_view(frame: &str) -> Choice {
 
 /// Chooses by name in the label table, or by id.
 fn select_by_name(object: &str, bench: &Bench) -> Choice {
-    let named = bench.names.and_then(|names| names.by_name(object));
+    let named = bench.names.and_then(|names| names.id_of(object));
     let Some(id) = named.or_else(|| object.parse().ok()) else {
         return Choice::Missing(format!("labels.json has no label called {object}"));
     };

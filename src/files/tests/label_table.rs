@@ -1,6 +1,6 @@
 //! labels.json: round trips, and invalid tables refused.
 
-use labelgs_files::label_table::FILE;
+use labelgs_files::label_table::FILE_NAME;
 use labelgs_files::{LabelEntry, LabelTable};
 use std::fs;
 
@@ -13,13 +13,13 @@ fn table() -> LabelTable {
 #[test]
 fn a_table_comes_back_sorted_and_is_found_by_name() {
     let folder = tempfile::tempdir().expect("folder");
-    let path = folder.path().join(FILE);
+    let path = folder.path().join(FILE_NAME);
     table().write(&path).expect("written");
     let read = LabelTable::read(&path).expect("read");
     assert_eq!(read, table());
     assert_eq!(read.labels.iter().map(|entry| entry.id).collect::<Vec<_>>(), [1, 2]);
-    assert_eq!(read.by_name("cup"), Some(2));
-    assert_eq!(read.by_name("saucer"), None);
+    assert_eq!(read.id_of("cup"), Some(2));
+    assert_eq!(read.id_of("saucer"), None);
     assert_eq!(read.entry(2).and_then(|entry| entry.source.as_deref()), Some("17"));
 }
 
@@ -30,17 +30,17 @@ fn a_models_table_is_beside_it_or_in_the_folder_of_its_run() {
     fs::create_dir_all(ply.parent().expect("folder")).expect("folder");
     fs::write(&ply, "").expect("file");
     assert_eq!(LabelTable::find_for_model(&ply), None);
-    table().write(&folder.path().join(FILE)).expect("written");
-    assert_eq!(LabelTable::find_for_model(&ply), Some(folder.path().join(FILE)));
-    assert_eq!(LabelTable::find_for_model(folder.path()), Some(folder.path().join(FILE)));
-    table().write(&LabelTable::beside(&ply)).expect("written");
+    table().write(&folder.path().join(FILE_NAME)).expect("written");
+    assert_eq!(LabelTable::find_for_model(&ply), Some(folder.path().join(FILE_NAME)));
+    assert_eq!(LabelTable::find_for_model(folder.path()), Some(folder.path().join(FILE_NAME)));
+    table().write(&LabelTable::path_beside(&ply)).expect("written");
     assert_eq!(LabelTable::find_for_model(&ply), Some(ply.with_file_name("point_cloud.labels.json")));
 }
 
 #[test]
 fn an_invalid_table_is_refused_with_its_place() {
     let folder = tempfile::tempdir().expect("folder");
-    let path = folder.path().join(FILE);
+    let path = folder.path().join(FILE_NAME);
     let entry = |id: u32, name: &str| format!(r#"{{"id": {id}, "name": "{name}", "colour": [1, 2, 3]}}"#);
     let cases = [
         (1, vec![entry(0, "a")], "labels are from 1"),
@@ -53,7 +53,7 @@ fn an_invalid_table_is_refused_with_its_place() {
         let text = format!(r#"{{"schema_version": {version}, "labels": [{}]}}"#, entries.join(","));
         fs::write(&path, text).expect("written");
         let message = LabelTable::read(&path).expect_err("refused").to_string();
-        assert!(message.contains(expected) && message.contains(FILE), "{message}");
+        assert!(message.contains(expected) && message.contains(FILE_NAME), "{message}");
     }
     fs::write(&path, "{\"labels\": 3}").expect("written");
     assert!(LabelTable::read(&path).expect_err("refused").to_string().contains("line 1"));
@@ -62,10 +62,10 @@ fn an_invalid_table_is_refused_with_its_place() {
 #[test]
 fn a_table_by_hand_needs_ids_and_names_only() {
     let folder = tempfile::tempdir().expect("folder");
-    let path = folder.path().join(FILE);
+    let path = folder.path().join(FILE_NAME);
     fs::write(&path, r#"{"labels": [{"id": 3, "name": "cup"}, {"id": 1, "color": [1, 2, 3], "score": 0.5}]}"#)
         .expect("ok");
-    let table = LabelTable::of_folder(folder.path()).expect("read").expect("a table");
+    let table = LabelTable::read_in_folder(folder.path()).expect("read").expect("a table");
     assert_eq!(table.name(3), Some("cup"));
     let colour = |id| table.entry(id).expect("an entry").colour;
     assert_eq!((colour(3), colour(1)), (LabelEntry::new(3).colour, [1, 2, 3]));

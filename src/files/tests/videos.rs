@@ -10,11 +10,11 @@ use std::process::Command;
 use std::{env, fs};
 
 /// The folder of the child's encoder.
-const CHILD: &str = "LABELGS_TEST_VIDEO";
+const CHILD_VARIABLE: &str = "LABELGS_TEST_VIDEO";
 
 /// The search path belongs to a whole process, so each test runs once more in a process of its own. Returns the folder there.
 fn with_encoder(test: &str, script: Option<&str>) -> Option<PathBuf> {
-    if let Some(folder) = env::var_os(CHILD) {
+    if let Some(folder) = env::var_os(CHILD_VARIABLE) {
         return Some(folder.into());
     }
     let scene = Scene::new();
@@ -25,7 +25,7 @@ fn with_encoder(test: &str, script: Option<&str>) -> Option<PathBuf> {
         path += ":/usr/bin:/bin";
     }
     let mut child = Command::new(env::current_exe().expect("this test"));
-    child.args(["--exact", &format!("videos::{test}")]).env("PATH", path).env(CHILD, scene.path());
+    child.args(["--exact", &format!("videos::{test}")]).env("PATH", path).env(CHILD_VARIABLE, scene.path());
     let output = child.output().expect("it runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     None
@@ -76,7 +76,7 @@ fn a_missing_encoder_is_named() {
     let Some(folder) = with_encoder("a_missing_encoder_is_named", None) else { return };
     let file = folder.join("clip.mp4");
     let write = || video::write(&file, (2, 2), 30.0, |_| panic!("no frame is drawn for nobody"));
-    for error in [video::encoder(&file).map(drop), write()].map(|done| done.expect_err("no encoder").to_string()) {
+    for error in [video::find_encoder(&file).map(drop), write()].map(|done| done.expect_err("no encoder").to_string()) {
         assert!(error.contains("apt-get install ffmpeg") && error.contains("name a folder"), "{error}");
     }
 }

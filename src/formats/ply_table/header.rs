@@ -1,6 +1,6 @@
 //! The header of a PLY file, and where values lie in a binary row.
 
-use labelgs_files::kind::name_of_content;
+use labelgs_files::content::identify;
 use labelgs_scene::{Error, Result};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarType};
@@ -20,7 +20,7 @@ pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<(Heade
 
 /// Reads the header including the `end_header` line, at most [`HEADER_MAX`] bytes.
 fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
-    let content = name_of_content(file.fill_buf().map_err(Error::read(path))?);
+    let content = identify(file.fill_buf().map_err(Error::read(path))?);
     let mut text = Vec::new();
     let mut limited = file.take(HEADER_MAX);
     loop {
@@ -33,7 +33,7 @@ fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
                 return Err(Error::data(path, "header", problem));
             }
             let unknown = || "does not start with `ply`; this is not a PLY file".to_owned();
-            return Err(Error::data(path, "byte 0", content.map_or_else(unknown, |content| content.told("a PLY"))));
+            return Err(Error::data(path, "byte 0", content.map_or_else(unknown, |content| content.mismatch("a PLY"))));
         }
         if line == b"end_header" && text.ends_with(b"\n") {
             return Ok(text);

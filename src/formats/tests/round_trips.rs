@@ -78,7 +78,7 @@ fn round_trips_stay_within_the_steps_and_keep_labels_and_names() {
         export_model(scene.at(file), &model(9, 0, true), Some(&names()), none).expect("written");
         let read = read_model(scene.at(file)).expect("read");
         assert_eq!((read.gaussians.labels, read.names), (None, None), "{file}");
-        assert!(!LabelTable::beside(&scene.at(file)).exists());
+        assert!(!LabelTable::path_beside(&scene.at(file)).exists());
         // A second write has the same bytes.
         let write = || {
             export_model(scene.at(file), &model(300, 2, true), Some(&names()), options).expect("written");

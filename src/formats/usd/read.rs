@@ -13,7 +13,7 @@ use crate::rows::{Row, Rows};
 use crate::transform::Transform;
 use crate::values::{log_scale, logit};
 use glam::{DMat4, DVec3};
-use labelgs_files::kind::name_of_content;
+use labelgs_files::content::identify;
 use labelgs_files::label_table::{LabelEntry, LabelTable, unique_name};
 use labelgs_files::read as file;
 use labelgs_scene::harmonics::coefficients;
@@ -40,10 +40,10 @@ pub(super) fn read_package(path: &Path) -> Result<ReadModel> {
         return Err(Error::data(path, "archive", "has no layer (.usda, .usd, .usdc); this is no USDZ file"));
     };
     let mut layer = archive.file(&name)?;
-    file::without_mark(path, &mut layer)?;
-    let known = name_of_content(&layer).filter(|content| !super::TEXT.contents.contains(&content.what));
+    file::strip_byte_order_mark(path, &mut layer)?;
+    let known = identify(&layer).filter(|content| !super::TEXT.contents.contains(&content.what));
     if let Some(content) = known {
-        return Err(Error::data(path, &name, content.told("a layer of text")));
+        return Err(Error::data(path, &name, content.mismatch("a layer of text")));
     }
     let text = String::from_utf8(layer)
         .map_err(|_| Error::data(path, &name, "is not UTF-8 text; save it as text first, as with usdcat"))?;

@@ -3,7 +3,7 @@
 use super::fixtures::*;
 use super::forms::*;
 use labelgs_files::LabelTable;
-use labelgs_files::label_table::FILE;
+use labelgs_files::label_table::FILE_NAME;
 use labelgs_masks::{Format, ImportOptions, Imported, Overlap, import, read_mask};
 use labelgs_scene::{Dataset, Error};
 use labelgs_scenes::{self as scenes, LoadOptions};
@@ -37,7 +37,7 @@ pub fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
             truth(photo).into_iter().map(|id| if id == 0 { 0 } else { ids[usize::from(id) - 1] }).collect();
         assert_eq!(read_mask(masks.join(format!("{}.png", name(photo)))).expect("a mask").ids, expected, "{photo}");
     }
-    let table = LabelTable::read(&masks.join(FILE)).expect("a table");
+    let table = LabelTable::read(&masks.join(FILE_NAME)).expect("a table");
     assert_eq!(table.labels, done.labels);
     let pixels = |object: u16| (0..PHOTOS).flat_map(truth).filter(|&id| id == object).count() as u64;
     for object in 1..=3 {

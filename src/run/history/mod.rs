@@ -11,7 +11,7 @@ pub(crate) use entry::{Entry, Steps, Sums, ViewScore};
 pub(crate) use read::read;
 
 use crate::error::{Error, Result};
-use crate::files::append::Lines;
+use crate::files::append::LineFile;
 use crate::train::{DensifyCounts, StepReport, Trainer};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub(crate) const STEPS_PER_LINE: u32 = 10;
 pub(super) struct Recorder {
     path: PathBuf,
     /// `None` if the file could not be opened.
-    lines: Option<Lines>,
+    lines: Option<LineFile>,
     sums: Sums,
     /// Lines whose step reports are still missing.
     due: VecDeque<Steps>,
@@ -55,7 +55,7 @@ impl Recorder {
             has_warned: false,
             path,
         };
-        match Lines::open(&recorder.path, bytes) {
+        match LineFile::open(&recorder.path, bytes) {
             Ok(lines) => recorder.lines = Some(lines),
             Err(error) => recorder.warn(&error),
         }
@@ -127,7 +127,7 @@ impl Recorder {
 
     /// Waits until all lines are on disk; call it before a checkpoint, which must not be ahead of the history.
     pub(super) fn sync(&mut self) {
-        self.write(Lines::sync);
+        self.write(LineFile::sync);
     }
 
     /// Returns the training time so far, including earlier parts of an interrupted run, s.
@@ -135,7 +135,7 @@ impl Recorder {
         self.before + self.start.elapsed().as_secs_f64()
     }
 
-    fn write(&mut self, what: impl FnOnce(&mut Lines) -> Result<()>) {
+    fn write(&mut self, what: impl FnOnce(&mut LineFile) -> Result<()>) {
         let Some(lines) = &mut self.lines else { return };
         if let Err(error) = what(lines) {
             self.warn(&error);

@@ -67,7 +67,7 @@ impl ReportedRun {
             return Err(Error::data(folder, "", "is not a folder; name the output folder of a run"));
         }
         let Some(settings) = Settings::for_model(folder)? else {
-            let problem = format!("has no {}; name the output folder of a run", run_folder::CONFIG);
+            let problem = format!("has no {}; name the output folder of a run", run_folder::CONFIG_FILE);
             return Err(Error::data(folder, "", problem));
         };
         let path = folder.join(history::HISTORY_FILE);

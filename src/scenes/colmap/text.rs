@@ -17,7 +17,7 @@ fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
         let place = || format!("line {}", index + 1);
         let mut line = line.map_err(Error::read(&path))?;
         if index == 0 {
-            read::without_mark(&path, &mut line)?;
+            read::strip_byte_order_mark(&path, &mut line)?;
         }
         let text = String::from_utf8(line);
         let text = text.map_err(|_| {

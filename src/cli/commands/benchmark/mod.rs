@@ -134,7 +134,7 @@ fn read_names(args: &BenchmarkArgs, layout: &Layout) -> Result<Option<LabelTable
     let named: Vec<&str> =
         layout.tasks.iter().filter(|task| task.prompt == Prompt::Name).map(|task| task.object.as_str()).collect();
     let known =
-        |name: &&str| name.parse::<u32>().is_ok() || names.as_ref().is_some_and(|names| names.by_name(name).is_some());
+        |name: &&str| name.parse::<u32>().is_ok() || names.as_ref().is_some_and(|names| names.id_of(name).is_some());
     if named.is_empty() || named.iter().any(known) {
         return Ok(names);
     }

@@ -42,7 +42,7 @@ pub(crate) fn run(args: &EvalArgs, context: &Context) -> Result<()> {
 fn names(args: &EvalArgs) -> Result<Option<LabelTable>> {
     let own = models::open_lazily(&args.model)?.names().cloned();
     let of_model = TableArg::default().open(&args.model, own)?;
-    let of_masks = || args.masks.as_deref().map_or(Ok(None), LabelTable::of_folder);
+    let of_masks = || args.masks.as_deref().map_or(Ok(None), LabelTable::read_in_folder);
     if of_model.is_some() { Ok(of_model) } else { of_masks() }
 }
 

@@ -112,7 +112,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         dataset.train.retain(|view| view.mask.is_some());
     }
     let names = match masks.ids(args.per_view) {
-        Ids::Shared => LabelTable::of_folder(folder)?,
+        Ids::Shared => LabelTable::read_in_folder(folder)?,
         ids => Some(make_agree(folder, near, &gpu, &model, (&mut dataset.train, ids))?),
     };
     let views: Vec<&View> = dataset.train.iter().collect();

@@ -5,7 +5,7 @@ use crate::cli::support::nested_masks::{MaskFolders, choose_objects};
 use crate::cli::support::parsers::near;
 use crate::cli::support::{Context, Progress, SceneArgs, near_plane, open_gpu, open_model, open_scene, warn_of_misfit};
 use crate::files::atomic;
-use crate::files::label_table::{FILE, LabelEntry, LabelTable};
+use crate::files::label_table::{FILE_NAME, LabelEntry, LabelTable};
 use crate::label::masks::agree::{Agreement, OBJECT_VIEWS_MIN, agree, follow};
 use crate::label::masks::names::carried;
 use crate::label::masks::repair::Repairs;
@@ -110,7 +110,7 @@ pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Va
             write_mask(&args.output.join(file), &mask)?;
         }
     }
-    table.write(&args.output.join(FILE))?;
+    table.write(&args.output.join(FILE_NAME))?;
     Ok(report(&all, &masks, &repairs, args))
 }
 
@@ -123,7 +123,7 @@ pub(in crate::cli) fn table(
     masks: &[Option<LabelMap>],
 ) -> Result<LabelTable> {
     let mut entries: BTreeMap<u16, LabelEntry> = BTreeMap::new();
-    let known = LabelTable::of_folder(folder)?;
+    let known = LabelTable::read_in_folder(folder)?;
     let names = match &known {
         Some(known) if per_view => {
             let mut pairs = Vec::new();

@@ -157,7 +157,7 @@ fn check_video(args: &RenderArgs, shots: &Shots) -> Result<()> {
     if args.format == Format::Exr {
         return Err(Error::usage("--format", "a video has 8-bit colours; name a folder in -o for exr"));
     }
-    video::encoder(&args.output).map(drop)
+    video::find_encoder(&args.output).map(drop)
 }
 
 /// Draws the views into files, and returns these.

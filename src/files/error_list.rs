@@ -1,9 +1,9 @@
-//! One error for many files.
+//! Combines the errors of many files into one.
 
 use labelgs_scene::{Error, Result};
 use std::path::Path;
 
-/// Most errors that one message lists.
+/// Most errors listed in one message.
 const LISTED_MAX: usize = 20;
 
 /// Returns the loaded views, or one error that lists all failures.
@@ -18,7 +18,7 @@ pub fn all_or_one_error<T>(root: &Path, loaded: Vec<Result<T>>) -> Result<Vec<T>
     }
 }
 
-/// Returns errors for the end of a message, a line each.
+/// Formats errors for the end of a message, one per line.
 pub fn listed(errors: &[Error]) -> String {
     let lines: String = errors.iter().take(LISTED_MAX).map(|error| format!("\n  {error}")).collect();
     let more = errors.len().saturating_sub(LISTED_MAX);
