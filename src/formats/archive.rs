@@ -1,4 +1,4 @@
-//! Archives of files that are stored as they are, as SOG and USDZ have them.
+//! Archives of uncompressed files, as in SOG and USDZ.
 
 use labelgs_scene::{Error, Result};
 use std::io::{self, Cursor, Read, Write};
@@ -16,7 +16,11 @@ impl<'a> Archive<'a> {
     /// Opens the archive in `bytes`; `format` is its name in errors.
     pub(super) fn open(path: &'a Path, bytes: &'a [u8], format: &str) -> Result<Self> {
         let zip = ZipArchive::new(Cursor::new(bytes)).map_err(|error| {
-            Error::data(path, "end of the archive", format!("{error}; this is no {format} file, or it was cut short"))
+            Error::data(
+                path,
+                "end of the archive",
+                format!("{error}; this is not a {format} file, or it was cut short"),
+            )
         })?;
         Ok(Self { path, zip, length: bytes.len() as u64 })
     }
@@ -26,7 +30,7 @@ impl<'a> Archive<'a> {
         self.path
     }
 
-    /// Returns the names of all entries in their order.
+    /// Returns the names of all entries in order.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         (0..self.zip.len()).filter_map(|index| self.zip.name_for_index(index))
     }
@@ -36,13 +40,13 @@ impl<'a> Archive<'a> {
         let bad = |problem: String| Error::data(self.path, name, format!("{problem}; export the file again"));
         let entry = self.zip.by_name(name).map_err(|error| bad(format!("cannot be found in the archive: {error}")))?;
         let mut bytes = Vec::new();
-        // Entries are stored as they are.
+        // Entries are stored uncompressed.
         entry.take(self.length).read_to_end(&mut bytes).map_err(|error| bad(format!("cannot be unpacked: {error}")))?;
         Ok(bytes)
     }
 }
 
-/// Packs files into an archive, stored as they are, with a fixed date. Each begins at a multiple of `alignment` bytes.
+/// Packs uncompressed files into an archive with a fixed date. Each starts at a multiple of `alignment` bytes.
 pub(super) fn pack(files: Vec<(String, Vec<u8>)>, alignment: u16) -> io::Result<Vec<u8>> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     let stored = SimpleFileOptions::default()

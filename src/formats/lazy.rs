@@ -1,4 +1,4 @@
-//! A model of which only a part may be in memory.
+//! A model that need not be entirely in memory.
 
 use super::{FirstView, ReadModel, Row, StoredModel, open_stored, read_model};
 use glam::DVec3;
@@ -7,12 +7,12 @@ use labelgs_scene::{Gaussians, Result};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// A model in its file, or one that was read whole because of its format.
+/// A model in its file, or in memory if its format requires reading it whole.
 #[derive(Clone, Debug)]
 pub enum LazyModel {
     /// In its file.
     Stored(StoredModel),
-    /// Read.
+    /// In memory.
     Whole(ReadModel),
 }
 
@@ -25,7 +25,7 @@ impl LazyModel {
         }
     }
 
-    /// Names of the labels, if the file holds them.
+    /// Returns the names of the labels, if the file contains them.
     pub fn names(&self) -> Option<&LabelTable> {
         match self {
             Self::Stored(_) => None,
@@ -33,7 +33,7 @@ impl LazyModel {
         }
     }
 
-    /// Where to see the model from at first, if the file says it.
+    /// Returns the initial view, if the file has one.
     pub fn first_view(&self) -> Option<FirstView> {
         match self {
             Self::Stored(stored) => stored.first_view,
@@ -41,7 +41,7 @@ impl LazyModel {
         }
     }
 
-    /// The model, to be seen row by row.
+    /// Returns access to the model row by row.
     pub fn view(&self) -> ModelRef<'_> {
         match self {
             Self::Stored(stored) => ModelRef::Stored(stored),
@@ -50,8 +50,7 @@ impl LazyModel {
     }
 }
 
-/// A model in its file or in memory, whose rows are seen one after the other. Rows have numbers, with gaps where a row of a
-/// file cannot be rendered.
+/// A model in its file or in memory, read row by row. Row numbers have gaps where a row of a file cannot be rendered.
 #[derive(Clone, Copy, Debug)]
 pub enum ModelRef<'a> {
     /// In its file.
@@ -67,7 +66,7 @@ impl<'a> From<&'a Gaussians> for ModelRef<'a> {
 }
 
 impl<'a> ModelRef<'a> {
-    /// Reads all of it.
+    /// Reads the whole model.
     pub fn read(self) -> Result<Cow<'a, Gaussians>> {
         match self {
             Self::Stored(stored) => Ok(Cow::Owned(read_model(&stored.path)?.gaussians)),
@@ -75,7 +74,7 @@ impl<'a> ModelRef<'a> {
         }
     }
 
-    /// Number of rows; of a file, those included that cannot be rendered.
+    /// Returns the number of rows; for a file, including those that cannot be rendered.
     pub fn count(self) -> u64 {
         match self {
             Self::Stored(stored) => stored.count,
@@ -83,7 +82,7 @@ impl<'a> ModelRef<'a> {
         }
     }
 
-    /// Degree of the spherical harmonics.
+    /// Returns the degree of the spherical harmonics.
     pub fn sh_degree(self) -> u32 {
         match self {
             Self::Stored(stored) => stored.sh_degree,
@@ -91,7 +90,7 @@ impl<'a> ModelRef<'a> {
         }
     }
 
-    /// Returns true if Gaussians have labels.
+    /// Returns true if the Gaussians have labels.
     pub fn has_labels(self) -> bool {
         match self {
             Self::Stored(stored) => stored.has_labels,
@@ -99,7 +98,7 @@ impl<'a> ModelRef<'a> {
         }
     }
 
-    /// World position to which positions are relative.
+    /// Returns the world position of (0, 0, 0).
     pub fn origin(self) -> DVec3 {
         match self {
             Self::Stored(stored) => stored.origin,
@@ -107,7 +106,7 @@ impl<'a> ModelRef<'a> {
         }
     }
 
-    /// Calls `see` with number and values of each row that can be rendered, in order. Returns notes for the user.
+    /// Calls `see` with the number and values of each renderable row, in order. Returns notes for the user.
     pub fn scan(self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
         let model = match self {
             Self::Stored(stored) => return stored.scan(see),
@@ -129,7 +128,7 @@ impl<'a> ModelRef<'a> {
         Ok(Vec::new())
     }
 
-    /// Returns rows by number, sorted, as a model about a place `far` from the origin; one in memory stays about its origin.
+    /// Returns rows by their sorted numbers, as a model relative to `far`. Rows of a model in memory keep its origin.
     pub fn rows(self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         match self {
             Self::Stored(stored) => stored.rows(numbers, far),

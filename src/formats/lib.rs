@@ -1,8 +1,9 @@
-//! Model files, by extension. Every command reads and writes models here.
+//! Model files, by extension. All commands read and write models through this crate.
 //!
-//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `FORMATS`.
+//! To add a format, add a file beside `ply` with a `ModelFormat`, and an entry in `MODEL_FORMATS`.
 
 mod archive;
+mod axis_signs;
 mod format;
 mod glb;
 mod html;
@@ -16,7 +17,6 @@ mod sog;
 mod splat;
 mod spz;
 mod transform;
-mod turn;
 mod usd;
 pub mod values;
 
@@ -36,62 +36,74 @@ pub use transform::Transform;
 pub use format::{Export, FirstView, LabelType, ReadModel, SpzVersion, WriteOptions};
 pub use format::{ModelFormat, ModelWriter};
 
-/// All formats. The first one also serves pipes and devices, such as `/dev/stdout`.
-const FORMATS: [&ModelFormat; 8] =
-    [&ply::FORMAT, &spz::FORMAT, &glb::FORMAT, &sog::FORMAT, &splat::FORMAT, &html::FORMAT, &usd::TEXT, &usd::PACKAGE];
+/// All formats. The first one is also used for pipes and devices, such as `/dev/stdout`.
+const MODEL_FORMATS: [&ModelFormat; 8] = [
+    &ply::MODEL_FORMAT,
+    &spz::MODEL_FORMAT,
+    &glb::MODEL_FORMAT,
+    &sog::MODEL_FORMAT,
+    &splat::MODEL_FORMAT,
+    &html::MODEL_FORMAT,
+    &usd::TEXT_FORMAT,
+    &usd::PACKAGE_FORMAT,
+];
 
-/// Returns the format for the extension of a path, ignoring case.
-fn by_ending(path: &Path) -> Option<&'static ModelFormat> {
+/// Returns the format for a path's extension, ignoring case.
+fn format_of(path: &Path) -> Option<&'static ModelFormat> {
     let name = path.file_name()?.to_string_lossy().to_lowercase();
-    FORMATS.into_iter().find(|format| format.endings.iter().any(|ending| name.ends_with(ending)))
+    MODEL_FORMATS.into_iter().find(|format| format.extensions.iter().any(|extension| name.ends_with(extension)))
 }
 
-/// Returns name and extension of each format that is written.
+/// Returns the name and extension of each writable format.
 pub fn formats() -> Vec<(&'static str, &'static str)> {
-    FORMATS.into_iter().filter(|format| format.write.is_some()).map(|format| (format.name, format.endings[0])).collect()
+    MODEL_FORMATS
+        .into_iter()
+        .filter(|format| format.write.is_some())
+        .map(|format| (format.name, format.extensions[0]))
+        .collect()
 }
 
-/// Returns true if a model at this path is written as a page, which shows it from somewhere at first.
+/// Returns true if a model at this path is written as a page, which needs an initial view.
 pub fn is_page(path: &Path) -> bool {
-    by_ending(path).is_some_and(|format| format.name == html::FORMAT.name)
+    format_of(path).is_some_and(|format| format.name == html::MODEL_FORMAT.name)
 }
 
-/// Returns all known extensions of formats that are `chosen`.
-fn endings(chosen: impl Fn(&ModelFormat) -> bool) -> String {
-    let all = FORMATS.into_iter().filter(|format| chosen(format));
-    all.flat_map(|format| format.endings).copied().collect::<Vec<_>>().join(", ")
+/// Lists the extensions of formats that are `chosen`.
+fn extensions(chosen: impl Fn(&ModelFormat) -> bool) -> String {
+    let all = MODEL_FORMATS.into_iter().filter(|format| chosen(format));
+    all.flat_map(|format| format.extensions).copied().collect::<Vec<_>>().join(", ")
 }
 
-/// What is wrong with the extension of a path, for a message.
-fn unknown_ending(path: &Path) -> String {
-    let ending = path.extension().map(|ending| format!(".{}", ending.display()));
-    ending.map_or("it has no extension".to_owned(), |ending| format!("{ending} is no extension of a model"))
+/// Returns the message for a path's unknown extension.
+fn unknown_extension(path: &Path) -> String {
+    let extension = path.extension().map(|extension| format!(".{}", extension.display()));
+    extension.map_or("it has no extension".to_owned(), |extension| format!("{extension} is not a model extension"))
 }
 
-/// Returns the format in which a path is read: that of its extension. A file without one is known by its first bytes, and a
-/// pipe is a PLY.
+/// Returns the format for reading a path, by its extension. A file without one is identified by its first bytes; a pipe
+/// is a PLY.
 fn format_to_read(path: &Path) -> Result<&'static ModelFormat> {
-    if let Some(format) = by_ending(path) {
+    if let Some(format) = format_of(path) {
         return Ok(format);
     }
     if !path.exists() {
         return Err(Error::data(path, "", "there is no such file"));
     }
     if !path.is_file() {
-        return Ok(FORMATS[0]);
+        return Ok(MODEL_FORMATS[0]);
     }
     let content = content::identify_file(path)?;
     let own = |format: &&'static ModelFormat| content.is_some_and(|content| format.contents.contains(&content.what));
-    if let Some(format) = FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
+    if let Some(format) = MODEL_FORMATS.into_iter().find(own).filter(|_| path.extension().is_none()) {
         return Ok(format);
     }
-    let problem = unknown_ending(path);
+    let problem = unknown_extension(path);
     let what = content.map_or(String::new(), |content| format!(" and the file {}", content.mismatch("a model")));
     let cure = "give the file the extension of its format, or export it in one of these";
-    Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", endings(|_| true))))
+    Err(Error::data(path, "", format!("{problem}{what}; {} are read: {cure}", extensions(|_| true))))
 }
 
-/// Returns the error of a reader, or what the file is instead if its first bytes tell.
+/// Returns the error of a reader, or what the file really is if its first bytes say so.
 fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
     let content = if path.is_file() { content::identify_file(path).ok().flatten() } else { None };
     match content.filter(|content| !format.contents.contains(&content.what)) {
@@ -102,7 +114,7 @@ fn explained(path: &Path, format: &ModelFormat, error: Error) -> Error {
     }
 }
 
-/// Reads a model in the format of its extension; an unknown one is an error.
+/// Reads a model in the format of its extension; an unknown extension is an error.
 pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     let path = path.as_ref();
     let _stage = Stage::new(format_args!("reading {}", path.display()), 0);
@@ -115,38 +127,37 @@ pub fn read_model(path: impl AsRef<Path>) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// Opens a model that can stay in its file, or returns `None` for one that is read whole.
+/// Opens a model that can stay in its file, or returns `None` for one that must be read whole.
 fn open_stored(path: &Path) -> Result<Option<StoredModel>> {
-    if format_to_read(path)?.name == FORMATS[0].name { StoredModel::open(path) } else { Ok(None) }
+    if format_to_read(path)?.name == MODEL_FORMATS[0].name { StoredModel::open(path) } else { Ok(None) }
 }
 
-/// Returns how a model is written at a path: by its extension. An unknown one is an error; a pipe or a device without one
-/// gets a PLY.
+/// Returns the writer for a path's extension. An unknown one is an error; a pipe or device without one gets a PLY.
 fn writer_for(path: &Path) -> Result<ModelWriter> {
     let is_pipe = || path.extension().is_none() && path.exists() && !path.is_file() && !path.is_dir();
-    let format = by_ending(path).or_else(|| is_pipe().then_some(FORMATS[0]));
+    let format = format_of(path).or_else(|| is_pipe().then_some(MODEL_FORMATS[0]));
     let problem = match format {
         Some(ModelFormat { write: Some(writer), .. }) => return Ok(*writer),
-        Some(format) => format!("{} files are only read", format.name),
-        None => unknown_ending(path),
+        Some(format) => format!("{} files can only be read", format.name),
+        None => unknown_extension(path),
     };
-    let known = endings(|format| format.write.is_some());
+    let known = extensions(|format| format.write.is_some());
     Err(Error::usage(path.display().to_string(), format!("{problem}; models are written as {known}")))
 }
 
-/// Refuses a path at which no model can be written because of its extension.
+/// Refuses a path whose extension has no writer.
 pub fn check_output(path: &Path) -> Result<()> {
     writer_for(path).map(drop)
 }
 
-/// Writes a model in the format of its extension; an unknown one is an error. Leaves out rows that are not finite and returns
-/// their number. The write is atomic. What the format cannot hold is logged as a warning.
+/// Writes a model in the format of its extension; an unknown extension is an error. Omits rows that are not finite and
+/// returns their number. The write is atomic. Warns about data that the format cannot store.
 pub fn write_model(path: impl AsRef<Path>, model: &Gaussians) -> Result<u64> {
     write(path.as_ref(), model, None, WriteOptions::default(), false)
 }
 
-/// Like [`write_model`], with the names of the labels: in the file, where its format has a place for them, and in
-/// `NAME.labels.json` beside it. Without names, an old file of names beside it is removed.
+/// Like [`write_model`], and also writes the label names: into the file if its format can store them, and to
+/// `NAME.labels.json` beside it. Without names, removes an old names file.
 pub fn export_model(
     path: impl AsRef<Path>,
     model: &Gaussians,
@@ -172,7 +183,7 @@ fn write(
     let export = Export { title: &title, ..Export::new(model, &rows, names, options) };
     (writer.losses)(&export)?.iter().for_each(|loss| tracing::warn!("{}: {loss}", path.display()));
     atomic::write(path, |out| (writer.write)(&export, out))?;
-    // A pipe or a device has no files beside it.
+    // A pipe or device has no files beside it.
     if path.is_file() {
         origin::write(path, export.origin, rows.len() as u64)?;
     }

@@ -1,5 +1,6 @@
-//! The origin of a scene far away, such as in UTM coordinates. Files hold 32-bit positions about it, so that no digit is
-//! lost; the origin itself is in `FILE.origin.json` beside it, and in the file if its format has a place.
+//! The origin of a faraway scene, for example in UTM coordinates. Files store 32-bit positions relative to it, so that
+//! no precision is lost. The origin itself is in `FILE.origin.json` beside the file, and in the file if its format
+//! supports it.
 
 use glam::DVec3;
 use labelgs_files::{atomic, read};
@@ -8,27 +9,27 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 const SCHEMA_VERSION: u32 = 1;
-/// Ending of the file, after the whole name of the model.
-const ENDING: &str = ".origin.json";
+/// Extension of the origin file, appended to the full name of the model.
+const ORIGIN_EXTENSION: &str = ".origin.json";
 
 #[derive(Serialize, Deserialize)]
 struct File {
     schema_version: u32,
     /// World position of the file's (0, 0, 0): world = file + origin.
     world_origin: [f64; 3],
-    /// Number of Gaussians of the model, so that a file of another model is noticed.
+    /// Number of Gaussians, to detect the file of another model.
     gaussians: u64,
 }
 
-/// Returns the path of the file beside a model.
+/// Returns the path of the origin file beside a model.
 pub(super) fn beside(model: &Path) -> PathBuf {
     let mut name = model.file_name().unwrap_or_default().to_owned();
-    name.push(ENDING);
+    name.push(ORIGIN_EXTENSION);
     model.with_file_name(name)
 }
 
-/// Reads the origin beside a model of `count` Gaussians; 0 without a file. A file of another count is another model's:
-/// it is left alone, with a note.
+/// Reads the origin beside a model of `count` Gaussians; 0 without a file. A file with another count belongs to another
+/// model and is ignored, with a note.
 pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<DVec3> {
     let path = beside(model);
     if !path.is_file() {
@@ -44,7 +45,7 @@ pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<
     if file.gaussians != count {
         let name = path.display();
         notes.push(format!(
-            "{name} is of a model of {} Gaussians, this one has {count}; it was ignored",
+            "{name} belongs to a model of {} Gaussians, but this one has {count}; it was ignored",
             file.gaussians
         ));
         return Ok(DVec3::ZERO);
@@ -52,7 +53,7 @@ pub(super) fn read(model: &Path, count: u64, notes: &mut Vec<String>) -> Result<
     Ok(origin)
 }
 
-/// Writes the file beside a model; an origin of 0 removes it.
+/// Writes the origin file beside a model, or removes it if the origin is 0.
 pub(super) fn write(model: &Path, origin: DVec3, gaussians: u64) -> Result<()> {
     let path = beside(model);
     if origin != DVec3::ZERO {

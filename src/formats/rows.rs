@@ -1,4 +1,4 @@
-//! Rows of any model file: those that cannot be rendered are left out and counted.
+//! Rows of any model file. Rows that cannot be rendered are dropped and counted.
 
 use super::format::ReadModel;
 use glam::DVec3;
@@ -6,18 +6,18 @@ use labelgs_scene::origin::far_origin;
 use labelgs_scene::{Gaussians, Result};
 use std::path::Path;
 
-/// Largest log-scale: the square of its exponential fits into f32, as covariances need it.
+/// Largest log-scale: the square of its exponential fits into f32, as covariances require.
 pub(super) const LOG_SCALE_MAX: f32 = 44.0;
 
-/// Fewest Gaussians for the check for activated values; with fewer, chance may look like it.
+/// Fewest Gaussians for detecting activated values; fewer may look activated by chance.
 const ACTIVATED_MIN: u64 = 16;
 
-/// A row, before activation, as in [`Gaussians`].
+/// A row before activation, as in [`Gaussians`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Row<'a> {
     /// World position.
     pub position: [f64; 3],
-    /// (w, x, y, z), of any length but 0.
+    /// (w, x, y, z), of any non-zero length.
     pub quat: [f64; 4],
     /// Logarithms of the standard deviations.
     pub scale: [f32; 3],
@@ -29,13 +29,13 @@ pub struct Row<'a> {
     pub rest: &'a [[f32; 3]],
     /// Label, if the file has labels.
     pub label: Option<u32>,
-    /// Confidence of the label, if the file has any.
+    /// Confidence of the label, if the file has confidences.
     pub confidence: Option<f32>,
 }
 
-/// Tells rows that can be rendered from others, which it counts.
+/// Separates renderable rows from others, and counts the others.
 #[derive(Debug, Default)]
-pub(super) struct Sieve {
+pub(super) struct RowFilter {
     total: u64,
     not_finite: u64,
     no_rotation: u64,
@@ -44,8 +44,8 @@ pub(super) struct Sieve {
     odd_scales: u64,
 }
 
-impl Sieve {
-    /// Returns the rotation of a row that can be rendered.
+impl RowFilter {
+    /// Returns the rotation of a renderable row.
     pub(super) fn rotation_of(&mut self, row: &Row) -> Option<[f32; 4]> {
         self.total += 1;
         let finite = row.position.iter().all(|&value| (value as f32).is_finite())
@@ -67,7 +67,7 @@ impl Sieve {
         quat
     }
 
-    /// Number of rows left out.
+    /// Returns the number of dropped rows.
     pub(super) fn dropped(&self) -> u64 {
         self.not_finite + self.no_rotation + self.too_large
     }
@@ -77,7 +77,7 @@ impl Sieve {
         self.total - self.dropped() >= ACTIVATED_MIN && self.odd_opacities + self.odd_scales == 0
     }
 
-    /// Returns a note on the rows left out, if there are any.
+    /// Returns a note on the dropped rows, if there are any.
     pub(super) fn note(&self) -> Option<String> {
         let all = [
             (self.not_finite, "with a value that is not finite"),
@@ -95,11 +95,11 @@ impl Sieve {
 pub(super) struct Rows {
     to: Gaussians,
     positions: Vec<DVec3>,
-    pub(super) sieve: Sieve,
+    pub(super) sieve: RowFilter,
 }
 
 impl Rows {
-    /// Makes an empty list for rows of a degree, all with or all without label and confidence.
+    /// Creates an empty list for rows of a degree, either all or none with label and confidence.
     pub(super) fn new(sh_degree: u32, labelled: bool, confident: bool) -> Self {
         let to = Gaussians {
             sh_degree,
@@ -110,7 +110,7 @@ impl Rows {
         Self { to, ..Self::default() }
     }
 
-    /// Appends a row, or counts the reason for leaving it out.
+    /// Appends a row, or counts the reason for dropping it.
     pub(super) fn push(&mut self, row: &Row) {
         let Some(quat) = self.sieve.rotation_of(row) else { return };
         self.to.sh0.push(row.sh0);
@@ -127,8 +127,8 @@ impl Rows {
         self.positions.push(DVec3::from_array(row.position));
     }
 
-    /// Returns the model, with a note on the rows left out. Its positions are relative to `origin`; without one in the
-    /// file at `path`, to the one beside it.
+    /// Returns the model, with a note on dropped rows. Its positions are relative to `origin`, or without one in the
+    /// file at `path`, to the origin beside it.
     pub(super) fn finish(self, path: &Path, origin: Option<DVec3>) -> Result<ReadModel> {
         let mut notes = Vec::new();
         let origin = match origin {
@@ -140,7 +140,7 @@ impl Rows {
         Ok(ReadModel { gaussians: self.gaussians(origin, far), dropped, notes, ..ReadModel::default() })
     }
 
-    /// Returns the rows, whose positions are relative to `origin`, about a place `far` from there.
+    /// Returns the rows, whose positions are relative to `origin`, relative to `far` instead.
     pub(super) fn gaussians(mut self, origin: DVec3, far: DVec3) -> Gaussians {
         self.to.origin = origin + far;
         self.to.means = self.positions.iter().map(|&position| (position - far).as_vec3().to_array()).collect();
@@ -148,7 +148,7 @@ impl Rows {
     }
 }
 
-/// Returns the rotation as stored, normalised only if its squared length does not fit into f32; `None` for zero.
+/// Returns the stored rotation, normalised only if its squared length does not fit into f32; `None` for zero.
 fn rotation(quat: [f64; 4]) -> Option<[f32; 4]> {
     let length = quat.iter().map(|v| v * v).sum::<f64>().sqrt();
     if length == 0.0 {

@@ -1,5 +1,6 @@
-//! Labels beside a file that has no place for them, or loses it in other programs: the part `gaussians` of
-//! `NAME.labels.json`. It holds for the same Gaussians in the same order, which a checksum of their positions tells.
+//! Labels beside a file whose format cannot store them, or whose labels other programs drop: the part `gaussians` of
+//! `NAME.labels.json`. They are valid for the same Gaussians in the same order, verified by a checksum of the
+//! positions.
 
 use super::format::Export;
 use labelgs_files::label_table::{LabelEntry, LabelTable};
@@ -10,14 +11,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 #[derive(Serialize)]
-struct Written<'a> {
+struct SideFile<'a> {
     #[serde(flatten)]
     table: &'a LabelTable,
     gaussians: PerGaussian,
 }
 
 #[derive(Deserialize)]
-struct Found {
+struct ReadSideFile {
     gaussians: Option<PerGaussian>,
 }
 
@@ -42,11 +43,11 @@ pub(super) fn write(path: &Path, export: &Export, labels: &[u32], checksum: u32)
     let known: BTreeSet<u32> = ids.iter().map(|run| run.0).filter(|&id| id != 0).collect();
     let unnamed = LabelTable::new(known.into_iter().map(LabelEntry::new).collect());
     let gaussians = PerGaussian { count: export.rows.len() as u64, positions_crc32: checksum, ids };
-    let written = Written { table: export.names.unwrap_or(&unnamed), gaussians };
+    let written = SideFile { table: export.names.unwrap_or(&unnamed), gaussians };
     atomic::write_json(&LabelTable::path_beside(path), &written)
 }
 
-/// Returns the labels beside the model at `path`, if they are of its `count` Gaussians; else adds a note.
+/// Reads the labels beside the model at `path` if they belong to its `count` Gaussians; otherwise adds a note.
 pub(super) fn read(path: &Path, count: usize, checksum: u32, notes: &mut Vec<String>) -> Result<Option<Vec<u32>>> {
     let beside = LabelTable::path_beside(path);
     if !beside.is_file() {
@@ -54,11 +55,11 @@ pub(super) fn read(path: &Path, count: usize, checksum: u32, notes: &mut Vec<Str
     }
     let expected =
         r#"expected "gaussians": {"count": N, "positions_crc32": C, "ids": [[id, length], ..]}; correct or delete it"#;
-    let found: Found = file::json(&beside, expected)?;
+    let found: ReadSideFile = file::json(&beside, expected)?;
     let Some(own) = found.gaussians else { return Ok(None) };
     if own.count != count as u64 || own.positions_crc32 != checksum {
         let name = beside.display();
-        notes.push(format!("the labels in {name} are of other Gaussians or another order and were ignored"));
+        notes.push(format!("the labels in {name} belong to other Gaussians or another order and were ignored"));
         return Ok(None);
     }
     let total = own.ids.iter().try_fold(0_u64, |sum, run| sum.checked_add(run.1));

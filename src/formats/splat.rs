@@ -1,5 +1,5 @@
-//! The format `.splat`: 32 bytes for each Gaussian and no header. It is only read: it has no place for labels, and none
-//! for harmonics.
+//! The format `.splat`: 32 bytes per Gaussian, without a header. It is read-only, because it cannot store labels or
+//! harmonics.
 
 use super::format::{ModelFormat, ReadModel};
 use super::rows::{Row, Rows};
@@ -9,19 +9,19 @@ use labelgs_scene::harmonics::sh0_of;
 use labelgs_scene::{Error, Result};
 use std::path::Path;
 
-/// The format by its ending.
-pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: ".splat", endings: &[".splat"], contents: &[], read, write: None };
+/// The .splat format.
+pub(super) const MODEL_FORMAT: ModelFormat =
+    ModelFormat { name: ".splat", extensions: &[".splat"], contents: &[], read, write: None };
 
-/// Bytes of a Gaussian: position and size as floats, red, green, blue, opacity, and the rotation w, x, y, z as bytes.
-const BYTES: usize = 32;
+/// Bytes per Gaussian: position and size as floats; red, green, blue, opacity and rotation (w, x, y, z) as bytes.
+const GAUSSIAN_BYTES: usize = 32;
 
 fn read(path: &Path) -> Result<ReadModel> {
     let bytes = file::bytes(path)?;
-    let (rows, odd) = bytes.as_chunks::<BYTES>();
+    let (rows, odd) = bytes.as_chunks::<GAUSSIAN_BYTES>();
     if !odd.is_empty() || rows.is_empty() {
         let problem = format!(
-            "has {} bytes, expected one or more times {BYTES}; the file was cut short or is no .splat",
+            "has {} bytes; expected a multiple of {GAUSSIAN_BYTES} above 0; the file was cut short or is not a .splat",
             bytes.len()
         );
         return Err(Error::data(path, format!("byte {}", bytes.len() - odd.len()), problem));

@@ -288,7 +288,7 @@ fn a_model_is_converted_by_the_ending() {
     let other = ["convert", &at("model.ply"), &at("v4.spz"), "--spz-version", "4", "--label-type", "none"];
     succeeds(&other);
     assert!(read_model(at("v4.spz")).expect("SPZ").gaussians.labels.is_none());
-    assert!(refused(&["convert", &at("model.ply"), &at("a.splat")]).contains(".splat files are only read"));
+    assert!(refused(&["convert", &at("model.ply"), &at("a.splat")]).contains(".splat files can only be read"));
 }
 
 /// A file for each label, which together are the whole.
@@ -355,7 +355,7 @@ fn nothing_is_written_under_a_wrong_extension() {
     ];
     for args in commands {
         let message = refused(args);
-        assert!(message.contains(".obj is no extension of a model") && message.contains(".ply, .spz"), "{message}");
+        assert!(message.contains(".obj is not a model extension") && message.contains(".ply, .spz"), "{message}");
     }
     assert!(refused(&["convert", &none, &at("x.splat")]).contains("only read"));
     let message = refused(&["occlusion", &none, "--masks", &none, "--model", &none, "-o", &at("x.ply")]);

@@ -367,7 +367,7 @@ fn a_folder_has_one_run_at_a_time() {
     let lock = labelgs::files::run_folder::Lock::take(&place.path("out")).expect("the first run");
     let output = place.trained("out", &["--iterations", "1"]);
     assert_eq!(output.status.code(), Some(7), "{}", stderr(&output));
-    assert!(stderr(&output).contains("another labelgs trains into this folder"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("another labelgs process trains into this folder"), "{}", stderr(&output));
     drop(lock);
     succeeded(&place.trained("out", &["--iterations", "1"]));
 }

@@ -69,7 +69,7 @@ fn a_table_by_hand_needs_ids_and_names_only() {
     assert_eq!(table.name(3), Some("cup"));
     let colour = |id| table.entry(id).expect("an entry").colour;
     assert_eq!((colour(3), colour(1)), (LabelEntry::new(3).colour, [1, 2, 3]));
-    // Keys of others come back.
+    // Unknown keys survive.
     table.write(&path).expect("written");
     assert!(fs::read_to_string(&path).expect("text").contains(r#""score": 0.5"#));
     assert_eq!(LabelTable::read(&path).expect("read"), table);

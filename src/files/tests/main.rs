@@ -1,4 +1,4 @@
-//! Files: writes that are whole or absent, pictures, the table of labels.
+//! Files: complete or absent writes, images, the label table.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,

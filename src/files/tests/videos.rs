@@ -1,4 +1,4 @@
-//! Videos through an encoder that stands in for ffmpeg.
+//! Videos are encoded by a stand-in for ffmpeg.
 #![cfg(unix)]
 
 use super::fixtures::Scene;
@@ -9,10 +9,10 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::{env, fs};
 
-/// The folder of the child's encoder.
+/// Set in the child process to the folder with the encoder.
 const CHILD_VARIABLE: &str = "LABELGS_TEST_VIDEO";
 
-/// The search path belongs to a whole process, so each test runs once more in a process of its own. Returns the folder there.
+/// The search path applies to a whole process, so each test runs again in its own process. Returns the folder there.
 fn with_encoder(test: &str, script: Option<&str>) -> Option<PathBuf> {
     if let Some(folder) = env::var_os(CHILD_VARIABLE) {
         return Some(folder.into());
@@ -44,7 +44,7 @@ fn frames_reach_the_encoder_whole_and_in_order() {
     for part in ["-video_size 4x2", "-pixel_format rgb24", "-framerate 29.97", "-pix_fmt yuv420p", "-f mp4"] {
         assert!(words.contains(part), "{words}");
     }
-    // A picture that fails ends the video; the old file stays.
+    // A failing frame ends the video; the old file stays.
     let failed = video::write(&file, (4, 2), 30.0, |push| {
         push(&frame(7))?;
         Err(Error::Interrupted)
@@ -60,7 +60,7 @@ fn an_encoder_that_fails_says_why() {
     let script = "echo 'Unknown encoder: none here' >&2; exit 3";
     let Some(folder) = with_encoder("an_encoder_that_fails_says_why", Some(script)) else { return };
     let file = folder.join("clip.mp4");
-    // More than a pipe holds, so that a write meets the closed end.
+    // More than a pipe holds, so that a write hits the closed end.
     let error = video::write(&file, (512, 512), 30.0, |push| (0..9).try_for_each(|_| push(&[[0; 3]; 512 * 512])))
         .expect_err("it failed")
         .to_string();

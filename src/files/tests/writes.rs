@@ -1,4 +1,4 @@
-//! Files that the program writes besides PLY, and the atomic writer below them.
+//! Files that the program writes besides PLY, and the atomic writer.
 
 use super::fixtures::Scene;
 use labelgs_files::{atomic, image as images};
@@ -61,7 +61,7 @@ fn links_and_devices_are_written_through() {
     }
 }
 
-/// A command removes old temporary files of a killed command from the folder that it writes to.
+/// A command removes old temporary files of a killed command from its output folder.
 #[cfg(target_os = "linux")]
 #[test]
 fn old_litter_goes_with_the_next_write() {

@@ -1,6 +1,6 @@
-//! Writes meshes as GLB: a node with a name for each, with colours of its corners and no light of its own.
+//! Writes meshes as GLB: a named node per mesh, with unlit vertex colours.
 
-use super::AXES;
+use super::GLTF_AXES;
 use super::file;
 use super::write::Binary;
 use glam::DVec3;
@@ -10,31 +10,31 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// Component type of 32-bit integers.
-const INTEGER: u64 = 5125;
-const UNLIT: &str = "KHR_materials_unlit";
+const INTEGER_COMPONENT: u64 = 5125;
+const UNLIT_EXTENSION: &str = "KHR_materials_unlit";
 
-/// A surface of triangles.
+/// A triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Name of its node.
+    /// Name of the mesh's node.
     pub name: String,
     /// World position of (0, 0, 0).
     pub origin: DVec3,
-    /// Corners relative to the origin, world units.
+    /// Vertices relative to the origin, world units.
     pub positions: Vec<[f32; 3]>,
-    /// Outward unit normals of the corners.
+    /// Outward unit normals of the vertices.
     pub normals: Vec<[f32; 3]>,
-    /// Colours of the corners, r, g, b, as in photos (sRGB), 0 to 1.
+    /// Vertex colours (r, g, b) as in photos (sRGB), 0 to 1.
     pub colours: Vec<[f32; 3]>,
-    /// Corners of each triangle, counter-clockwise from outside.
+    /// Vertices of each triangle, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Writes meshes to a GLB, atomically, with y up as models have it there.
+/// Writes meshes to a GLB, atomically, with y up as for models.
 ///
 /// # Errors
 ///
-/// Another ending, a mesh without triangles, or more numbers than a GLB holds.
+/// Another extension, a mesh without triangles, or more data than a GLB can hold.
 pub fn write_meshes(path: &Path, meshes: &[Mesh]) -> Result<()> {
     let bytes: usize = meshes.iter().map(|mesh| 36 * mesh.positions.len() + 12 * mesh.triangles.len()).sum();
     if bytes as u64 > file::BYTES_MAX {
@@ -46,21 +46,21 @@ pub fn write_meshes(path: &Path, meshes: &[Mesh]) -> Result<()> {
     }
     let (mut binary, mut nodes, mut all) = (Binary::default(), Vec::new(), Vec::new());
     for (index, mesh) in meshes.iter().enumerate() {
-        let sign = DVec3::from_array(AXES.0.map(f64::from));
+        let sign = DVec3::from_array(GLTF_AXES.0.map(f64::from));
         nodes.push(json!({ "name": mesh.name, "mesh": index, "translation": (sign * mesh.origin).to_array() }));
         all.push(json!({ "name": mesh.name, "primitives": [primitive(mesh, &mut binary)] }));
     }
     binary.bytes.resize(binary.bytes.len().next_multiple_of(8), 0);
     let root = json!({
         "asset": { "version": "2.0", "generator": concat!("labelgs ", env!("CARGO_PKG_VERSION")) },
-        "extensionsUsed": [UNLIT],
+        "extensionsUsed": [UNLIT_EXTENSION],
         "scene": 0,
         "scenes": [{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }],
         "nodes": nodes,
         "materials": [{
             "name": "colours",
             "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 1.0 },
-            "extensions": { UNLIT: {} },
+            "extensions": { UNLIT_EXTENSION: {} },
         }],
         "meshes": all,
         "accessors": binary.accessors,
@@ -71,7 +71,7 @@ pub fn write_meshes(path: &Path, meshes: &[Mesh]) -> Result<()> {
 }
 
 fn primitive(mesh: &Mesh, to: &mut Binary) -> Value {
-    let turned = |all: &[[f32; 3]]| all.iter().map(|&at| AXES.position(at)).collect::<Vec<_>>();
+    let turned = |all: &[[f32; 3]]| all.iter().map(|&at| GLTF_AXES.position(at)).collect::<Vec<_>>();
     let positions = to.attribute(true, turned(&mesh.positions).into_iter());
     let normals = to.attribute(false, turned(&mesh.normals).into_iter());
     let colours = to.attribute(false, mesh.colours.iter().map(|colour| colour.map(linear)));
@@ -79,7 +79,7 @@ fn primitive(mesh: &Mesh, to: &mut Binary) -> Value {
     let view = to.view(|bytes| corners.iter().for_each(|corner| bytes.extend(corner.to_le_bytes())));
     to.views[view]["target"] = json!(34963);
     to.accessors.push(json!({
-        "bufferView": view, "componentType": INTEGER, "count": corners.len(), "type": "SCALAR",
+        "bufferView": view, "componentType": INTEGER_COMPONENT, "count": corners.len(), "type": "SCALAR",
     }));
     json!({
         "mode": 4,
@@ -89,7 +89,7 @@ fn primitive(mesh: &Mesh, to: &mut Binary) -> Value {
     })
 }
 
-/// The light of a value of sRGB, from 0 to 1: colours of corners are linear in glTF.
+/// Converts an sRGB value, 0 to 1, to linear light: vertex colours are linear in glTF.
 fn linear(value: f32) -> f32 {
     let value = value.clamp(0.0, 1.0);
     if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }

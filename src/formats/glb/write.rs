@@ -1,7 +1,8 @@
 //! Writes GLB.
 
 use super::{
-    ANTIALIASED, AXES, CONFIDENCE, EYE, FEATURE, FEATURES, FLOAT, METADATA, OPACITY, ROTATION, SCALE, SPLATS, UP, file,
+    ANTIALIASED_KEY, CONFIDENCE_ATTRIBUTE, EYE_KEY, FEATURE_ATTRIBUTE, FEATURES_EXTENSION, FLOAT_COMPONENT, GLTF_AXES,
+    METADATA_EXTENSION, OPACITY_ATTRIBUTE, ROTATION_ATTRIBUTE, SCALE_ATTRIBUTE, SPLATS_EXTENSION, UP_KEY, file,
     harmonic, harmonics,
 };
 use crate::format::{Export, FirstView, ModelWriter};
@@ -13,19 +14,19 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 
-pub(super) const WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
+pub(super) const MODEL_WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
 
 fn losses(export: &Export) -> Result<Vec<String>> {
     let bytes = file::bytes_per_row(export) * export.rows.len() as u64;
     if export.rows.is_empty() || bytes > file::BYTES_MAX {
         let problem =
-            format!("a GLB holds up to {} bytes, and at least a Gaussian; this model takes {bytes}", file::BYTES_MAX);
+            format!("a GLB holds at least 1 Gaussian and at most {} bytes; this model takes {bytes}", file::BYTES_MAX);
         return Err(Error::usage("GLB", format!("{problem}; leave out some Gaussians or write another format")));
     }
     Ok(losses_of_values(export))
 }
 
-/// Numbers and the accessors on them.
+/// The binary chunk and its accessors.
 #[derive(Default)]
 pub(super) struct Binary {
     pub(super) bytes: Vec<u8>,
@@ -34,7 +35,7 @@ pub(super) struct Binary {
 }
 
 impl Binary {
-    /// Adds a view of the bytes that `fill` appends, from a multiple of 8 on, as tables need it.
+    /// Adds a view of the bytes that `fill` appends, aligned to 8 bytes as tables require.
     pub(super) fn view(&mut self, fill: impl FnOnce(&mut Vec<u8>)) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(8), 0);
         let start = self.bytes.len();
@@ -43,7 +44,7 @@ impl Binary {
         self.views.len() - 1
     }
 
-    /// Adds an attribute of floats; positions need their bounds.
+    /// Adds a float attribute. Position attributes need bounds.
     pub(super) fn attribute<const N: usize>(&mut self, bounds: bool, rows: impl Iterator<Item = [f32; N]>) -> usize {
         let (mut least, mut most, mut count) = ([f32::MAX; N], [f32::MIN; N], 0);
         let view = self.view(|bytes| {
@@ -58,7 +59,8 @@ impl Binary {
         });
         self.views[view]["target"] = json!(34962);
         let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
-        let mut accessor = json!({ "bufferView": view, "componentType": FLOAT, "count": count, "type": kind });
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": FLOAT_COMPONENT, "count": count, "type": kind });
         if bounds {
             accessor["min"] = json!(least.as_slice());
             accessor["max"] = json!(most.as_slice());
@@ -73,16 +75,16 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let mut primitive = json!({
         "mode": 0,
         "attributes": attributes(export, &mut binary),
-        "extensions": { SPLATS: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
+        "extensions": { SPLATS_EXTENSION: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } },
     });
     if export.model.antialiased {
-        primitive["extras"][ANTIALIASED] = true.into();
+        primitive["extras"][ANTIALIASED_KEY] = true.into();
     }
     if let Some(FirstView { up, eye }) = export.options.first_view {
-        primitive["extras"][UP] = json!(up.to_array());
-        primitive["extras"][EYE] = json!(eye.to_array());
+        primitive["extras"][UP_KEY] = json!(up.to_array());
+        primitive["extras"][EYE_KEY] = json!(eye.to_array());
     }
-    let mut used = vec![SPLATS];
+    let mut used = vec![SPLATS_EXTENSION];
     let mut root = json!({
         "asset": { "version": "2.0", "generator": concat!("labelgs ", env!("CARGO_PKG_VERSION")) },
         "scene": 0,
@@ -94,16 +96,16 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
         let ids: Vec<u32> = [UNLABELLED].into_iter().chain(ids).collect();
         let row_of = |row: usize| ids.binary_search(&labels[row]).unwrap_or_default() as f32;
         let feature = binary.attribute(false, export.rows.iter().map(|&row| [row_of(row)]));
-        primitive["attributes"][FEATURE] = json!(feature);
+        primitive["attributes"][FEATURE_ATTRIBUTE] = json!(feature);
         if let Some(shares) = export.label_confidence() {
             let share = binary.attribute(false, export.rows.iter().map(|&row| [shares[row]]));
-            primitive["attributes"][CONFIDENCE] = json!(share);
+            primitive["attributes"][CONFIDENCE_ATTRIBUTE] = json!(share);
         }
-        primitive["extensions"][FEATURES] = json!({ "featureIds": [{
+        primitive["extensions"][FEATURES_EXTENSION] = json!({ "featureIds": [{
             "featureCount": ids.len(), "attribute": 0, "nullFeatureId": 0, "label": "object", "propertyTable": 0,
         }]});
-        root["extensions"] = json!({ METADATA: table(&ids, export.names, &mut binary) });
-        used.extend([FEATURES, METADATA]);
+        root["extensions"] = json!({ METADATA_EXTENSION: table(&ids, export.names, &mut binary) });
+        used.extend([FEATURES_EXTENSION, METADATA_EXTENSION]);
     }
     binary.bytes.resize(binary.bytes.len().next_multiple_of(8), 0);
     root["extensionsUsed"] = json!(used);
@@ -118,34 +120,34 @@ fn attributes(export: &Export, to: &mut Binary) -> Value {
     let g = export.model;
     let rows = || export.rows.iter().copied();
     let rotation = |row: usize| {
-        let [w, x, y, z] = unit(AXES.quat(g.quats[row]));
+        let [w, x, y, z] = unit(GLTF_AXES.quat(g.quats[row]));
         [x, y, z, w]
     };
     let mut all = Map::new();
     let mut add = |name: String, accessor: usize| drop(all.insert(name, json!(accessor)));
-    add("POSITION".into(), to.attribute(true, rows().map(|row| AXES.position(export.position(row)))));
-    // For viewers that draw points.
+    add("POSITION".into(), to.attribute(true, rows().map(|row| GLTF_AXES.position(export.position(row)))));
+    // Fallback colours for viewers that draw points.
     let shown = |row: usize| {
         let [r, g, b] = export.model.sh0[row].map(|sh0| value_of(sh0).clamp(0.0, 1.0) as f32);
         [r, g, b, sigmoid(export.model.opacities[row])]
     };
     add("COLOR_0".into(), to.attribute(false, rows().map(shown)));
-    add(ROTATION.into(), to.attribute(false, rows().map(rotation)));
-    add(SCALE.into(), to.attribute(false, rows().map(|row| g.scales[row].map(f32::exp))));
-    add(OPACITY.into(), to.attribute(false, rows().map(|row| [sigmoid(g.opacities[row])])));
+    add(ROTATION_ATTRIBUTE.into(), to.attribute(false, rows().map(rotation)));
+    add(SCALE_ATTRIBUTE.into(), to.attribute(false, rows().map(|row| g.scales[row].map(f32::exp))));
+    add(OPACITY_ATTRIBUTE.into(), to.attribute(false, rows().map(|row| [sigmoid(g.opacities[row])])));
     add(harmonic(0, 0), to.attribute(false, rows().map(|row| g.sh0[row])));
-    for ((index, name), sign) in harmonics(g.sh_degree).enumerate().zip(AXES.signs()) {
+    for ((index, name), sign) in harmonics(g.sh_degree).enumerate().zip(GLTF_AXES.signs()) {
         let value = |row: usize| export.model.rest(row)[index].map(|value| sign * value);
         add(name, to.attribute(false, rows().map(value)));
     }
     Value::Object(all)
 }
 
-/// The table of labels: a row for each id, with its name.
+/// Writes the label table: a row for each id, with its name.
 fn table(ids: &[u32], names: Option<&LabelTable>, to: &mut Binary) -> Value {
     let name = |&id: &u32| names.and_then(|names| names.name(id)).unwrap_or_default();
     let texts: Vec<&str> = ids.iter().map(name).collect();
-    // A view may not be empty.
+    // A view must not be empty.
     let text = texts.concat() + if texts.iter().all(|text| text.is_empty()) { " " } else { "" };
     let values = to.view(|bytes| bytes.extend(text.as_bytes()));
     let offsets = to.view(|bytes| {

@@ -1,5 +1,5 @@
-//! A page that shows a model in any browser: one HTML file that asks nothing from the network, with the model as an SPZ
-//! in it. It is read back like an SPZ.
+//! A page that shows a model in any browser: a single HTML file that embeds the model as an SPZ and needs no network.
+//! It is read back like an SPZ.
 
 use super::format::{Export, FirstView, ModelFormat, ModelWriter, ReadModel};
 use super::spz;
@@ -18,19 +18,19 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// The format by its ending.
-pub(super) const FORMAT: ModelFormat = ModelFormat {
+/// The HTML page format.
+pub(super) const MODEL_FORMAT: ModelFormat = ModelFormat {
     name: "HTML",
-    endings: &[".html"],
+    extensions: &[".html"],
     contents: &["a web page", "a page of HTML or XML"],
     read,
-    write: Some(WRITER),
+    write: Some(MODEL_WRITER),
 };
 
-const WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
+const MODEL_WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
 
-/// One script, in this order.
-const SCRIPTS: [&str; 8] = [
+/// The page's scripts, concatenated in this order.
+const PAGE_SCRIPTS: [&str; 8] = [
     web::ALGEBRA,
     web::CAMERA,
     web::INPUT,
@@ -40,8 +40,8 @@ const SCRIPTS: [&str; 8] = [
     include_str!("pick.js"),
     include_str!("page.js"),
 ];
-/// Start and end of the model in a page.
-const MODEL: [&str; 2] = ["<script type=\"text/plain\" id=\"model\">", "</script>"];
+/// Delimiters of the model in a page.
+const MODEL_DELIMITERS: [&str; 2] = ["<script type=\"text/plain\" id=\"model\">", "</script>"];
 
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let mut packed = Vec::new();
@@ -49,7 +49,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(page(export, &STANDARD.encode(packed)).as_bytes())
 }
 
-/// Returns the page around a model, which comes as base64.
+/// Returns the page around a model encoded as base64.
 fn page(export: &Export, model: &str) -> String {
     let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
     for &row in export.rows {
@@ -59,12 +59,12 @@ fn page(export: &Export, model: &str) -> String {
         let name = export.names.and_then(|names| names.name(id));
         json!({ "id": id, "name": name, "colour": label_colour(id), "gaussians": count })
     });
-    // Axes of the model inside.
-    let turned = |place: DVec3| spz::AXES.position(place.as_vec3().to_array());
+    // Axes of the embedded model.
+    let turned = |place: DVec3| spz::SPZ_AXES.position(place.as_vec3().to_array());
     let view = export.options.first_view;
     let view = view.map(|FirstView { up, eye }| json!({ "up": turned(up), "eye": turned(eye - export.origin) }));
     let about = json!({ "labels": labels.collect::<Vec<_>>(), "origin": export.origin.to_array(), "view": view });
-    // Nothing in a name may end the script.
+    // A name must not end the script element.
     let about = about.to_string().replace('<', "\\u003c");
     let title = if export.title.is_empty() { "Model" } else { export.title };
     let body = html! {
@@ -73,14 +73,14 @@ fn page(export: &Export, model: &str) -> String {
         script type="application/json" id="about" { (PreEscaped(about)) }
         script type="text/plain" id="model" { (PreEscaped(model)) }
     };
-    web::page(title, include_str!("style.css"), &body, &web::joined(&SCRIPTS))
+    web::page(title, include_str!("style.css"), &body, &web::joined(&PAGE_SCRIPTS))
 }
 
 fn panels(title: &str, count: usize) -> Markup {
     html! {
         header.card id="head" {
             h1 { (title) }
-            // Of the device at hand: the script fills it.
+            // The script fills in the controls of the device.
             p id="hint" {}
         }
         details.card id="panel" aria-label="Objects" hidden {
@@ -104,10 +104,10 @@ fn panels(title: &str, count: usize) -> Markup {
             details.card id="notes" {
                 summary { "Made with labelgs" }
                 p {
-                    "Values have the steps of SPZ: positions, sizes, rotations, colours. The browser sorts Gaussians by the \
-                     depth of their centres and adds their colours in steps of 1/256, where the engine has 32-bit \
-                     floats and stops behind opaque ones. Labels are those of Gaussians, so outlines are as sharp as the \
-                     Gaussians, not as a label map."
+                    "Values are quantised as in SPZ: positions, sizes, rotations, colours. The browser sorts Gaussians by \
+                     the depth of their centres and blends their colours in steps of 1/256; the engine blends 32-bit \
+                     floats and stops behind opaque ones. Outlines follow whole Gaussians, so they are less sharp than \
+                     in a label map."
                 }
                 p { (counted(count, "Gaussian")) ". " label { input type="checkbox" id="counts"; " Show the number of each object" } }
             }
@@ -116,15 +116,15 @@ fn panels(title: &str, count: usize) -> Markup {
     }
 }
 
-/// Reads the model in a page.
+/// Reads the model embedded in a page.
 fn read(path: &Path) -> Result<ReadModel> {
     let text = file::text(path)?;
-    let [start, end] = MODEL;
+    let [start, end] = MODEL_DELIMITERS;
     let inside = text.split_once(start).and_then(|(_, rest)| rest.split_once(end));
-    let (packed, _) = inside
-        .ok_or_else(|| Error::data(path, "", "has no model inside; only pages that labelgs has written are read"))?;
+    let (packed, _) =
+        inside.ok_or_else(|| Error::data(path, "", "contains no model; only pages written by labelgs can be read"))?;
     let bytes = STANDARD.decode(packed.trim()).map_err(|error| {
-        Error::data(path, "the model inside", format!("is not base64: {error}; the page was cut short or changed"))
+        Error::data(path, "embedded model", format!("is not base64: {error}; the page was cut short or changed"))
     })?;
     spz::read_bytes(path, &bytes)
 }

@@ -1,4 +1,4 @@
-//! Rows of a 3DGS PLY.
+//! Decodes rows of a 3DGS PLY.
 
 use super::columns::Columns;
 use crate::rows::Row;
@@ -6,26 +6,27 @@ use labelgs_scene::harmonics::{coefficients, sh0_of};
 use labelgs_scene::{Error, MODEL_LABEL_MAX, Result};
 use std::path::Path;
 
-/// Values of a row before the harmonics.
-const HEAD: usize = 14;
-/// Standard deviation of a disc of 2DGS across its plane, as viewers of 2DGS draw it.
-const DISC: f32 = 1e-6;
-/// Least and largest opacity that a filtered Gaussian gets, so that its logit is finite.
-const OPACITY: [f64; 2] = [1e-12, 1.0 - 1e-12];
-/// Bits of the column `state` that editors of Gaussians write.
-const SELECTED: u8 = 1;
-const DELETED: u8 = 4;
-/// The label of a Gaussian without an object in models of the paper.
-const PAPER_NONE: f64 = -1.0;
+/// Number of values in a row before the harmonics.
+const VALUES_BEFORE_SH: usize = 14;
+/// Standard deviation across a 2DGS disc, as viewers of 2DGS draw it.
+const DISC_THICKNESS: f32 = 1e-6;
+/// Bounds on the opacity of a filtered Gaussian, so that its logit is finite.
+const OPACITY_MIN: f64 = 1e-12;
+const OPACITY_MAX: f64 = 1.0 - 1e-12;
+/// Bits of the column `state`, which Gaussian editors write.
+const SELECTED_BIT: u8 = 1;
+const DELETED_BIT: u8 = 4;
+/// The label of a Gaussian without an object in the paper's models.
+const PAPER_UNLABELLED: f64 = -1.0;
 
-/// Decodes rows, and counts what the user should know.
+/// Decodes rows and counts what the user should know.
 pub(super) struct Decoder<'a> {
     path: &'a Path,
     columns: &'a Columns,
     triples: Vec<[f32; 3]>,
-    /// Gaussians that an editor has deleted.
+    /// Number of Gaussians that an editor has deleted.
     pub(super) deleted: u64,
-    /// Labels of -1.
+    /// Number of labels that are -1.
     minus_one: u64,
 }
 
@@ -35,15 +36,15 @@ impl<'a> Decoder<'a> {
         Self { path, columns, triples, deleted: 0, minus_one: 0 }
     }
 
-    /// Returns the row of the values with this number in the file; `None` if an editor has deleted it.
+    /// Decodes the row with this number in the file, or returns `None` if an editor has deleted it.
     pub(super) fn row(&mut self, index: u64, row: &[f64]) -> Result<Option<Row<'_>>> {
         let Columns { flat, full_colour, filter, label, confidence, state, .. } = *self.columns;
         let rest = self.triples.len();
         let value = |index: usize| row[index] as f32;
         for (k, triple) in self.triples.iter_mut().enumerate() {
-            *triple = [0, 1, 2].map(|channel| value(HEAD + k + channel * rest));
+            *triple = [0, 1, 2].map(|channel| value(VALUES_BEFORE_SH + k + channel * rest));
         }
-        let third = if flat { DISC.ln() } else { value(9) };
+        let third = if flat { DISC_THICKNESS.ln() } else { value(9) };
         let (mut opacity, mut scale) = (value(6), [value(7), value(8), third]);
         if let Some(at) = filter {
             (opacity, scale) = blurred(opacity, scale, row[at]);
@@ -52,11 +53,11 @@ impl<'a> Decoder<'a> {
         let confidence = confidence.map(|at| confidence_of(self.path, index, row[at])).transpose()?;
         if let Some(at) = state {
             let state = row[at] as u8;
-            if state & DELETED != 0 {
+            if state & DELETED_BIT != 0 {
                 self.deleted += 1;
                 return Ok(None);
             }
-            label = Some(u32::from(state & SELECTED));
+            label = Some(u32::from(state & SELECTED_BIT));
         }
         Ok(Some(Row {
             position: [row[0], row[1], row[2]],
@@ -70,23 +71,23 @@ impl<'a> Decoder<'a> {
         }))
     }
 
-    /// What the user should know, after the last row.
+    /// Returns notes for the user, after the last row.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes: Vec<String> = self.columns.notes().collect();
         if self.columns.state.is_some() {
             let note = "the selection in the column `state` became label 1";
             let deleted = self.deleted;
-            let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were left out") } else { String::new() };
+            let more = if deleted > 0 { format!("; {deleted} deleted Gaussians were omitted") } else { String::new() };
             notes.push(format!("{note}{more}"));
         }
         if self.minus_one > 0 {
-            notes.push(format!("{} labels are -1, which is none (0) here, as in models of the paper", self.minus_one));
+            notes.push(format!("{} labels are -1, which means unlabelled (0) in the paper's models", self.minus_one));
         }
         notes
     }
 
     fn label_of(&mut self, index: u64, value: f64) -> Result<u32> {
-        if value == PAPER_NONE {
+        if value == PAPER_UNLABELLED {
             self.minus_one += 1;
             return Ok(0);
         }
@@ -101,7 +102,7 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// Returns logit and log-scales of a Gaussian after the filter of Mip-Splatting: squares of sizes add up, and the opacity
+/// Applies the filter of Mip-Splatting to the logit and log-scales of a Gaussian: squared sizes add up, and the opacity
 /// falls as the volume grows.
 fn blurred(opacity: f32, scale: [f32; 3], filter: f64) -> (f32, [f32; 3]) {
     if filter == 0.0 {
@@ -111,7 +112,7 @@ fn blurred(opacity: f32, scale: [f32; 3], filter: f64) -> (f32, [f32; 3]) {
     let larger = sizes.map(|size| size.hypot(filter));
     let shrunk: f64 = sizes.iter().zip(&larger).map(|(size, larger)| size / larger).product();
     let share = shrunk / (1.0 + (-f64::from(opacity)).exp());
-    let share = if share.is_nan() { share } else { share.clamp(OPACITY[0], OPACITY[1]) };
+    let share = if share.is_nan() { share } else { share.clamp(OPACITY_MIN, OPACITY_MAX) };
     ((share / (1.0 - share)).ln() as f32, larger.map(|size| size.ln() as f32))
 }
 

@@ -1,4 +1,4 @@
-//! Writes a file of many models, one after the other, so that no more than one is in memory.
+//! Writes several models into one file, with only one in memory at a time.
 
 use super::write::{write_header, write_rows};
 use crate::format::{Export, WriteOptions};
@@ -7,12 +7,12 @@ use labelgs_scene::{Error, Gaussians, Result, Setting};
 use std::io;
 use std::path::Path;
 
-/// Writes the models of `parts` as one, atomically; they have `count` rows together. All have the columns and the world
-/// origin of `like`, whose rows do not matter.
+/// Writes the models in `parts` as a single one, atomically; together they have `count` rows. All use the columns and
+/// world origin of `like`, whose rows are ignored.
 ///
 /// # Errors
 ///
-/// Another number of rows, or a part with other columns; what a part cannot be read for.
+/// Another number of rows, a part with other columns, or a part that cannot be read.
 pub fn write_joined(
     path: &Path,
     like: &Gaussians,
@@ -36,12 +36,12 @@ pub fn write_joined(
             written += rows.len();
         }
         if written != count {
-            failed = Some(Error::Bug(format!("{written} rows were written, and {count} announced")));
+            failed = Some(Error::Bug(format!("{written} rows were written, but {count} were announced")));
             return Err(io::Error::other("a wrong number of rows"));
         }
         Ok(())
     });
-    // What a part was refused for says more than that the file was not finished.
+    // The error of a part says more than that the file is incomplete.
     failed.map_or(done, Err)
 }
 
@@ -68,7 +68,7 @@ fn fitting(mut part: Gaussians, like: &Gaussians) -> Result<Gaussians> {
     Ok(part)
 }
 
-/// Makes one model of all parts.
+/// Joins all parts into one model.
 pub fn joined(mut parts: Vec<Gaussians>) -> Result<Gaussians> {
     if parts.len() == 1 {
         return Ok(parts.remove(0));

@@ -1,5 +1,5 @@
-//! The standard 3DGS PLY. If the scene has labels, the last column is `label`. If votes were counted, `property float
-//! label_confidence` precedes it.
+//! The standard 3DGS PLY. Its last column is `label` if the scene has labels. `property float label_confidence`
+//! precedes it if votes were counted.
 
 mod columns;
 mod decode;
@@ -22,26 +22,29 @@ use std::path::Path;
 pub use stored::StoredModel;
 
 /// Start of the comment with the world position of the file's (0, 0, 0).
-const ORIGIN: &str = "labelgs world_origin ";
-/// Starts of the comments with the way up, and with the place of the eye at first, in the world.
-const UP: &str = "labelgs up ";
-const EYE: &str = "labelgs eye ";
-/// Start of the comment with how viewers draw the model (Brush, PlayCanvas), and its value for antialiased models.
-const MODE: &str = "SplatRenderMode: ";
-const ANTIALIASED: &str = "mip";
-/// The comment of Postshot's antialiased models.
-const ANTIALIASED_POSTSHOT: &str = "antialiased 1";
+const ORIGIN_COMMENT: &str = "labelgs world_origin ";
+/// Starts of the comments with the up direction and the eye position of the initial view, in the world.
+const UP_COMMENT: &str = "labelgs up ";
+const EYE_COMMENT: &str = "labelgs eye ";
+/// Start of the comment that tells viewers (Brush, PlayCanvas) how to draw the model, and its value for antialiased
+/// models.
+const MODE_COMMENT: &str = "SplatRenderMode: ";
+const ANTIALIASED_MODE: &str = "mip";
+/// Comment in Postshot's antialiased models.
+const POSTSHOT_COMMENT: &str = "antialiased 1";
 
-/// The format that viewers of 3DGS read.
-pub(super) const FORMAT: ModelFormat =
-    ModelFormat { name: "PLY", endings: &[".ply"], contents: &["a PLY"], read, write: Some(write::WRITER) };
+/// The PLY format of 3DGS viewers.
+pub(super) const MODEL_FORMAT: ModelFormat =
+    ModelFormat { name: "PLY", extensions: &[".ply"], contents: &["a PLY"], read, write: Some(write::MODEL_WRITER) };
 
-/// Reads a 3DGS PLY: little-endian, big-endian or ascii, columns by name in any order and of any scalar type, with or
-/// without the prefixes of CloudCompare. The number of `f_rest_*` (0, 9, 24, 45 or 72, channel-major) gives the SH degree, of
-/// which 3 are kept; `label` is optional. The filter of Mip-Splatting is applied, discs of 2DGS get a thin third axis; other
-/// columns that may change the picture are named in a note. Without `label`, the selection in the `state` of an editor is
-/// label 1. Rows that cannot be rendered are dropped and counted. A compressed PLY is read too. A label of -1 is none; one
-/// that is no whole number up to [`MODEL_LABEL_MAX`] is an error.
+/// Reads a 3DGS PLY: little-endian, big-endian or ascii, with columns in any order and of any scalar type, with or
+/// without CloudCompare's prefixes. The number of `f_rest_*` columns (0, 9, 24, 45 or 72, channel-major) gives the SH
+/// degree, of which at most 3 is kept.
+///
+/// Applies the filter of Mip-Splatting, and gives 2DGS discs a thin third axis. Other columns that may change renders
+/// get a note. `label` is optional; without it, Gaussians selected in an editor (column `state`) get label 1. A label
+/// of -1 is read as 0; one that is not a whole number up to [`MODEL_LABEL_MAX`] is an error. Rows that cannot be
+/// rendered are dropped and counted. Compressed PLY files are read too.
 ///
 /// [`MODEL_LABEL_MAX`]: labelgs_scene::MODEL_LABEL_MAX
 fn read(path: &Path) -> Result<ReadModel> {
@@ -49,7 +52,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     if packed::is_packed(&table) {
         return packed::read(path, table);
     }
-    let columns = Columns::of(path, &table)?;
+    let columns = Columns::find(path, &table)?;
     let (origin, antialiased) = (origin(path, &table)?, is_antialiased(table.comments()));
     let first_view = first_view(&table);
     let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, &columns));
@@ -68,7 +71,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     Ok(ReadModel { first_view, ..read })
 }
 
-/// Adds what the user should know of the values and the length of a file.
+/// Adds notes about the values and the length of a file.
 fn add_notes(notes: &mut Vec<String>, activated: bool, extra_bytes: u64) {
     if activated {
         let note = "every opacity is from 0 to 1 and every scale positive: they seem to be written after their sigmoid \
@@ -80,39 +83,40 @@ fn add_notes(notes: &mut Vec<String>, activated: bool, extra_bytes: u64) {
     }
 }
 
-/// Returns true if the comments of a header say that the model is antialiased.
+/// Returns true if the comments of a header mark the model as antialiased.
 fn is_antialiased<'a>(mut comments: impl Iterator<Item = &'a str>) -> bool {
     comments.any(|comment| {
         let comment = comment.trim();
-        comment.strip_prefix(MODE).is_some_and(|mode| mode.trim() == ANTIALIASED) || comment == ANTIALIASED_POSTSHOT
+        comment.strip_prefix(MODE_COMMENT).is_some_and(|mode| mode.trim() == ANTIALIASED_MODE)
+            || comment == POSTSHOT_COMMENT
     })
 }
 
-/// Returns the origin in the comments of the header.
+/// Returns the origin from the header's comments.
 fn origin(path: &Path, table: &Table) -> Result<Option<DVec3>> {
-    let Some(words) = comment(table, ORIGIN) else { return Ok(None) };
+    let Some(words) = comment(table, ORIGIN_COMMENT) else { return Ok(None) };
     match triple(words) {
         Some(place) if place.as_vec3().is_finite() => Ok(Some(place)),
         _ => {
             let problem =
-                format!("the comment `{ORIGIN}{words}` does not end with three numbers; correct or remove it");
+                format!("the comment `{ORIGIN_COMMENT}{words}` does not end with three numbers; correct or remove it");
             Err(Error::data(path, "header", problem))
         }
     }
 }
 
-/// Returns where to see the model from at first, if the comments of the header say it. It is a hint, so a damaged one does not matter.
+/// Returns the initial view from the header's comments. It is only a hint, so a damaged one is ignored.
 fn first_view(table: &Table) -> Option<FirstView> {
     let of = |start| comment(table, start).and_then(triple);
-    FirstView::checked(of(UP)?, of(EYE)?)
+    FirstView::checked(of(UP_COMMENT)?, of(EYE_COMMENT)?)
 }
 
-/// Returns the rest of a comment of the header by its start.
+/// Returns the rest of a header comment that begins with `start`.
 fn comment<'a>(table: &'a Table, start: &str) -> Option<&'a str> {
     table.comments().find_map(|comment| comment.trim().strip_prefix(start))
 }
 
-/// Returns three numbers, if the words are that.
+/// Parses three numbers.
 fn triple(words: &str) -> Option<DVec3> {
     let numbers: Option<Vec<f64>> = words.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
     numbers?.try_into().ok().map(DVec3::from_array)

@@ -1,5 +1,5 @@
-//! The compressed PLY of PlayCanvas: chunks of 256 Gaussians with bounds, and values of 10 or 11 bits within them. It is
-//! only read: its readers refuse any further element, so labels have no place.
+//! The compressed PLY of PlayCanvas: chunks of 256 Gaussians with bounds, and values of 10 or 11 bits within them. It
+//! is read-only: its readers refuse additional elements, so there is no place for labels.
 
 use crate::format::ReadModel;
 use crate::ply_table::Table;
@@ -11,9 +11,9 @@ use std::f64::consts::SQRT_2;
 use std::path::Path;
 
 /// Gaussians in a chunk.
-const CHUNK: u64 = 256;
-/// Columns of a chunk that every file has: bounds of positions and of log-scales.
-const BOUNDS: [&str; 12] = [
+const CHUNK_GAUSSIANS: u64 = 256;
+/// Chunk columns in every file: bounds of positions and log-scales.
+const BOUND_COLUMNS: [&str; 12] = [
     "min_x",
     "min_y",
     "min_z",
@@ -28,30 +28,31 @@ const BOUNDS: [&str; 12] = [
     "max_scale_z",
 ];
 /// Bounds of colours, which older files lack.
-const COLOURS: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
-const PACKED: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
+const COLOUR_BOUND_COLUMNS: [&str; 6] = ["min_r", "min_g", "min_b", "max_r", "max_g", "max_b"];
+const PACKED_COLUMNS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
-/// Returns true for a table of a compressed file.
+/// Returns true for the table of a compressed file.
 pub(super) fn is_packed(vertex: &Table) -> bool {
-    vertex.has(PACKED[0])
+    vertex.has(PACKED_COLUMNS[0])
 }
 
-/// Reads a compressed file, whose element `vertex` is open.
+/// Reads a compressed file whose `vertex` element is open.
 pub(super) fn read(path: &Path, vertex: Table) -> Result<ReadModel> {
     let bounds = bounds(path)?;
     let (count, chunks) = (vertex.count(), bounds.len() as u64);
-    if chunks < count.div_ceil(CHUNK) {
-        let problem =
-            format!("has {chunks} chunks for {count} Gaussians; expected one for each {CHUNK}; export it again");
+    if chunks < count.div_ceil(CHUNK_GAUSSIANS) {
+        let problem = format!(
+            "has {chunks} chunks for {count} Gaussians; expected one for each {CHUNK_GAUSSIANS}; export it again"
+        );
         return Err(Error::data(path, "header", problem));
     }
     let (degree, codes) = harmonics(path, count)?;
     let mut rows = Rows::new(degree, false, false);
     let mut rest = vec![[0.0; 3]; coefficients(degree)];
     let antialiased = super::is_antialiased(vertex.comments());
-    vertex.for_each(&PACKED, |index, row| {
+    vertex.for_each(&PACKED_COLUMNS, |index, row| {
         let [place, spin, size, colour] = [0, 1, 2, 3].map(|column| row[column] as u32);
-        let bound = &bounds[(index / CHUNK) as usize];
+        let bound = &bounds[(index / CHUNK_GAUSSIANS) as usize];
         let within = |share: [f64; 3], at: usize| {
             [0, 1, 2].map(|axis| bound[at + axis] + share[axis] * (bound[at + 3 + axis] - bound[at + axis]))
         };
@@ -77,11 +78,15 @@ pub(super) fn read(path: &Path, vertex: Table) -> Result<ReadModel> {
     Ok(read)
 }
 
-/// Reads the bounds of each chunk; colours are from 0 to 1 without bounds of their own.
+/// Reads the bounds of each chunk. Colours without bounds range from 0 to 1.
 fn bounds(path: &Path) -> Result<Vec<[f64; 18]>> {
     let problem = "has no element `chunk`; a compressed PLY has `chunk` and `vertex`";
     let chunk = Table::open_element(path, "chunk")?.ok_or_else(|| Error::data(path, "header", problem))?;
-    let names = if chunk.has(COLOURS[0]) { [&BOUNDS[..], &COLOURS].concat() } else { BOUNDS.to_vec() };
+    let names = if chunk.has(COLOUR_BOUND_COLUMNS[0]) {
+        [&BOUND_COLUMNS[..], &COLOUR_BOUND_COLUMNS].concat()
+    } else {
+        BOUND_COLUMNS.to_vec()
+    };
     let mut all = Vec::new();
     chunk.for_each(&names, |_, row| {
         let mut bounds = [0.0; 18];
@@ -93,7 +98,7 @@ fn bounds(path: &Path) -> Result<Vec<[f64; 18]>> {
     Ok(all)
 }
 
-/// Reads the degree of the harmonics, and their bytes, channel by channel for each of `count` Gaussians.
+/// Reads the SH degree and the harmonics of `count` Gaussians as bytes, channel by channel.
 fn harmonics(path: &Path, count: u64) -> Result<(u32, Vec<u8>)> {
     let mut codes = Vec::new();
     let Some(table) = Table::open_element(path, "sh")? else { return Ok((0, codes)) };
@@ -111,19 +116,19 @@ fn harmonics(path: &Path, count: u64) -> Result<(u32, Vec<u8>)> {
     Ok((degree, codes))
 }
 
-/// Three shares in 11, 10 and 11 bits.
+/// Unpacks three fractions of 11, 10 and 11 bits.
 fn thirds(packed: u32) -> [f64; 3] {
     [f64::from(packed >> 21) / 2047.0, f64::from(packed >> 11 & 1023) / 1023.0, f64::from(packed & 2047) / 2047.0]
 }
 
-/// The rotation (w, x, y, z): which component is the largest, and the three others in order.
+/// Unpacks a rotation (w, x, y, z) stored as the index of the largest component and the three others in order.
 fn quat(packed: u32) -> [f64; 4] {
     let small = [20, 10, 0].map(|shift| (f64::from(packed >> shift & 1023) / 1023.0 - 0.5) * SQRT_2);
     let largest = (1.0 - small.iter().map(|v| v * v).sum::<f64>()).max(0.0).sqrt();
     with_largest(largest, packed >> 30, small)
 }
 
-/// A coefficient from -4 to 4.
+/// Converts a byte to a coefficient from -4 to 4.
 fn harmonic(byte: u8) -> f32 {
     let share = match byte {
         0 => 0.0,

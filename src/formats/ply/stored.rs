@@ -1,21 +1,21 @@
-//! A model that stays in its file: its rows are seen one after the other, and some of them are read when they are asked for.
+//! A model that stays in its file. Rows are scanned in order or read on demand.
 
 use super::columns::Columns;
 use super::decode::Decoder;
 use super::{add_notes, first_view, is_antialiased, origin, packed};
 use crate::format::FirstView;
 use crate::ply_table::Table;
-use crate::rows::{Row, Sieve};
+use crate::rows::{Row, RowFilter};
 use glam::DVec3;
 use labelgs_scene::{Error, Gaussians, Result};
 use std::path::{Path, PathBuf};
 
-/// A 3DGS PLY whose rows have fixed places.
+/// A 3DGS PLY with rows of fixed size.
 #[derive(Clone, Debug)]
 pub struct StoredModel {
     pub(crate) path: PathBuf,
     columns: Columns,
-    /// Number of rows, those included that cannot be rendered.
+    /// Number of rows, including those that cannot be rendered.
     pub(crate) count: u64,
     pub(crate) sh_degree: u32,
     pub(crate) has_labels: bool,
@@ -27,10 +27,10 @@ pub struct StoredModel {
 }
 
 impl StoredModel {
-    /// Opens a file; `None` for one that is read whole: of text, compressed, changed by an editor, or with positions of
-    /// another type.
+    /// Opens a file. Returns `None` for a file that must be read whole: ascii, compressed, changed by an editor, or
+    /// with positions of another type.
     pub fn open(path: &Path) -> Result<Option<Self>> {
-        // A pipe is read once.
+        // A pipe can only be read once.
         if !path.is_file() {
             return Ok(None);
         }
@@ -38,7 +38,7 @@ impl StoredModel {
         if packed::is_packed(&table) {
             return Ok(None);
         }
-        let columns = Columns::of(path, &table)?;
+        let columns = Columns::find(path, &table)?;
         if columns.state.is_some() || !["x", "y", "z"].iter().all(|name| table.is_single(name)) {
             return Ok(None);
         }
@@ -54,10 +54,10 @@ impl StoredModel {
         Ok(has_places.then_some(read))
     }
 
-    /// Calls `see` with the number and the values of each row that can be rendered, in order. Returns notes for the user.
+    /// Calls `see` with the number and values of each renderable row, in order. Returns notes for the user.
     pub fn scan(&self, mut see: impl FnMut(u64, &Row)) -> Result<Vec<String>> {
         let (path, columns) = (&self.path, &self.columns);
-        let (mut decoder, mut sieve) = (Decoder::new(path, columns), Sieve::default());
+        let (mut decoder, mut sieve) = (Decoder::new(path, columns), RowFilter::default());
         let each = |index: u64, values: &[f64]| {
             let row = decoder.row(index, values)?;
             if let Some(row) = row.filter(|row| sieve.rotation_of(row).is_some()) {
@@ -73,12 +73,12 @@ impl StoredModel {
         Ok(notes)
     }
 
-    /// Reads some rows, sorted, as a model about a place `far` from the origin of the file.
+    /// Reads some rows by their sorted numbers, as a model relative to `far` in the file's coordinates.
     pub fn rows(&self, numbers: impl Iterator<Item = u64>, far: DVec3) -> Result<Gaussians> {
         let (path, columns) = (&self.path, &self.columns);
         let (mut rows, mut decoder) = (columns.rows(), Decoder::new(path, columns));
         let Some(stored) = Table::open(path)?.stored_rows(&columns.names())? else {
-            return Err(Error::data(path, "header", "another file took the place of the model; start again"));
+            return Err(Error::data(path, "header", "the file was replaced by another one; start again"));
         };
         stored.for_some(numbers, |index, values| {
             if let Some(row) = decoder.row(index, values)? {

@@ -1,6 +1,6 @@
 //! Writes the standard 3DGS PLY.
 
-use super::{ANTIALIASED, EYE, MODE, ORIGIN, UP};
+use super::{ANTIALIASED_MODE, EYE_COMMENT, MODE_COMMENT, ORIGIN_COMMENT, UP_COMMENT};
 use crate::format::{Export, FirstView, LabelType, ModelWriter};
 use glam::DVec3;
 use labelgs_scene::{Error, Result, Setting};
@@ -8,25 +8,25 @@ use ply_rs_bw::ply::{Addable, DefaultElement, ElementDef, Encoding, Header, Prop
 use ply_rs_bw::writer::Writer;
 use std::io::{self, Write};
 
-/// Largest whole number up to which a 32-bit float holds all of them.
+/// Floats of 32 bits represent all integers up to this one.
 const FLOAT_EXACT: u32 = 1 << 24;
 
-pub(super) const WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
+pub(super) const MODEL_WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
 
 /// Refuses ids that a float would round.
 fn losses(export: &Export) -> Result<Vec<String>> {
     let labels = export.labels().filter(|_| export.options.label_type == LabelType::Float).unwrap_or_default();
     let Some(label) = labels.iter().find(|&&label| label > FLOAT_EXACT) else { return Ok(Vec::new()) };
     let problem = format!(
-        "label {label} is above {FLOAT_EXACT}, up to which 32-bit floats hold whole numbers; give it a smaller id, or \
+        "label {label} is above {FLOAT_EXACT}, the limit of exact integers in floats; give it a smaller id, or \
          write labels as uint"
     );
     Err(Error::usage(Setting("label_type"), problem))
 }
 
-/// Writes a little-endian PLY with zero normals. If the scene has labels, `label` is the last column, and
-/// `label_confidence` precedes it if known. Positions are 32-bit floats, because some readers take nothing else; those
-/// that would be rounded are relative to the origin in a comment.
+/// Writes a little-endian PLY with zero normals. The last column is `label` if the scene has labels; `label_confidence`
+/// precedes it if known. Positions are 32-bit floats, because some readers accept nothing else. Positions that would be
+/// rounded are relative to the origin in a comment.
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     write_header(export, export.rows.len(), out)?;
     write_rows(export, out)
@@ -66,14 +66,14 @@ fn header(export: &Export, count: usize) -> Header {
     header.encoding = Encoding::BinaryLittleEndian;
     let mut say = |what: &str, DVec3 { x, y, z }| header.comments.push(format!("{what}{x:?} {y:?} {z:?}"));
     if export.origin != DVec3::ZERO {
-        say(ORIGIN, export.origin);
+        say(ORIGIN_COMMENT, export.origin);
     }
     if let Some(FirstView { up, eye }) = export.options.first_view {
-        say(UP, up);
-        say(EYE, eye);
+        say(UP_COMMENT, up);
+        say(EYE_COMMENT, eye);
     }
     if export.model.antialiased {
-        header.comments.push(format!("{MODE}{ANTIALIASED}"));
+        header.comments.push(format!("{MODE_COMMENT}{ANTIALIASED_MODE}"));
     }
     header.elements.add(vertex);
     header

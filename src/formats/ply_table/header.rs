@@ -1,4 +1,4 @@
-//! The header of a PLY file, and where values lie in a binary row.
+//! The header of a PLY file, and the layout of a binary row.
 
 use labelgs_files::content::identify;
 use labelgs_scene::{Error, Result};
@@ -7,12 +7,12 @@ use ply_rs_bw::ply::{DefaultElement, ElementDef, Header, PropertyType, ScalarTyp
 use std::io::{BufRead, Read};
 use std::path::Path;
 
-/// Most bytes of a header; that of a 3DGS file has about 1.5 KiB.
+/// Most bytes of a header; a 3DGS header has about 1.5 KiB.
 const HEADER_MAX: u64 = 64 * 1024;
-/// The byte order mark that some editors of text write first.
+/// The byte order mark that some text editors write first.
 const BOM: &[u8] = b"\xEF\xBB\xBF";
 
-/// Reads and parses the header; returns its length too.
+/// Reads and parses the header; also returns its length.
 pub(super) fn read_header(path: &Path, file: &mut impl BufRead) -> Result<(Header, usize)> {
     let text = header_bytes(path, file)?;
     Ok((parse_header(path, &text)?, text.len()))
@@ -45,8 +45,8 @@ fn header_bytes(path: &Path, file: &mut impl BufRead) -> Result<Vec<u8>> {
     }
 }
 
-/// Returns the header with one space between words and without the byte order mark. Comments are free: bytes that are no
-/// UTF-8, as in names of users and folders, are replaced.
+/// Returns the header with single spaces between words and without a byte order mark. Replaces invalid UTF-8, which may
+/// occur in comments with names of users and folders.
 fn plain(text: &[u8]) -> Option<String> {
     let mut to = String::with_capacity(text.len());
     for line in text.strip_prefix(BOM).unwrap_or(text).split(|&byte| byte == b'\n') {
@@ -70,7 +70,7 @@ fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
     let header = Parser::<DefaultElement>::new()
         .read_header(&mut Reader::new(text.as_bytes()))
         .map_err(|error| problem(error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")))?;
-    // The crate keeps the last of two properties with the same name, which would move the later columns.
+    // The crate keeps the last of two properties with the same name, which would shift later columns.
     let lines = |word: &str| text.lines().filter(|line| line.split(' ').next() == Some(word)).count();
     let kept: usize = header.elements.values().map(|element| element.properties.len()).sum();
     if lines("property") != kept || lines("element") != header.elements.len() {
@@ -79,7 +79,7 @@ fn parse_header(path: &Path, text: &[u8]) -> Result<Header> {
     Ok(header)
 }
 
-/// Returns the offset and scalar type of each property of a binary row, and the bytes of a row. Refuses lists.
+/// Returns the offset and scalar type of each property of a binary row, and the row's length in bytes. Refuses lists.
 pub(super) fn layout_of(path: &Path, element: &ElementDef) -> Result<(Vec<(usize, ScalarType)>, usize)> {
     let mut stride = 0;
     let mut layout = Vec::with_capacity(element.properties.len());
@@ -99,7 +99,7 @@ pub(super) fn layout_of(path: &Path, element: &ElementDef) -> Result<(Vec<(usize
     Ok((layout, stride))
 }
 
-/// Decodes the scalar at the start of `bytes`; f64 holds every PLY scalar exactly.
+/// Decodes the scalar at the start of `bytes`; f64 represents every PLY scalar exactly.
 pub(super) fn decode(scalar: &ScalarType, bytes: &[u8], big_endian: bool) -> f64 {
     macro_rules! number {
         ($type:ty) => {{

@@ -1,4 +1,4 @@
-//! Rows of a binary PLY in any order.
+//! Reads rows of a binary PLY in any order.
 
 use super::header::decode;
 use super::table::Column;
@@ -7,7 +7,7 @@ use labelgs_scene::{Error, Result};
 use std::io::{BufReader, Read};
 use std::path::PathBuf;
 
-/// The rows of an element in an open file, from the first one on.
+/// The rows of an element in an open file, from the first one.
 pub struct StoredRows {
     pub(super) path: PathBuf,
     pub(super) file: BufReader<Source>,
@@ -18,7 +18,7 @@ pub struct StoredRows {
 }
 
 impl StoredRows {
-    /// Calls `see` with number and values of some rows, sorted, as [`Table::for_each`](super::Table::for_each) does.
+    /// Calls `see` with the numbers and values of some rows, sorted, like [`Table::for_each`](super::Table::for_each).
     pub fn for_some(
         mut self,
         rows: impl Iterator<Item = u64>,
@@ -27,7 +27,7 @@ impl StoredRows {
         let (mut bytes, mut values) = (vec![0u8; self.stride], vec![0.0; self.columns.len()]);
         let mut next = 0;
         for row in rows {
-            // A short way stays within what is read already.
+            // A short seek stays within the buffer.
             let skip = (row - next) as i64 * self.stride as i64;
             self.file.seek_relative(skip).map_err(Error::read(&self.path))?;
             self.file.read_exact(&mut bytes).map_err(Error::read(&self.path))?;

@@ -18,15 +18,15 @@ pub struct Table {
     encoding: Encoding,
     comments: Vec<String>,
     element: ElementDef,
-    /// Elements before it; their rows are skipped.
+    /// Elements before this one; their rows are skipped.
     before: Vec<ElementDef>,
-    /// True if another element follows.
+    /// Whether another element follows.
     after: bool,
     header_bytes: u64,
     file_bytes: u64,
 }
 
-/// A column: its place among the properties, its offset in a binary row, and its type.
+/// A column: its index among the properties, its offset in a binary row, and its type.
 pub(super) struct Column {
     index: usize,
     pub(super) offset: usize,
@@ -40,7 +40,7 @@ impl Table {
         Self::open_element(path, "vertex")?.ok_or_else(|| Error::data(path, "header", problem))
     }
 
-    /// Opens an element of a file, if it has it.
+    /// Opens an element of a file, if the file has it.
     pub fn open_element(path: &Path, name: &str) -> Result<Option<Self>> {
         let mut file = read::open(path)?;
         let file_bytes = file.get_ref().length().map_err(Error::read(path))?;
@@ -60,7 +60,7 @@ impl Table {
         self.element.properties.values().map(|property| property.name.as_str())
     }
 
-    /// Returns true if the element has a property.
+    /// Returns true if the element has the property.
     pub fn has(&self, name: &str) -> bool {
         self.element.properties.contains_key(name)
     }
@@ -70,12 +70,12 @@ impl Table {
         self.comments.iter().map(String::as_str)
     }
 
-    /// Returns the largest value of a property of integers, and `None` for one of floats or lists.
+    /// Returns the largest value of an integer property, or `None` for floats and lists.
     pub fn integer_max(&self, name: &str) -> Option<f64> {
         match self.element.properties.get(name)?.data_type {
             PropertyType::Scalar(ScalarType::UShort) => Some(f64::from(u16::MAX)),
             PropertyType::Scalar(ScalarType::Float | ScalarType::Double) | PropertyType::List(..) => None,
-            // Wider integers hold bytes too.
+            // Wider integers may store bytes too.
             PropertyType::Scalar(_) => Some(255.0),
         }
     }
@@ -91,8 +91,8 @@ impl Table {
         property.is_some_and(|property| matches!(property.data_type, PropertyType::Scalar(ScalarType::Float)))
     }
 
-    /// Calls `see` with number and values of `columns` of each row, as f64, in order. Returns the number of bytes after the
-    /// last declared element.
+    /// Calls `see` with the number of each row and its values of `columns`, as f64, in order. Returns the number of
+    /// bytes after the last declared element.
     pub fn for_each(mut self, columns: &[&str], mut see: impl FnMut(u64, &[f64]) -> Result<()>) -> Result<u64> {
         let (columns, count) = (self.locate(columns)?, self.count());
         if self.encoding == Encoding::Ascii {
@@ -103,8 +103,8 @@ impl Table {
         Ok(extra_bytes)
     }
 
-    /// Returns access to the rows in any order, with the values of `columns`; `None` for text, whose rows have no fixed
-    /// places.
+    /// Returns random access to the rows, with the values of `columns`; `None` for ascii, whose rows have no fixed
+    /// offsets.
     pub fn stored_rows(self, columns: &[&str]) -> Result<Option<StoredRows>> {
         if self.encoding == Encoding::Ascii {
             return Ok(None);
@@ -127,8 +127,8 @@ impl Table {
         Ok(columns.iter().map(column).collect())
     }
 
-    /// Returns the rows of a binary file, and the number of bytes after the last declared element. Fails if the file is too
-    /// short.
+    /// Returns the rows of a binary file, and the number of bytes after the last declared element. Fails if the file is
+    /// too short.
     fn binary_rows(mut self, columns: Vec<Column>) -> Result<(StoredRows, u64)> {
         let (mut skip, count, (_, stride)) = (0, self.count(), layout_of(&self.path, &self.element)?);
         for element in &self.before {
@@ -163,7 +163,7 @@ impl Table {
             let text = str::from_utf8(&line).map_err(|_| problem("is not text".into()))?;
             let words: Vec<&str> = text.split_ascii_whitespace().collect();
             if words.len() != width {
-                return Err(problem(format!("has {} values, the header declares {width}", words.len())));
+                return Err(problem(format!("has {} values; the header declares {width}", words.len())));
             }
             for (value, column) in values.iter_mut().zip(columns) {
                 let word = words[column.index];
@@ -181,7 +181,7 @@ impl Table {
             let mut limited = (&mut self.file).take(LINE_MAX);
             let read = limited.read_until(b'\n', line).map_err(Error::read(&self.path))?;
             if read == 0 {
-                return Err(Error::data(&self.path, what, "the file ends before it; it was cut short"));
+                return Err(Error::data(&self.path, what, "is missing because the file ends here; it was cut short"));
             }
             if read as u64 == LINE_MAX {
                 return Err(Error::data(&self.path, what, format!("a line is longer than {LINE_MAX} bytes")));

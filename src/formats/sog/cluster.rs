@@ -1,15 +1,15 @@
-//! Codebooks of single numbers and of vectors. No random numbers: the same values give the same book.
+//! Codebooks of numbers and vectors. They use no random numbers, so the same values give the same codebook.
 
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Rounds of Lloyd's algorithm for numbers.
-const ROUNDS: usize = 20;
-/// Rounds of the power iteration that finds the direction in which a cluster is widest.
-const POWER: usize = 6;
+/// Iterations of Lloyd's algorithm for numbers.
+const LLOYD_ITERATIONS: usize = 20;
+/// Power iterations to find the direction of a cluster's largest spread.
+const POWER_ITERATIONS: usize = 6;
 
-/// Returns up to `size` numbers, sorted, near which all values lie; filled up with the last one.
+/// Returns up to `size` sorted numbers that approximate the values, padded with the last one.
 pub(super) fn numbers(values: impl Iterator<Item = f32>, size: usize) -> Vec<f32> {
     let mut sorted: Vec<f32> = values.collect();
     sorted.sort_unstable_by(f32::total_cmp);
@@ -20,7 +20,7 @@ pub(super) fn numbers(values: impl Iterator<Item = f32>, size: usize) -> Vec<f32
         different.resize(size, last);
         return different;
     }
-    // Halving the cells with the largest spread leaves numbers for rare values at the ends too.
+    // Halving the cells with the largest spread keeps numbers for rare values at the ends too.
     let (cells, _) = vectors(&different, 1, size);
     let mut book: Vec<f32> = cells.into_iter().flatten().collect();
     book.sort_unstable_by(f32::total_cmp);
@@ -31,7 +31,7 @@ pub(super) fn numbers(values: impl Iterator<Item = f32>, size: usize) -> Vec<f32
             Some(*sum)
         }))
         .collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..LLOYD_ITERATIONS {
         let mut first = 0;
         for cell in 0..size {
             let end = match book.get(cell + 1) {
@@ -48,7 +48,7 @@ pub(super) fn numbers(values: impl Iterator<Item = f32>, size: usize) -> Vec<f32
     book
 }
 
-/// Returns the index of the nearest number of a sorted book.
+/// Returns the index of the nearest number in a sorted codebook.
 pub(super) fn nearest(book: &[f32], value: f32) -> u8 {
     let at = book.partition_point(|&own| own < value).min(book.len() - 1);
     let before = at.saturating_sub(1);
@@ -80,8 +80,8 @@ impl Ord for Cluster {
     }
 }
 
-/// Divides vectors of `width` numbers into up to `size` clusters: the one with the largest spread is halved, across the
-/// direction in which it is widest, until there are enough. Returns the centres and the cluster of each vector.
+/// Divides vectors of `width` numbers into up to `size` clusters. Repeatedly halves the cluster with the largest
+/// spread, across the direction of that spread. Returns the centres and the cluster of each vector.
 pub(super) fn vectors(values: &[f32], width: usize, size: usize) -> (Vec<Vec<f32>>, Vec<u16>) {
     let count = values.len() / width;
     let row = |row: u32| &values[row as usize * width..][..width];
@@ -95,7 +95,7 @@ pub(super) fn vectors(values: &[f32], width: usize, size: usize) -> (Vec<Vec<f32
     };
     let mut clusters = BinaryHeap::from([make((0..count as u32).collect())]);
     while clusters.len() < size {
-        // Several at once: those of the first halves do not depend on each other.
+        // Halve several at once: the first halvings are independent.
         let open = (size - clusters.len()).min(clusters.len().max(1));
         let mut widest = Vec::new();
         while widest.len() < open && clusters.peek().is_some_and(|cluster| cluster.spread > 0.0) {
@@ -127,11 +127,11 @@ fn halve<'a>(cluster: &Cluster, row: &impl Fn(u32) -> &'a [f32]) -> Vec<Vec<u32>
             .map(|((value, centre), axis)| f64::from(value - centre) * axis)
             .sum()
     };
-    // The vector farthest from the centre starts the search: it is never at the centre, as the spread is above 0.
+    // Start at the vector farthest from the centre: it differs from the centre, because the spread is above 0.
     let off = |at: u32| row(at).iter().zip(&cluster.centre).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
     let far = cluster.rows.iter().copied().max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or_default();
     let mut axis: Vec<f64> = row(far).iter().zip(&cluster.centre).map(|(a, b)| f64::from(a - b)).collect();
-    for _ in 0..POWER {
+    for _ in 0..POWER_ITERATIONS {
         let mut next = vec![0.0; width];
         for &at in &cluster.rows {
             let share = along(at, &axis);
@@ -148,7 +148,7 @@ fn halve<'a>(cluster: &Cluster, row: &impl Fn(u32) -> &'a [f32]) -> Vec<Vec<u32>
     }
     let (low, high): (Vec<u32>, Vec<u32>) = cluster.rows.iter().partition(|&&at| along(at, &axis) < 0.0);
     if low.is_empty() || high.is_empty() {
-        // Rounding put all on one side.
+        // Rounding put all vectors on one side.
         let (low, high) = cluster.rows.split_at(cluster.rows.len() / 2);
         return vec![low.to_vec(), high.to_vec()];
     }

@@ -1,13 +1,13 @@
-//! `meta.json`.
+//! The file `meta.json` of a SOG.
 
 use labelgs_files::label_table::LabelTable;
 use serde::{Deserialize, Serialize};
 
-pub(super) const FILE: &str = "meta.json";
+pub(super) const META_FILE: &str = "meta.json";
 pub(super) const VERSION: u32 = 2;
 /// [`Meta::model`] of an antialiased model.
-pub(super) const ANTIALIASED: &str = "antialiased";
-/// Version of our own part.
+pub(super) const ANTIALIASED_MODEL: &str = "antialiased";
+/// Version of the labelgs extras.
 pub(super) const EXTRAS_VERSION: u32 = 1;
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -17,16 +17,16 @@ pub(super) struct Meta {
     #[serde(default)]
     pub(super) asset: Asset,
     pub(super) count: usize,
-    /// `antialiased` or nothing.
+    /// `antialiased` or absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) model: Option<String>,
     /// The same in older files.
     #[serde(default, skip_serializing)]
     pub(super) antialias: bool,
     pub(super) means: Means,
-    pub(super) scales: Coded,
+    pub(super) scales: CodebookIndices,
     pub(super) quats: Files,
-    pub(super) sh0: Coded,
+    pub(super) sh0: CodebookIndices,
     #[serde(rename = "shN", default, skip_serializing_if = "Option::is_none")]
     pub(super) rest: Option<Palette>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -39,7 +39,7 @@ pub(super) struct Asset {
     pub(super) generator: String,
 }
 
-/// Positions: bounds of their logarithms, pictures of the low and high bytes.
+/// Positions: bounds of their logarithms, and images of the low and high bytes.
 #[derive(Debug, Deserialize, Serialize)]
 pub(super) struct Means {
     pub(super) mins: [f64; 3],
@@ -54,12 +54,12 @@ pub(super) struct Files {
 
 /// Indices into a codebook.
 #[derive(Debug, Deserialize, Serialize)]
-pub(super) struct Coded {
+pub(super) struct CodebookIndices {
     pub(super) codebook: Vec<f32>,
     pub(super) files: [String; 1],
 }
 
-/// Harmonics: pictures of the palette's entries and of the entry of each Gaussian.
+/// Harmonics: images of the palette entries, and of the entry of each Gaussian.
 #[derive(Debug, Deserialize, Serialize)]
 pub(super) struct Palette {
     pub(super) count: usize,
@@ -76,7 +76,7 @@ pub(super) struct Extras {
     pub(super) view: Option<View>,
 }
 
-/// The first view, in the world and the axes of labelgs.
+/// The initial view, in the world and axes of labelgs.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(super) struct View {
     pub(super) up: [f64; 3],
@@ -87,7 +87,7 @@ pub(super) struct View {
 pub(super) struct Labels {
     pub(super) version: u32,
     pub(super) file: String,
-    /// True if the blue of the picture is the confidence.
+    /// Whether the blue channel of the image is the confidence.
     pub(super) confidence: bool,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) names: Option<LabelTable>,

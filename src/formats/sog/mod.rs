@@ -1,28 +1,28 @@
-//! SOG version 2, the compressed format of PlayCanvas: `meta.json` and lossless WebP pictures in an archive. A Gaussian is
-//! a pixel, the same in each picture. Labels are one more picture, which `extras` of `meta.json` names.
+//! SOG version 2, the compressed format of PlayCanvas: an archive with `meta.json` and lossless WebP images. A Gaussian
+//! is the same pixel in every image. Labels are an additional image, named in `extras` of `meta.json`.
 
 mod cluster;
+mod images;
 mod meta;
-mod pictures;
 mod read;
 mod write;
 
 use super::format::ModelFormat;
 
-/// The format by its ending.
-pub(super) const FORMAT: ModelFormat = ModelFormat {
+/// The SOG format.
+pub(super) const MODEL_FORMAT: ModelFormat = ModelFormat {
     name: "SOG",
-    endings: &[".sog"],
+    extensions: &[".sog"],
     contents: &["a zip archive"],
     read: read::read,
-    write: Some(write::WRITER),
+    write: Some(write::MODEL_WRITER),
 };
 
-/// Values in a codebook.
-const CODEBOOK: usize = 256;
-/// Entries of the palette in a row of its picture.
-const PALETTE_ROW: usize = 64;
-/// First alpha of a rotation; which component is the largest follows.
-const ROTATION: u8 = 252;
-/// Picture with labels: red and green are the id, blue is the confidence.
-const LABELS: &str = "labels.webp";
+/// Number of values in a codebook.
+const CODEBOOK_SIZE: usize = 256;
+/// Number of palette entries per row of the palette image.
+const PALETTE_ROW_ENTRIES: usize = 64;
+/// Alpha of a rotation whose first component is the largest; larger values mean the following components.
+const ROTATION_ALPHA_MIN: u8 = 252;
+/// Image with labels: red and green are the id, blue is the confidence.
+const LABELS_IMAGE: &str = "labels.webp";

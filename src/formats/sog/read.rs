@@ -1,8 +1,8 @@
 //! Reads SOG.
 
-use super::meta::{ANTIALIASED, EXTRAS_VERSION, FILE, Labels, Meta, VERSION};
-use super::pictures::{Picture, picture};
-use super::{CODEBOOK, PALETTE_ROW, ROTATION};
+use super::images::{Image, picture};
+use super::meta::{ANTIALIASED_MODEL, EXTRAS_VERSION, Labels, META_FILE, Meta, VERSION};
+use super::{CODEBOOK_SIZE, PALETTE_ROW_ENTRIES, ROTATION_ALPHA_MIN};
 use crate::archive::Archive;
 use crate::format::{FirstView, ReadModel};
 use crate::rows::{Row, Rows};
@@ -13,27 +13,27 @@ use labelgs_scene::{Error, Result};
 use std::f64::consts::SQRT_2;
 use std::path::Path;
 
-/// The pictures of a file, each with a pixel for every Gaussian.
-struct Pictures {
-    low: Picture,
-    high: Picture,
-    quats: Picture,
-    scales: Picture,
-    sh0: Picture,
-    /// Entries of the palette, and the palette.
-    rest: Option<(Picture, Picture)>,
-    labels: Option<Picture>,
+/// The images of a file, each with a pixel for every Gaussian.
+struct Images {
+    low: Image,
+    high: Image,
+    quats: Image,
+    scales: Image,
+    sh0: Image,
+    /// The palette index of each Gaussian, and the palette.
+    rest: Option<(Image, Image)>,
+    labels: Option<Image>,
 }
 
 /// Reads a SOG of version 2.
 pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let bytes = file::bytes(path)?;
     let mut archive = Archive::open(path, &bytes, "SOG")?;
-    let text = archive.file(FILE)?;
+    let text = archive.file(META_FILE)?;
     let meta: Meta = serde_json::from_slice(&text)
-        .map_err(|error| Error::data(path, FILE, format!("{error}; expected that of a SOG; export the file again")))?;
+        .map_err(|error| Error::data(path, META_FILE, format!("{error}; expected that of a SOG; export it again")))?;
     if meta.version != VERSION {
-        return Err(bad(path, FILE, format!("has version {}; {VERSION} is read", meta.version)));
+        return Err(bad(path, META_FILE, format!("has version {}; {VERSION} is read", meta.version)));
     }
     let view = meta.extras.as_ref().and_then(|extras| extras.view);
     let own = meta.extras.as_ref().and_then(|extras| extras.labelgs.as_ref());
@@ -45,7 +45,7 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     for index in 0..meta.count {
         if let (Some(own), Some((entries, palette))) = (&meta.rest, &pictures.rest) {
             harmonics(&mut triples, &own.codebook, palette, entries.texels[index])
-                .ok_or_else(|| bad(path, &own.files[1], format!("pixel {index} names no entry of the palette")))?;
+                .ok_or_else(|| bad(path, &own.files[1], format!("pixel {index} refers to a missing palette entry")))?;
         }
         let place = |axis: usize| {
             let steps = [&pictures.low, &pictures.high].map(|picture| picture.texels[index][axis]);
@@ -69,7 +69,7 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     let names = own.and_then(|own| own.names.as_ref());
     let names = names.map(|names| names.checked(path)).transpose()?;
     let mut read = rows.finish(path, None)?;
-    read.gaussians.antialiased = meta.antialias || meta.model.as_deref() == Some(ANTIALIASED);
+    read.gaussians.antialiased = meta.antialias || meta.model.as_deref() == Some(ANTIALIASED_MODEL);
     let first_view = view.and_then(|view| FirstView::checked(view.up.into(), view.eye.into()));
     Ok(ReadModel { names, first_view, ..read })
 }
@@ -78,21 +78,21 @@ fn bad(path: &Path, place: &str, problem: String) -> Error {
     Error::data(path, place, format!("{problem}; export the file again"))
 }
 
-/// Reads the pictures, and checks their sizes and the codebooks.
-fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archive) -> Result<Pictures> {
+/// Reads the images, and checks their sizes and the codebooks.
+fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archive) -> Result<Images> {
     let mut rest = None;
     if let Some(own) = &meta.rest {
         if !(1..=3).contains(&own.bands) {
-            return Err(bad(path, FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
+            return Err(bad(path, META_FILE, format!("has harmonics of degree {}; expected 1 to 3", own.bands)));
         }
         let (entries, palette) = (picture(archive, &own.files[1])?, picture(archive, &own.files[0])?);
-        if palette.width != PALETTE_ROW * coefficients(own.bands) {
-            let problem = format!("is {} wide, expected {PALETTE_ROW} entries a row", palette.width);
+        if palette.width != PALETTE_ROW_ENTRIES * coefficients(own.bands) {
+            let problem = format!("is {} wide, expected {PALETTE_ROW_ENTRIES} entries a row", palette.width);
             return Err(bad(path, &own.files[0], problem));
         }
         rest = Some((entries, palette));
     }
-    let all = Pictures {
+    let all = Images {
         low: picture(archive, &meta.means.files[0])?,
         high: picture(archive, &meta.means.files[1])?,
         quats: picture(archive, &meta.quats.files[0])?,
@@ -104,31 +104,31 @@ fn pictures(path: &Path, meta: &Meta, own: Option<&Labels>, archive: &mut Archiv
     let needed = [&all.low, &all.high, &all.quats, &all.scales, &all.sh0].into_iter().chain(&all.labels);
     let least = needed.chain(all.rest.as_ref().map(|rest| &rest.0)).map(|picture| picture.texels.len()).min();
     if meta.count == 0 || least < Some(meta.count) {
-        return Err(bad(path, FILE, format!("has {} Gaussians, and a picture has fewer pixels", meta.count)));
+        return Err(bad(path, META_FILE, format!("has {} Gaussians, but an image has fewer pixels", meta.count)));
     }
     let books =
         [&meta.scales.codebook, &meta.sh0.codebook].into_iter().chain(meta.rest.as_ref().map(|rest| &rest.codebook));
-    if books.into_iter().any(|book| book.len() != CODEBOOK) {
-        return Err(bad(path, FILE, format!("has a codebook of other than {CODEBOOK} numbers")));
+    if books.into_iter().any(|book| book.len() != CODEBOOK_SIZE) {
+        return Err(bad(path, META_FILE, format!("has a codebook without exactly {CODEBOOK_SIZE} numbers")));
     }
     Ok(all)
 }
 
-/// Fills in the harmonics of a palette's entry; `None` if there is no such entry.
-fn harmonics(to: &mut [[f32; 3]], book: &[f32], palette: &Picture, [low, high, _, _]: [u8; 4]) -> Option<()> {
+/// Decodes the harmonics of a palette entry; `None` if the palette has no such entry.
+fn harmonics(to: &mut [[f32; 3]], book: &[f32], palette: &Image, [low, high, _, _]: [u8; 4]) -> Option<()> {
     let entry = usize::from(u16::from_le_bytes([low, high]));
-    let start = entry / PALETTE_ROW * palette.width + entry % PALETTE_ROW * to.len();
+    let start = entry / PALETTE_ROW_ENTRIES * palette.width + entry % PALETTE_ROW_ENTRIES * to.len();
     let texels = palette.texels.get(start..start + to.len())?;
     to.iter_mut().zip(texels).for_each(|(triple, texel)| *triple = [0, 1, 2].map(|at| book[usize::from(texel[at])]));
     Some(())
 }
 
-/// The rotation (w, x, y, z) of a pixel.
+/// Decodes the rotation (w, x, y, z) of a pixel.
 fn quat([a, b, c, which]: [u8; 4]) -> [f64; 4] {
-    if which < ROTATION {
+    if which < ROTATION_ALPHA_MIN {
         return [1.0, 0.0, 0.0, 0.0];
     }
     let [a, b, c] = [a, b, c].map(|value| (f64::from(value) / 255.0 * 2.0 - 1.0) / SQRT_2);
     let largest = (1.0 - a * a - b * b - c * c).max(0.0).sqrt();
-    with_largest(largest, u32::from(which - ROTATION), [a, b, c])
+    with_largest(largest, u32::from(which - ROTATION_ALPHA_MIN), [a, b, c])
 }

@@ -1,20 +1,20 @@
-//! The axes of an SPZ: right, up, back, unless a record says others.
+//! The axes of an SPZ: right, up, back, unless a record specifies others.
 
+use crate::axis_signs::Signs;
 use crate::transform::Transform;
-use crate::turn::Signs;
 use glam::DQuat;
 use std::f64::consts::FRAC_PI_2;
 
-/// Bits of a record's value less 1: x is right, the axis of height is up, that of depth is front. In the second half of
-/// the values z is the axis of height.
-const RIGHT: u32 = 1;
-const UP: u32 = 2;
-const FRONT: u32 = 4;
-const Z_IS_HEIGHT: u32 = 8;
-/// Largest value of a record. 0 is none of them.
+/// Bits of a record's value minus 1: x points right, the height axis points up, the depth axis points to the front. In
+/// the upper half of the values, z is the height axis.
+const RIGHT_BIT: u32 = 1;
+const UP_BIT: u32 = 2;
+const FRONT_BIT: u32 = 4;
+const HEIGHT_IS_Z_BIT: u32 = 8;
+/// Largest value of a record; 0 is invalid.
 const VALUE_MAX: u32 = 16;
 
-/// How the axes of a file become ours: first signs, then a quarter turn about x.
+/// How to convert a file's axes to ours: signs, then a quarter turn about x.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FileAxes {
     pub(super) signs: Signs,
@@ -23,25 +23,28 @@ pub(super) struct FileAxes {
 
 impl Default for FileAxes {
     fn default() -> Self {
-        Self { signs: super::AXES, is_turned: false }
+        Self { signs: super::SPZ_AXES, is_turned: false }
     }
 }
 
 impl FileAxes {
-    /// The axes of a record; `None` for an unknown value.
-    pub(super) fn of_record(value: u32) -> Option<Self> {
+    /// Returns the axes of a record, or `None` for an unknown value.
+    pub(super) fn from_record(value: u32) -> Option<Self> {
         if value == 0 || value > VALUE_MAX {
             return (value == 0).then(Self::default);
         }
         let sign = |bit: u32| if (value - 1) & bit == 0 { -1.0 } else { 1.0 };
-        let is_turned = (value - 1) & Z_IS_HEIGHT != 0;
-        // Ours are right, down, front. The quarter turn makes -z, which is up for a z that is down, our y.
-        let signs =
-            if is_turned { [sign(RIGHT), sign(FRONT), sign(UP)] } else { [sign(RIGHT), -sign(UP), sign(FRONT)] };
+        let is_turned = (value - 1) & HEIGHT_IS_Z_BIT != 0;
+        // Ours are right, down, front. The quarter turn maps -z, which is up if z is down, to our y.
+        let signs = if is_turned {
+            [sign(RIGHT_BIT), sign(FRONT_BIT), sign(UP_BIT)]
+        } else {
+            [sign(RIGHT_BIT), -sign(UP_BIT), sign(FRONT_BIT)]
+        };
         Some(Self { signs: Signs(signs), is_turned })
     }
 
-    /// The turn after the signs, if there is one.
+    /// Returns the turn after the signs, if there is one.
     pub(super) fn turn(self) -> Option<Transform> {
         let turn = DQuat::from_rotation_x(FRAC_PI_2);
         self.is_turned.then(|| Transform { turn, ..Transform::default() })

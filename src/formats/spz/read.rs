@@ -1,7 +1,7 @@
 //! Reads SPZ.
 
 use super::record::{self, Records};
-use super::{ANTIALIASED, BITS_MAX, HAS_RECORDS, MAGIC, pack, planes};
+use super::{ANTIALIASED_BIT, BITS_MAX, MAGIC, RECORDS_BIT, pack, planes};
 use crate::format::ReadModel;
 use crate::rows::{Row, Rows};
 use crate::side_labels;
@@ -14,14 +14,14 @@ use labelgs_scene::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
-/// Most bytes that a byte of gzip stands for.
-const GZIP_RATIO: u64 = 1032;
-/// Most bytes of positions that a byte of a version 4 file may stand for, as its readers demand.
-const V4_RATIO: u64 = 1024;
+/// Largest expansion of a byte by gzip.
+const GZIP_RATIO_MAX: u64 = 1032;
+/// Most bytes of positions per byte of a version 4 file, as its readers demand.
+const V4_RATIO_MAX: u64 = 1024;
 /// Most bytes of records besides labels.
 const RECORDS_MAX: u64 = 16 << 20;
-const HEADER: usize = 16;
-const HEADER_V4: usize = 32;
+const HEADER_BYTES: usize = 16;
+const HEADER_V4_BYTES: usize = 32;
 
 struct Header {
     version: u32,
@@ -33,8 +33,8 @@ struct Header {
     streams: usize,
 }
 
-/// A file with its planes unpacked.
-struct Unpacked {
+/// A file with its planes decompressed.
+struct UnpackedFile {
     header: Header,
     planes: Vec<Vec<u8>>,
     records: Records,
@@ -46,13 +46,13 @@ pub(super) fn read(path: &Path) -> Result<ReadModel> {
     read_bytes(path, &file::bytes(path)?)
 }
 
-/// Reads the bytes of an SPZ; `path` is where they come from.
+/// Reads the bytes of an SPZ; `path` is their source, for messages.
 pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
-    let Unpacked { header, planes, mut records, mut notes } = match bytes.first_chunk::<4>() {
+    let UnpackedFile { header, planes, mut records, mut notes } = match bytes.first_chunk::<4>() {
         Some([0x1f, 0x8b, _, _]) => gzipped(path, bytes)?,
         Some(&magic) if u32::from_le_bytes(magic) == MAGIC => framed(path, bytes)?,
         _ => {
-            let problem = "starts neither with gzip (versions 1 to 3) nor with `NGSP` (version 4); this is no SPZ file";
+            let problem = "starts neither with gzip (versions 1 to 3) nor `NGSP` (version 4); this is not an SPZ file";
             return Err(Error::data(path, "byte 0", problem));
         }
     };
@@ -60,7 +60,7 @@ pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<ReadModel> {
         records.labels = side_labels::read(path, header.count, crc32fast::hash(&planes[0]), &mut notes)?;
     }
     if header.sh_degree > 3 {
-        notes.push("harmonics of degree 4 were left out; labelgs has 3 degrees".into());
+        notes.push("harmonics of degree 4 were omitted; labelgs supports up to degree 3".into());
     }
     let mut read = decode(path, &header, &planes, &records)?;
     notes.append(&mut records.notes);
@@ -79,7 +79,7 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
         let (place, spin, harmonics) = (at(0), at(4), at(5));
         let position = match header.version {
             1 => [0, 2, 4].map(|at| f16::from_le_bytes([place[at], place[at + 1]]).to_f64()),
-            _ => [0, 3, 6].map(|at| pack::place(&place[at..], header.bits)),
+            _ => [0, 3, 6].map(|at| pack::decode_position(&place[at..], header.bits)),
         };
         let quat = match *spin {
             [a, b, c, d] => pack::quat([a, b, c, d]),
@@ -105,15 +105,15 @@ fn decode(path: &Path, header: &Header, planes: &[Vec<u8>], records: &Records) -
     if let Some(turn) = records.axes.turn() {
         read.gaussians = turn.apply(&read.gaussians)?;
     }
-    read.gaussians.antialiased = header.flags & ANTIALIASED != 0;
+    read.gaussians.antialiased = header.flags & ANTIALIASED_BIT != 0;
     Ok(read)
 }
 
-/// Reads the fields that all versions have in common.
+/// Reads the header fields that all versions share.
 fn header(path: &Path, bytes: &[u8]) -> Result<Header> {
     let bad = |place: &str, problem: String| Err(Error::data(path, place, problem));
-    let Some(head) = bytes.first_chunk::<HEADER>() else {
-        return bad("header", format!("has {} bytes, expected {HEADER}; the file was cut short", bytes.len()));
+    let Some(head) = bytes.first_chunk::<HEADER_BYTES>() else {
+        return bad("header", format!("has {} bytes; expected {HEADER_BYTES}; the file was cut short", bytes.len()));
     };
     let number = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
     let header = Header {
@@ -125,7 +125,7 @@ fn header(path: &Path, bytes: &[u8]) -> Result<Header> {
         streams: usize::from(head[15]),
     };
     if number(0) != MAGIC {
-        return bad("byte 0", "the packed data does not start with `NGSP`; this is no SPZ file".into());
+        return bad("byte 0", "the packed data does not start with `NGSP`; this is not an SPZ file".into());
     }
     if !(1..=4).contains(&header.version) {
         return bad("byte 4", format!("has version {}; 1 to 4 are read", header.version));
@@ -150,8 +150,8 @@ fn too_large(path: &Path, header: &Header, bytes: usize) -> Error {
     Error::data(path, "byte 8", problem)
 }
 
-/// Versions 1 to 3.
-fn gzipped(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
+/// Decompresses versions 1 to 3.
+fn gzipped(path: &Path, bytes: &[u8]) -> Result<UnpackedFile> {
     let broken = |place: &'static str| {
         move |error: std::io::Error| {
             Error::data(path, place, format!("cannot be unpacked: {error}; the file was cut short or changed"))
@@ -159,14 +159,14 @@ fn gzipped(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
     };
     let mut stream = GzDecoder::new(bytes);
     let mut head = Vec::new();
-    (&mut stream).take(HEADER as u64).read_to_end(&mut head).map_err(broken("header"))?;
+    (&mut stream).take(HEADER_BYTES as u64).read_to_end(&mut head).map_err(broken("header"))?;
     let header = header(path, &head)?;
     if header.version == 4 {
-        return Err(Error::data(path, "byte 4", "has version 4 inside of gzip; that version is not packed as a whole"));
+        return Err(Error::data(path, "byte 4", "has version 4 inside gzip; that version is not packed as a whole"));
     }
     let widths = planes(header.version, header.sh_degree);
     let needed = header.count as u64 * widths.iter().sum::<usize>() as u64;
-    if needed > GZIP_RATIO * bytes.len() as u64 {
+    if needed > GZIP_RATIO_MAX * bytes.len() as u64 {
         return Err(too_large(path, &header, bytes.len()));
     }
     let mut unpacked = Vec::new();
@@ -182,7 +182,7 @@ fn gzipped(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
     let most = RECORDS_MAX + 5 * header.count as u64;
     (&mut stream).take(most).read_to_end(&mut rest).map_err(broken("end"))?;
     let mut notes = Vec::new();
-    let records = if header.flags & HAS_RECORDS != 0 {
+    let records = if header.flags & RECORDS_BIT != 0 {
         record::read(path, &rest, header.count)?
     } else {
         if !rest.is_empty() {
@@ -190,27 +190,27 @@ fn gzipped(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
         }
         Records::default()
     };
-    Ok(Unpacked { header, planes: unpacked, records, notes })
+    Ok(UnpackedFile { header, planes: unpacked, records, notes })
 }
 
-/// Version 4.
-fn framed(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
+/// Decompresses version 4.
+fn framed(path: &Path, bytes: &[u8]) -> Result<UnpackedFile> {
     let header = header(path, bytes)?;
     let bad = |place: &str, problem: String| Error::data(path, place, problem);
     if header.version != 4 {
-        return Err(bad("byte 4", format!("has version {} without gzip; only version 4 starts so", header.version)));
+        return Err(bad("byte 4", format!("has version {} without gzip; only version 4 may", header.version)));
     }
-    if 9 * header.count as u64 > V4_RATIO * bytes.len() as u64 {
+    if 9 * header.count as u64 > V4_RATIO_MAX * bytes.len() as u64 {
         return Err(too_large(path, &header, bytes.len()));
     }
     let widths = planes(4, header.sh_degree);
     let streams = widths.iter().filter(|&&width| width > 0).count();
     if header.streams != streams {
-        let problem = format!("has {} streams, expected {streams} for degree {}", header.streams, header.sh_degree);
+        let problem = format!("has {} streams; expected {streams} for degree {}", header.streams, header.sh_degree);
         return Err(bad("byte 15", problem));
     }
     let table = bytes.get(16..20).map_or(0, |at| u32::from_le_bytes([at[0], at[1], at[2], at[3]]) as usize);
-    let Some(mut frames) = bytes.get(table + 16 * streams..).filter(|_| table >= HEADER_V4) else {
+    let Some(mut frames) = bytes.get(table + 16 * streams..).filter(|_| table >= HEADER_V4_BYTES) else {
         let problem = format!("puts the table of sizes at byte {table}, beyond the file; it was cut short or changed");
         return Err(bad("byte 16", problem));
     };
@@ -226,11 +226,11 @@ fn framed(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
         let [packed, plain] =
             [0, 8].map(|at| sizes[at..at + 8].iter().rev().fold(0_u64, |size, &byte| size << 8 | u64::from(byte)));
         if plain != length as u64 {
-            return Err(bad(&place, format!("has {plain} bytes, expected {length} for {} Gaussians", header.count)));
+            return Err(bad(&place, format!("has {plain} bytes; expected {length} for {} Gaussians", header.count)));
         }
         let Some((frame, rest)) = usize::try_from(packed).ok().and_then(|packed| frames.split_at_checked(packed))
         else {
-            return Err(bad(&place, format!("promises {packed} packed bytes, {} are left", frames.len())));
+            return Err(bad(&place, format!("promises {packed} packed bytes; only {} are left", frames.len())));
         };
         let mut plane = Vec::new();
         let decoder =
@@ -238,14 +238,17 @@ fn framed(path: &Path, bytes: &[u8]) -> Result<Unpacked> {
         decoder
             .map_err(|error| bad(&place, format!("cannot be unpacked: {error}; the file was cut short or changed")))?;
         if plane.len() != length {
-            return Err(bad(&place, format!("unpacks to other than {length} bytes")));
+            return Err(bad(&place, format!("does not unpack to {length} bytes")));
         }
         unpacked.push(plane);
         frames = rest;
     }
     let notes = (!frames.is_empty()).then(|| format!("{} bytes after the last stream were ignored", frames.len()));
-    let has_records = header.flags & HAS_RECORDS != 0;
-    let records =
-        if has_records { record::read(path, &bytes[HEADER_V4..table], header.count)? } else { Records::default() };
-    Ok(Unpacked { header, planes: unpacked, records, notes: notes.into_iter().collect() })
+    let has_records = header.flags & RECORDS_BIT != 0;
+    let records = if has_records {
+        record::read(path, &bytes[HEADER_V4_BYTES..table], header.count)?
+    } else {
+        Records::default()
+    };
+    Ok(UnpackedFile { header, planes: unpacked, records, notes: notes.into_iter().collect() })
 }

@@ -34,7 +34,7 @@ fn an_unknown_extension_is_refused() {
             assert_eq!(read.expect("read by its content").gaussians, balls());
         } else {
             let refused = refusal(read);
-            assert!(refused.contains("is no extension of a model") && refused.contains(".ply"), "{refused}");
+            assert!(refused.contains("is not a model extension") && refused.contains(".ply"), "{refused}");
         }
     }
     for format in ["spz", "glb", "sog", "usda"] {

@@ -1,11 +1,11 @@
-//! PLY models of other trainers and programs: their columns, labels and headers, and files that are no PLY.
+//! PLY models of other trainers and programs: columns, labels and headers, and files that are not PLY.
 
 use super::fixtures::*;
 use labelgs_formats::{ReadModel, read_model, write_model};
 use std::fs;
 
 /// The columns of a 3DGS PLY of degree 0, and values of a row.
-const PLAIN: [(&str, f64); 14] = [
+const PLAIN_COLUMNS: [(&str, f64); 14] = [
     ("x", 1.0),
     ("y", 2.0),
     ("z", 3.0),
@@ -22,7 +22,7 @@ const PLAIN: [(&str, f64); 14] = [
     ("rot_3", 0.0),
 ];
 
-/// A PLY of text with one row for each of `last`, the values of the last column.
+/// An ascii PLY with one row for each entry of `last`, the values of the last column.
 fn ply(columns: &[(&str, f64)], last: &[f64]) -> String {
     let properties: String = columns.iter().map(|(name, _)| format!("property float {name}\n")).collect();
     let head: String = columns[..columns.len() - 1].iter().map(|(_, value)| format!("{value} ")).collect();
@@ -30,9 +30,9 @@ fn ply(columns: &[(&str, f64)], last: &[f64]) -> String {
     format!("ply\nformat ascii 1.0\ncomment x\nelement vertex {}\n{properties}end_header\n{rows}", last.len())
 }
 
-/// The plain columns and more.
+/// The plain columns and additional ones.
 fn with(more: &[(&'static str, f64)]) -> Vec<(&'static str, f64)> {
-    PLAIN.iter().chain(more).copied().collect()
+    PLAIN_COLUMNS.iter().chain(more).copied().collect()
 }
 
 fn read(columns: &[(&str, f64)]) -> ReadModel {
@@ -41,10 +41,10 @@ fn read(columns: &[(&str, f64)]) -> ReadModel {
 }
 
 fn without(name: &str) -> Vec<(&'static str, f64)> {
-    PLAIN.into_iter().filter(|column| column.0 != name).collect()
+    PLAIN_COLUMNS.into_iter().filter(|column| column.0 != name).collect()
 }
 
-/// Squares of sizes add up, and the opacity falls by the ratio of the volumes.
+/// Squared sizes add up, and the opacity falls by the ratio of the volumes.
 #[test]
 fn the_filter_of_mip_splatting_is_applied() {
     let filter = 0.2_f64;
@@ -59,8 +59,8 @@ fn the_filter_of_mip_splatting_is_applied() {
     assert!((f64::from(gaussians.opacities[0]) - (share / (1.0 - share)).ln()).abs() < 1e-6);
     assert_eq!(notes.len(), 1, "{notes:?}");
     assert!(notes[0].contains("`filter_3D`"), "{notes:?}");
-    // A filter of 0 changes nothing, and the smallest Gaussian stays one that can be drawn.
-    assert_eq!(read(&with(&[("filter_3D", 0.0)])).gaussians, read(&PLAIN).gaussians);
+    // A filter of 0 changes nothing, and the smallest Gaussian remains drawable.
+    assert_eq!(read(&with(&[("filter_3D", 0.0)])).gaussians, read(&PLAIN_COLUMNS).gaussians);
     let mut tiny = with(&[("filter_3D", 1e6)]);
     tiny[7].1 = -40.0;
     assert_eq!(read(&tiny).dropped, 0);
@@ -91,17 +91,17 @@ fn prefixes_of_cloudcompare_are_dropped() {
 #[test]
 fn harmonics_of_degree_4_are_left_out() {
     let names: Vec<String> = (0..72).map(|index| format!("f_rest_{index}")).collect();
-    let mut columns: Vec<(&str, f64)> = PLAIN.to_vec();
+    let mut columns: Vec<(&str, f64)> = PLAIN_COLUMNS.to_vec();
     columns.extend(names.iter().enumerate().map(|(index, name)| (name.as_str(), index as f64)));
     let ReadModel { gaussians, notes, .. } = read(&columns);
     let expected: Vec<[f32; 3]> = (0..15).map(|k| [k as f32, (24 + k) as f32, (48 + k) as f32]).collect();
     assert_eq!((gaussians.sh_degree, gaussians.sh_rest), (3, expected));
-    assert_eq!(notes, ["harmonics of degree 4 were left out; labelgs has 3 degrees"]);
+    assert_eq!(notes, ["harmonics of degree 4 were omitted; labelgs supports up to degree 3"]);
     let refused = refusal(read_model(Scene::new().write("a.ply", ply(&columns[..20], &[0.0]))));
     assert!(refused.contains("6 `f_rest_` properties") && refused.contains("export it"), "{refused}");
 }
 
-/// Columns that may change the picture are named once; those that do not, are not.
+/// Columns that may change renders are named once; harmless columns are not named.
 #[test]
 fn columns_that_are_not_read_are_named() {
     let lobes = [("sg_axis_0", 1.0), ("sg_axis_1", 1.0), ("sg_sharpness_0", 2.0), ("beta", 0.5)];
@@ -110,8 +110,9 @@ fn columns_that_are_not_read_are_named() {
     assert!(notes[0].contains("the columns beta, sg_axis_*, sg_sharpness_* were not read"), "{notes:?}");
     let harmless = [("nx", 0.0), ("ny", 0.0), ("nz", 1.0), ("red", 1.0), ("obj_dc_0", 3.0), ("id", 4.0)];
     assert_eq!(read(&with(&harmless)).notes, Vec::<String>::new());
-    // Anchors of a network are no Gaussians.
-    let mut anchors: Vec<(&str, f64)> = PLAIN.into_iter().filter(|(name, _)| !name.starts_with("f_dc")).collect();
+    // Anchors of a network are not Gaussians.
+    let mut anchors: Vec<(&str, f64)> =
+        PLAIN_COLUMNS.into_iter().filter(|(name, _)| !name.starts_with("f_dc")).collect();
     anchors.push(("f_anchor_feat_0", 0.0));
     let refused = refusal(read_model(Scene::new().write("a.ply", ply(&anchors, &[0.0]))));
     assert!(refused.contains("Scaffold-GS") && refused.contains("export"), "{refused}");
@@ -123,7 +124,7 @@ fn columns_that_are_not_read_are_named() {
 fn colours_instead_of_harmonics_are_read() {
     let colours = [("red", 255.0), ("green", 0.0), ("blue", 51.0)];
     let columns: Vec<(&str, f64)> =
-        PLAIN.into_iter().filter(|(name, _)| !name.starts_with("f_dc")).chain(colours).collect();
+        PLAIN_COLUMNS.into_iter().filter(|(name, _)| !name.starts_with("f_dc")).chain(colours).collect();
     let text = ply(&columns, &[51.0]);
     let bytes = ["red", "green", "blue"]
         .iter()
@@ -132,7 +133,7 @@ fn colours_instead_of_harmonics_are_read() {
     for (found, expected) in sh0.iter().zip([1.0, 0.0, 0.2]) {
         assert!((0.5 + 0.282_094_8 * f64::from(*found) - expected).abs() < 1e-6, "{sh0:?}");
     }
-    // Without rotations they are points.
+    // Without rotations, the rows are points.
     let points: Vec<(&str, f64)> = [("x", 0.0), ("y", 0.0), ("z", 0.0)].into_iter().chain(colours).collect();
     let refused = refusal(read_model(Scene::new().write("a.ply", ply(&points, &[0.0]))));
     assert!(refused.contains("coloured points"), "{refused}");
@@ -151,11 +152,11 @@ fn a_label_of_minus_one_is_none() {
     }
 }
 
-/// Comments are free, words are apart by any white space, and a byte order mark is none of them.
+/// Comments are free text, any white space separates words, and a byte order mark is not a word.
 #[test]
 fn headers_of_other_programs_are_read() {
     let scene = Scene::new();
-    let good = ply(&PLAIN, &[0.0]);
+    let good = ply(&PLAIN_COLUMNS, &[0.0]);
     let expected = read_model(scene.write("a.ply", &good)).expect("read").gaussians;
     let bytes = |from: &str, to: &[u8]| {
         let at = good.find(from).expect("the text");
@@ -180,7 +181,7 @@ fn headers_of_other_programs_are_read() {
     assert!(refused.contains("header: ") && refused.contains("not text"), "{refused}");
 }
 
-/// Whatever its name says, the first bytes tell what a file is, and the message what to do.
+/// The first bytes identify a file whatever its name, and the message says what to do.
 #[test]
 fn a_file_that_is_no_model_is_named() {
     let scene = Scene::new();
@@ -193,16 +194,16 @@ fn a_file_that_is_no_model_is_named() {
         (b"", "an empty file", "again"),
     ];
     for (bytes, what, cure) in cases {
-        for ending in ["ply", "spz", "glb", "sog", "splat", "html", "usda", "usdz"] {
-            // These are what they should be, as far as the first bytes tell.
-            if matches!((what, ending), ("a zip archive", "sog" | "usdz") | ("a web page", "html")) {
+        for extension in ["ply", "spz", "glb", "sog", "splat", "html", "usda", "usdz"] {
+            // These contents match their extensions as far as the first bytes show.
+            if matches!((what, extension), ("a zip archive", "sog" | "usdz") | ("a web page", "html")) {
                 continue;
             }
-            let refused = refusal(read_model(scene.write(&format!("a.{ending}"), bytes)));
-            assert!(refused.contains(&format!("is {what}, not ")) && refused.contains(cure), "{ending}: {refused}");
+            let refused = refusal(read_model(scene.write(&format!("a.{extension}"), bytes)));
+            assert!(refused.contains(&format!("is {what}, not ")) && refused.contains(cure), "{extension}: {refused}");
         }
     }
-    let model = read(&PLAIN).gaussians;
+    let model = read(&PLAIN_COLUMNS).gaussians;
     write_model(scene.at("a.spz"), &model).expect("written");
     fs::rename(scene.at("a.spz"), scene.at("b.glb")).expect("renamed");
     assert!(refusal(read_model(scene.at("b.glb"))).contains("packed by gzip"));

@@ -1,4 +1,4 @@
-//! Model files, those of other programs too.
+//! Model files, including those of other programs.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,

@@ -1,9 +1,9 @@
-//! Models of usual values, and every format that is written with what it may change.
+//! Models of typical values, and all writable formats with their error bounds.
 
 use labelgs_formats::{SpzVersion, WriteOptions};
 use labelgs_scene::Gaussians;
 
-/// Most that a value may change in a round trip.
+/// Largest change of each value in a round trip.
 #[derive(Clone, Copy)]
 pub struct Bounds {
     pub position: f32,
@@ -18,9 +18,9 @@ pub struct Bounds {
     pub confidence: f32,
 }
 
-/// Half of a step of each quantised value. Positions: 12 fractional bits. Rotations: each of the three smaller components
-/// is off by up to 1 / (2 * 511 * sqrt 2) = 0.0007, and the largest one, which is what the unit length leaves, by up to
-/// three times that where all are alike. Harmonics are rounded twice: to 1/128, then to 8 or 16 of these.
+/// Half of a quantisation step. Positions have 12 fractional bits. Each of the three smaller rotation components is off
+/// by up to 1 / (2 * 511 * sqrt 2) = 0.0007. The largest one follows from the unit length and is off by up to three
+/// times that if all are alike. Harmonics are rounded twice: to 1/128, then to 8 or 16 of these steps.
 pub const SPZ: Bounds = Bounds {
     position: 1.01 / 8192.0,
     rotation: 0.0022,
@@ -31,8 +31,8 @@ pub const SPZ: Bounds = Bounds {
     confidence: 1.01 / 510.0,
 };
 
-/// Floats throughout, as in USD too. Rotations lose their length; sizes and opacities go through an exponential and back, each rounded
-/// to 24 bits.
+/// Floats throughout, also in USD. Rotations lose their length. Sizes and opacities go through an exponential and back,
+/// each rounded to 24 bits.
 pub const GLB: Bounds = Bounds {
     position: 0.0,
     rotation: 1e-6,
@@ -43,9 +43,9 @@ pub const GLB: Bounds = Bounds {
     confidence: 0.0,
 };
 
-/// Positions are the exponential of one of 65536 steps up to ln 9; rotations have 8 bits over sqrt 2; sizes and colours lie
-/// near one of 256 numbers, at most two of their mean distances away. The palette of harmonics has fewer entries than
-/// Gaussians, so a single one has no bound; the picture has.
+/// Positions are the exponential of one of 65536 steps up to ln 9. Rotations have 8 bits over sqrt 2. Sizes and colours
+/// are near one of 256 numbers, at most two of their mean distances away. The palette of harmonics has fewer entries
+/// than Gaussians, so a single one has no bound; the render has.
 pub const SOG: Bounds = Bounds {
     position: 9.0 * 2.0 * 2.198 / 131_070.0 * 1.01,
     rotation: 3.05 * std::f32::consts::SQRT_2 / 510.0,
@@ -56,7 +56,7 @@ pub const SOG: Bounds = Bounds {
     confidence: 1.01 / 510.0,
 };
 
-/// Numbers from a fixed sequence, from `low` to `high`.
+/// A reproducible sequence of numbers from `low` to `high`.
 pub struct Numbers(u64);
 
 impl Numbers {
@@ -70,7 +70,7 @@ impl Numbers {
     }
 }
 
-/// A model of usual values; rotations have any length and sign.
+/// A model of typical values; rotations have any length and sign.
 pub fn model(count: usize, degree: u32, labelled: bool) -> Gaussians {
     let mut n = Numbers(7);
     let mut g = Gaussians { sh_degree: degree, ..Gaussians::default() };
@@ -91,7 +91,7 @@ pub fn v4() -> WriteOptions {
     WriteOptions { spz_version: SpzVersion::V4, ..WriteOptions::default() }
 }
 
-/// Every format that is written: file, choices, bounds.
+/// All writable formats: file, options, bounds.
 pub fn written() -> [(&'static str, WriteOptions, Bounds); 7] {
     let usual = WriteOptions::default();
     [
@@ -105,7 +105,7 @@ pub fn written() -> [(&'static str, WriteOptions, Bounds); 7] {
     ]
 }
 
-/// Long and thin Gaussians in a ball, in every direction, whose colour depends on the direction.
+/// Long and thin Gaussians in a ball, in all directions, with view-dependent colours.
 pub fn picture_model() -> Gaussians {
     let mut n = Numbers(3);
     let mut g = model(1500, 3, true);

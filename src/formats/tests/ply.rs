@@ -64,7 +64,7 @@ fn the_layout_is_the_standard_one() {
     assert_eq!((&row[3..6], &row[9..18], row.len()), (&[0.0; 3][..], &expected[..], 27));
 }
 
-/// Rows with `uint label` differ from those with `float label` in nothing else, and both read alike.
+/// Rows with `uint label` are otherwise identical to those with `float label`, and both read alike.
 #[test]
 fn labels_are_written_as_floats_integers_or_not_at_all() {
     let scene = Scene::new();
@@ -84,7 +84,7 @@ fn labels_are_written_as_floats_integers_or_not_at_all() {
     let (bytes, without) = written(LabelType::None);
     assert!(!String::from_utf8_lossy(&bytes).contains("label"));
     assert_eq!(without, Gaussians { labels: None, label_confidence: None, ..g.clone() });
-    // The first whole number that a float rounds is refused before the old file is touched.
+    // The first integer that a float rounds is refused before the old file is touched.
     let mut large = g;
     large.labels = Some(vec![1, 1 << 24, (1 << 24) + 1]);
     let error = write_model(scene.at("a.ply"), &large).expect_err("too large").to_string();
@@ -103,7 +103,7 @@ fn the_selection_of_an_editor_becomes_labels() {
         assert_eq!((read.gaussians.labels, read.dropped), (Some(labels), u64::from(label.is_none())), "state {state}");
         assert!(read.notes.iter().any(|note| note.contains("`state`")), "{:?}", read.notes);
     }
-    // A column of labels wins.
+    // A label column takes precedence.
     let both = text.replace("char opacity", "uchar label").replace("int8 tail", "char opacity").replace(" -5 ", " 7 ");
     assert_eq!(read_model(scene.write("a.ply", both)).expect("read").gaussians.labels, Some(vec![7]));
 }
@@ -120,7 +120,8 @@ fn a_far_origin_is_in_a_comment_and_beside_the_file() {
     assert!(header.contains("\ncomment labelgs world_origin 448256.0 5411840.0 0.1\n"), "{header}");
     assert!(header.contains("property float x\n"), "{header}");
     assert_eq!(read_model(scene.at("a.ply")).expect("read").gaussians, g);
-    // Without the comment, as after another program, the file beside it serves, unless it is of another model.
+    // Without the comment, as after another program, the file beside the model is used, unless it belongs to another
+    // model.
     let text = "comment labelgs world_origin 448256.0 5411840.0 0.1\n";
     let at = bytes.windows(text.len()).position(|part| part == text.as_bytes()).expect("the comment");
     scene.write("a.ply", [&bytes[..at], &bytes[at + text.len()..]].concat());
@@ -135,12 +136,12 @@ fn a_far_origin_is_in_a_comment_and_beside_the_file() {
     }
     let broken = String::from_utf8_lossy(&bytes).replace(" 0.1\n", " one\n");
     assert!(refusal(read_model(scene.write("b.ply", broken))).contains("three numbers"));
-    // A model near the origin takes the file beside it away.
+    // Writing a model near the origin removes the file beside it.
     write_model(scene.at("a.ply"), &gaussians(3, 0, true)).expect("written");
     assert!(!scene.path().join("a.ply.origin.json").exists());
 }
 
-/// A PLY of one Gaussian with other order and types of columns, and with unknown columns.
+/// A PLY of one Gaussian with another order and other types of columns, and with unknown columns.
 fn foreign(format: &str, line_end: &str) -> Vec<u8> {
     let columns: [(&str, &str, f64); 19] = [
         ("double", "rot_3", 0.4),
@@ -302,7 +303,7 @@ fn a_file_cut_anywhere_is_refused() {
     let scene = Scene::new();
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         let whole = foreign(format, "\n");
-        // An ASCII file may lose its last line end. The loss of one more digit gives another valid number.
+        // An ASCII file may lose its last line end. Losing another digit still gives a valid number.
         let last = if format == "ascii" { whole.len() - 3 } else { whole.len() };
         (0..last).for_each(|length| {
             refusal(read_model(scene.write("a.ply", &whole[..length])));

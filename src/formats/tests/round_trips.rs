@@ -1,4 +1,4 @@
-//! Formats of models besides PLY: what a round trip may change, what is kept, and how bad files are refused.
+//! Model formats besides PLY: what a round trip may change, what it preserves, and how bad files are refused.
 
 use super::fixtures::*;
 use super::models::*;
@@ -18,8 +18,8 @@ fn unit(quat: [f32; 4]) -> [f32; 4] {
     quat.map(|v| v / length)
 }
 
-/// Largest difference of two rotations of a Gaussian. Both signs are the same rotation, and half turns about its own axes
-/// leave it as it is; some writers turn it so.
+/// Largest difference between two rotations of a Gaussian. Both signs are the same rotation, and half turns about the
+/// Gaussian's own axes leave it unchanged; some writers apply them.
 fn apart(a: [f32; 4], [w, x, y, z]: [f32; 4]) -> f32 {
     let same = [[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]];
     let of = |b: [f32; 4], sign: f32| a.iter().zip(b).map(|(a, b)| (a - sign * b).abs()).fold(0.0_f32, f32::max);
@@ -73,7 +73,7 @@ fn round_trips_stay_within_the_steps_and_keep_labels_and_names() {
                 assert!(count == 1 || name(read.names.as_ref()) == name(names.as_ref()), "{file}: {:?}", read.names);
             }
         }
-        // Nothing of the labels is left where none are wanted.
+        // No trace of the labels remains if none are wanted.
         let none = WriteOptions { label_type: LabelType::None, ..options };
         export_model(scene.at(file), &model(9, 0, true), Some(&names()), none).expect("written");
         let read = read_model(scene.at(file)).expect("read");
@@ -88,7 +88,7 @@ fn round_trips_stay_within_the_steps_and_keep_labels_and_names() {
     }
 }
 
-/// Each format says whether its model is antialiased.
+/// Each format records whether its model is antialiased.
 #[test]
 fn an_antialiased_model_stays_one() {
     let scene = Scene::new();
@@ -101,7 +101,7 @@ fn an_antialiased_model_stays_one() {
     }
 }
 
-/// Positions of a scene far away are relative to an origin beside the file.
+/// Positions of a faraway scene are relative to an origin beside the file.
 #[test]
 fn far_scenes_keep_their_place() {
     let scene = Scene::new();
@@ -115,7 +115,7 @@ fn far_scenes_keep_their_place() {
     }
 }
 
-/// 24 bits hold any scene: fewer fractional bits where it is large, more where it is small, and none wraps around.
+/// 24 bits hold any scene: a large one has fewer fractional bits, a small one more, and no value wraps around.
 #[test]
 fn positions_of_an_spz_never_wrap() {
     let scene = Scene::new();
@@ -126,7 +126,7 @@ fn positions_of_an_spz_never_wrap() {
         before = Gaussians { means: before.means, ..model(101, 0, false) };
         write_model(scene.at("a.spz"), &before).expect("written");
         let after = read_model(scene.at("a.spz")).expect("read").gaussians;
-        // Half of 2^-23 of the size, or of the usual steps; below 2^-23 there are no more bits.
+        // Half of 2^-23 of the size, or of the usual steps; there are no more bits below 2^-23.
         let step = (size / 4.19e6).max(1.0 / 4096.0_f32.max(16_384.0 / size).min(8_388_608.0));
         let off = before.means.as_flattened().iter().zip(after.means.as_flattened()).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0_f32, f32::max);
@@ -138,7 +138,7 @@ fn positions_of_an_spz_never_wrap() {
     assert!(error.contains("9000000 from the origin") && !scene.path().join("b.spz").exists(), "{error}");
 }
 
-/// An opacity of 0 or 1 has no finite logit; it ends a step from there.
+/// An opacity of 0 or 1 has no finite logit and is moved by a step.
 #[test]
 fn opacities_stay_finite() {
     let scene = Scene::new();
@@ -154,7 +154,7 @@ fn opacities_stay_finite() {
     }
 }
 
-/// The labels beside an SPZ serve where another program dropped the record, and only for the same Gaussians.
+/// The labels beside an SPZ are used if another program dropped the record, and only for the same Gaussians.
 #[test]
 fn labels_beside_a_file_hold_for_the_same_gaussians_only() {
     let scene = Scene::new();
@@ -168,7 +168,7 @@ fn labels_beside_a_file_hold_for_the_same_gaussians_only() {
     drop_record(&whole);
     let read = read_model(scene.at("a.spz")).expect("read");
     assert_eq!((&read.gaussians.labels, read.notes.len()), (&whole.labels, 0));
-    // The table of names beside it is the usual one.
+    // The names file beside it is the usual one.
     assert_eq!(LabelTable::read(&scene.at("a.labels.json")).expect("a table"), names());
     let text = fs::read_to_string(scene.at("a.labels.json")).expect("text");
     for (from, to) in [("\"ids\"", "\"id\""), ("700", "2147483700"), ("\"count\": 60", "\"count\": \"many\"")] {
@@ -192,7 +192,7 @@ fn golden(name: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
 }
 
-/// A model in the order of another one, by the nearest position: some writers sort.
+/// Reorders a model like another one, by nearest position: some writers sort.
 fn in_order_of(model: &Gaussians, other: &Gaussians) -> Gaussians {
     let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>();
     let nearest = |place: &[f32; 3]| {
@@ -217,8 +217,8 @@ fn in_order_of(model: &Gaussians, other: &Gaussians) -> Gaussians {
     }
 }
 
-/// Files that other programs wrote of `source.ply`: splat-transform 2.7.1, and for `.splat` the rules of the converter
-/// that defined it. Their axes and steps are read as meant.
+/// Files that other programs wrote from `source.ply`: splat-transform 2.7.1, and for `.splat` the rules of the
+/// converter that defined it. Their axes and quantisation are read as intended.
 #[test]
 fn files_of_other_writers_are_read() {
     let source = read_model(golden("source.ply")).expect("read").gaussians;
@@ -229,7 +229,7 @@ fn files_of_other_writers_are_read() {
         assert_eq!(read.notes, Vec::<String>::new(), "{name}");
     }
     within(&source, &read_model(golden("splat-transform.glb")).expect("read").gaussians, GLB);
-    // Codebooks have one number for each value of so few Gaussians; 16 entries serve 24 harmonics.
+    // Codebooks have a number for each value of so few Gaussians; 16 entries suffice for 24 harmonics.
     let sog = read_model(golden("splat-transform.sog")).expect("read").gaussians;
     within(&source, &in_order_of(&sog, &source), Bounds { opacity: 1.01 / 255.0, ..SOG });
     // One chunk: half of a step of 10 bits over its bounds; rotations 10 bits over sqrt 2, and three times that for the
@@ -252,8 +252,8 @@ fn files_of_other_writers_are_read() {
             confidence: 0.0,
         },
     );
-    // Bytes are cut off and not rounded: a whole step of 1/128 for rotations, which are not of unit length after that,
-    // and of 1/255 for colours.
+    // Bytes are truncated, not rounded: a full step of 1/128 for rotations, which then no longer have unit length, and
+    // of 1/255 for colours.
     let flat = Gaussians { sh_degree: 0, sh_rest: Vec::new(), ..source };
     within(
         &flat,
@@ -275,13 +275,13 @@ fn formats_that_are_only_read_say_so() {
     let scene = Scene::new();
     let error = write_model(scene.at("a.splat"), &model(1, 0, false)).expect_err("read only").to_string();
     assert!(
-        error.contains(".splat files are only read; models are written as")
+        error.contains(".splat files can only be read; models are written as")
             && error.contains(".ply, .spz, .glb, .sog, .html, .usda, .usd, .usdz"),
         "{error}"
     );
 }
 
-/// What a message about a bad file names: the file, the place, and what was expected.
+/// A message about a bad file names the file, the location, and what was expected.
 #[test]
 fn bad_files_are_refused_by_file_place_and_cure() {
     let scene = Scene::new();
@@ -302,14 +302,14 @@ fn bad_files_are_refused_by_file_place_and_cure() {
     export_model(scene.at("whole.html"), &model(9, 0, true), None, WriteOptions::default()).expect("written");
     let page = fs::read(scene.at("whole.html")).expect("bytes");
     let cases: [(&str, Vec<u8>, &[&str]); 20] = [
-        ("a.spz", b"PK".to_vec(), &["a.spz: byte 0: ", "no SPZ file"]),
+        ("a.spz", b"PK".to_vec(), &["a.spz: byte 0: ", "not an SPZ file"]),
         ("a.spz", v3[..v3.len() / 2].to_vec(), &["a.spz: planes: ", "cut short"]),
         ("a.spz", with(&v4, 4, 9), &["a.spz: byte 4: ", "1 to 4 are read"]),
         ("a.spz", with(&v4, 11, 0x10), &["a.spz: byte 8: ", "promises 268435480 Gaussians"]),
         ("a.spz", with(&v4, 12, 7), &["a.spz: byte 12: ", "0 to 4"]),
         ("a.spz", with(&v4, 15, 2), &["a.spz: byte 15: ", "expected 6"]),
         ("a.spz", v4[..v4.len() - 9].to_vec(), &["a.spz: stream 5: ", "are left"]),
-        ("a.glb", b"glTX".to_vec(), &["a.glb: byte 0: ", "no GLB file"]),
+        ("a.glb", b"glTX".to_vec(), &["a.glb: byte 0: ", "not a GLB file"]),
         ("a.glb", glb[..glb.len() - 4].to_vec(), &["a.glb: byte ", "`BIN`", "cut short"]),
         ("a.glb", text(&glb, "\"count\":24", "\"count\":99"), &["a.glb: accessor 0 of POSITION: ", "99 elements"]),
         (
@@ -326,10 +326,10 @@ fn bad_files_are_refused_by_file_place_and_cure() {
         ("a.sog", sog[..sog.len() - 30].to_vec(), &["a.sog: end of the archive: ", "cut short"]),
         ("a.sog", text(&sog, "\"version\":2", "\"version\":1"), &["a.sog: meta.json: cannot be unpacked: "]),
         ("a.sog", text(&sog, "RIFF", "RAFF"), &["a.sog: means_l.webp: "]),
-        ("a.html", b"<p>A page.</p>".to_vec(), &["a.html: has no model inside", "labelgs has written"]),
-        ("a.html", text(&page, "H4sI", "H4*I"), &["a.html: the model inside: ", "not base64"]),
-        ("a.html", text(&page, "H4sI", "AAAA"), &["a.html: byte 0: ", "no SPZ file"]),
-        ("a.splat", splat[..splat.len() - 1].to_vec(), &["a.splat: byte 736: ", "times 32"]),
+        ("a.html", b"<p>A page.</p>".to_vec(), &["a.html: contains no model", "written by labelgs"]),
+        ("a.html", text(&page, "H4sI", "H4*I"), &["a.html: embedded model: ", "not base64"]),
+        ("a.html", text(&page, "H4sI", "AAAA"), &["a.html: byte 0: ", "not an SPZ file"]),
+        ("a.splat", splat[..splat.len() - 1].to_vec(), &["a.splat: byte 736: ", "multiple of 32"]),
     ];
     for (name, bytes, expected) in cases {
         let error = refusal(read_model(scene.write(name, bytes)));
@@ -338,7 +338,7 @@ fn bad_files_are_refused_by_file_place_and_cure() {
     }
 }
 
-/// Each format tells where a model is seen from at first; a file without that has the bytes that it always had.
+/// Each format stores the initial view; without one, a file has the same bytes as before.
 #[test]
 fn a_first_view_comes_back() {
     let scene = Scene::new();
@@ -357,13 +357,13 @@ fn a_first_view_comes_back() {
             assert_eq!(read.gaussians, export(None).gaussians, "{file}");
         }
     }
-    // A file of SPZ without labels has no records at all: some readers warn of them.
+    // An SPZ without labels has no records at all, because some readers warn about them.
     let options = WriteOptions { label_type: LabelType::None, first_view: Some(view), ..WriteOptions::default() };
     export_model(scene.at("a.spz"), &model(50, 1, true), None, options).expect("written");
     assert_eq!(read_model(scene.at("a.spz")).expect("read").first_view, None);
 }
 
-/// Comments of a PLY are free: damaged ones are no reason to refuse it.
+/// PLY comments are free text, so damaged ones do not make a file invalid.
 #[test]
 fn a_damaged_first_view_of_a_ply_does_not_matter() {
     let scene = Scene::new();
@@ -374,7 +374,7 @@ fn a_damaged_first_view_of_a_ply_does_not_matter() {
     let at = |part: &[u8]| bytes.windows(part.len()).position(|window| window == part).expect("a comment");
     let (up, eye) = (at(b"comment labelgs up 0.0 -1.0 0.0"), at(b"comment labelgs eye 1.0 2.0 3.0"));
     assert_eq!(LazyModel::open(&scene.at("a.ply")).expect("opened").first_view(), Some(view));
-    // No number, no direction, no number, two numbers.
+    // Not a number, no direction, not a number, only two numbers.
     for (place, letter) in [(up + 19, b'x'), (up + 24, b'0'), (eye + 20, b'e'), (eye + 23, b'1')] {
         let mut bytes = bytes.clone();
         bytes[place] = letter;

@@ -1,4 +1,4 @@
-//! USD: what is in a layer of ours, layers of other programs, and damaged ones.
+//! USD: layers of labelgs, layers of other programs, and damaged ones.
 
 use super::fixtures::*;
 use super::models::model;
@@ -9,11 +9,11 @@ use labelgs_scene::Gaussians;
 use labelgs_scene::harmonics::basis;
 use std::fs;
 
-/// A stage as a person may write it: z is up, a thing in a turned group, halves, comments, a prim of another kind, one that is
-/// switched off.
-const FOREIGN: &str = include_str!("golden/foreign.usda");
+/// A stage as a person may write it: z up, a prim in a rotated group, 16-bit floats, comments, a prim of another kind,
+/// and one that is switched off.
+const FOREIGN_STAGE: &str = include_str!("golden/foreign.usda");
 
-/// The square of the size of a Gaussian along each axis.
+/// The squared size of a Gaussian along each axis.
 fn squares(model: &Gaussians, row: usize) -> DVec3 {
     let [w, x, y, z] = model.quats[row].map(f64::from);
     let sizes = model.scales[row].map(|scale| f64::from(scale).exp());
@@ -25,7 +25,7 @@ fn squares(model: &Gaussians, row: usize) -> DVec3 {
 #[test]
 fn a_stage_of_another_program_is_read_at_its_place() {
     let scene = Scene::new();
-    let read = read_model(scene.write("a.usda", FOREIGN)).expect("read");
+    let read = read_model(scene.write("a.usda", FOREIGN_STAGE)).expect("read");
     let g = &read.gaussians;
     assert_eq!((g.len(), g.sh_degree), (3, 1));
     // (x, y, z) with z up is (x, z, -y) with y up, and our y and z point the other way.
@@ -45,14 +45,14 @@ fn a_stage_of_another_program_is_read_at_its_place() {
     let expected = red(&[[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.3, 0.0, 0.0]], direction);
     let found = red(g.rest(0), ours(direction.x, direction.y, direction.z));
     assert!(expected.abs() > 0.01 && (found - expected).abs() < 1e-6, "{found} and {expected}");
-    // What a prim or one around it shows is a label.
+    // The semantic label of a prim or of a prim around it becomes a label.
     assert_eq!(g.labels, Some(vec![1, 1, 2]));
     let names = read.names.expect("names");
     assert_eq!([names.name(1), names.name(2)], [Some("table"), Some("lamp \"A\"")]);
     let notes = read.notes.join("; ");
-    assert!(notes.contains("switched off") && notes.contains("references were left out"), "{notes}");
-    // A package of it is the same.
-    let mut zip = zip_of(&[("textures/a.png", b"x".to_vec()), ("World.USDA", FOREIGN.into())]);
+    assert!(notes.contains("switched off") && notes.contains("references were omitted"), "{notes}");
+    // A package of the layer reads the same.
+    let mut zip = zip_of(&[("textures/a.png", b"x".to_vec()), ("World.USDA", FOREIGN_STAGE.into())]);
     assert_eq!(read_model(scene.write("a.usdz", &zip)).expect("read").gaussians, *g);
     zip = zip_of(&[("a.usdc", b"PXR-USDC\0\x08".to_vec())]);
     let refused = refusal(read_model(scene.write("b.usdz", &zip)));
@@ -63,7 +63,7 @@ fn a_stage_of_another_program_is_read_at_its_place() {
     }
 }
 
-/// An archive of stored files.
+/// An archive of uncompressed files.
 fn zip_of(files: &[(&str, Vec<u8>)]) -> Vec<u8> {
     use std::io::Write;
     let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
@@ -75,14 +75,14 @@ fn zip_of(files: &[(&str, Vec<u8>)]) -> Vec<u8> {
     zip.finish().expect("finished").into_inner()
 }
 
-/// A prim for each label with its name, in boxes that hold its Gaussians.
+/// Each label is a prim with its name, and its bounding box contains its Gaussians.
 #[test]
 fn each_label_is_a_prim() {
     let scene = Scene::new();
     let entry = |id, name: &str| LabelEntry { name: Some(name.into()), ..LabelEntry::new(id) };
     let names = LabelTable::new(vec![entry(3, "3 \"Krüge\"\\")]);
     let mut before = model(40, 1, true);
-    // One alone, turned by a quarter about z: its size along y is that of its first axis.
+    // A single one, turned by a quarter about z: its size along y is that of its first axis.
     let alone = before.labels.as_ref().and_then(|labels| labels.iter().position(|&label| label == 700)).expect("a row");
     before = before.filtered(|row| row % 4 != 3 || row == alone);
     before.means[alone] = [1.0, 2.0, 3.0];
@@ -123,7 +123,7 @@ fn each_label_is_a_prim() {
     assert!(error.contains("no Gaussians") && !scene.at("none.usda").exists(), "{error}");
 }
 
-/// Readers map the files of a package into memory: stored, each from a multiple of 64 bytes on.
+/// Readers map the files of a package into memory: they are uncompressed and aligned to 64 bytes.
 #[test]
 fn files_of_a_package_are_aligned() {
     let scene = Scene::new();
@@ -146,22 +146,19 @@ fn damaged_layers_are_refused_by_their_line() {
     let prim = "#usda 1.0\ndef ParticleField3DGaussianSplat \"a\" {\npoint3f[] positions = [(1, 2, 3), (4, 5, 6)]\n";
     let deep = format!("#usda 1.0\n{}", "def \"a\" {\n".repeat(300));
     let cases: [(String, &[&str]); 17] = [
-        ("#usdb".into(), &["a.usda: line 1: ", "no USD layer"]),
+        ("#usdb".into(), &["a.usda: line 1: ", "not a USD text layer"]),
         ("#usda 1.0\n".into(), &["a.usda: no prim is a ParticleField3DGaussianSplat"]),
-        ("#usda 1.0\n(subLayers = [@b.usda@])".into(), &["no prim is", "its subLayers were left out"]),
+        ("#usda 1.0\n(subLayers = [@b.usda@])".into(), &["no prim is", "its subLayers were omitted"]),
         (prim.into(), &["a.usda: line 2: ", "\"a\" has no end"]),
         (format!("{prim}}}}}"), &["a.usda: line 4: ", "closes nothing"]),
-        (
-            format!("{prim}float[] opacities = [0.5]\n}}"),
-            &["line 4: ", "opacities has 1 numbers, and 2 positions need 2"],
-        ),
+        (format!("{prim}float[] opacities = [0.5]\n}}"), &["line 4: ", "opacities has 1 numbers; 2 positions need 2"]),
         (format!("{prim}float[] opacities = [0.5, x]\n}}"), &["line 4: ", "expected a number, found `x`"]),
         (format!("{prim}float[] opacities = [0.5, \"1\"]\n}}"), &["line 4: ", "expected a number, found `\"1\"]`"]),
         (format!("{prim}float[] opacities = [0.5, 1\n}}"), &["line 5: ", "`}` closes nothing"]),
-        (format!("{prim}string a = \"b\n}}"), &["line 4: ", "string without an end"]),
-        (format!("{prim}string a = \"\"\"b\n}}"), &["line 4: ", "string without an end"]),
-        (prim.replace("positions", "points") + "}", &["line 2: ", "has no positions"]),
-        (prim.replace(", 6", "") + "}", &["line 3: ", "no triples"]),
+        (format!("{prim}string a = \"b\n}}"), &["line 4: ", "string that does not end on its line"]),
+        (format!("{prim}string a = \"\"\"b\n}}"), &["line 4: ", "unterminated string"]),
+        (prim.replace("positions", "points") + "}", &["line 2: ", "has no static positions"]),
+        (prim.replace(", 6", "") + "}", &["line 3: ", "not triples"]),
         (
             format!(
                 "{prim}int radiance:sphericalHarmonicsDegree = 4\nfloat3[] radiance:sphericalHarmonicsCoefficients = []}}"
@@ -170,13 +167,13 @@ fn damaged_layers_are_refused_by_their_line() {
         ),
         (
             format!("{prim}double3 xformOp:scale = (1, 2, 1)\ntoken[] xformOpOrder = [\"xformOp:scale\"]\n}}"),
-            &["line 2: ", "another factor along each axis"],
+            &["line 2: ", "different factors per axis"],
         ),
         (
             format!("{prim}token[] xformOpOrder = [\"xformOp:scale\"]\n}}"),
             &["line 2: ", "xformOp:scale, which has no value"],
         ),
-        (deep, &["line 258: ", "more than 256 others"]),
+        (deep, &["line 258: ", "deeper than 256"]),
     ];
     for (text, expected) in cases {
         let error = refusal(read_model(scene.write("a.usda", &text)));
@@ -188,5 +185,5 @@ fn damaged_layers_are_refused_by_their_line() {
     assert!(refusal(read_model(scene.write("a.usdz", zip_of(&[("a.txt", Vec::new())])))).contains("has no layer"));
     let own = "customData = { dictionary labelgs = { int label = -1 } }";
     let text = prim.replace("\"a\"", &format!("\"a\" ({own})")) + "}";
-    assert!(refusal(read_model(scene.write("a.usda", text))).contains("line 2: the label is no whole number"));
+    assert!(refusal(read_model(scene.write("a.usda", text))).contains("line 2: the label is not a whole number"));
 }

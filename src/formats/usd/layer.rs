@@ -1,68 +1,69 @@
-//! The prims with Gaussians in a layer of text, and what is around them.
+//! Parses the prims with Gaussians in a text layer, and the prims around them.
 
 use super::text::{Scanner, Span};
 use super::{
-    CONFIDENCE, DEGREE, HARMONICS, MAGIC, OPACITIES, ORIENTATIONS, OWN, POSITIONS, SCALES, SEMANTICS, SPLATS, place,
+    CONFIDENCE_ATTRIBUTE, DEGREE_ATTRIBUTE, HARMONICS_ATTRIBUTE, MAGIC, OPACITIES_ATTRIBUTE, ORIENTATIONS_ATTRIBUTE,
+    OWN_DICTIONARY, POSITIONS_ATTRIBUTE, SCALES_ATTRIBUTE, SEMANTICS_PREFIX, SPLATS_SCHEMA, xform,
 };
 use glam::DMat4;
 use labelgs_scene::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 
-/// Most prims around a prim.
+/// Deepest nesting of prims.
 const DEPTH_MAX: usize = 256;
 /// Words before the type of an attribute.
-const MODIFIERS: [&str; 8] = ["custom", "uniform", "varying", "config", "prepend", "append", "delete", "add"];
-/// Keys of metadata by which a prim or a layer gets more from elsewhere.
-const ARCS: [&str; 6] = ["references", "payload", "inherits", "specializes", "subLayers", "variantSets"];
+const ATTRIBUTE_MODIFIERS: [&str; 8] = ["custom", "uniform", "varying", "config", "prepend", "append", "delete", "add"];
+/// Metadata keys by which a prim or a layer includes content from elsewhere.
+const ARC_KEYS: [&str; 6] = ["references", "payload", "inherits", "specializes", "subLayers", "variantSets"];
 
 /// A prim with Gaussians.
 #[derive(Debug)]
-pub(super) struct Part<'a> {
-    /// Where it begins.
+pub(super) struct SplatPrim<'a> {
+    /// Offset of the prim in the text.
     pub(super) at: usize,
     pub(super) attributes: BTreeMap<&'a str, Span>,
-    /// Our own dictionary, if it has one.
+    /// The dictionary of labelgs, if the prim has one.
     pub(super) own: BTreeMap<&'a str, Span>,
-    /// Its name for people.
+    /// Its display name.
     pub(super) title: Option<Span>,
-    /// What it shows, or what a prim around it shows.
+    /// The semantic label of the prim or of a prim around it.
     pub(super) semantic: Option<Span>,
-    /// From its own axes to those of a stage with y up.
+    /// Transform from the prim's axes to those of a stage with y up.
     pub(super) matrix: DMat4,
-    /// True if the prims around it do not move it.
+    /// Whether the prim resets the transforms of the prims around it.
     is_free: bool,
 }
 
-/// All of a layer that is read.
+/// The supported content of a layer.
 #[derive(Debug, Default)]
 pub(super) struct Layer<'a> {
-    pub(super) parts: Vec<Part<'a>>,
-    /// Our own dictionary, if it has one.
+    pub(super) parts: Vec<SplatPrim<'a>>,
+    /// The dictionary of labelgs, if the layer has one.
     pub(super) own: BTreeMap<&'a str, Span>,
     pub(super) notes: BTreeSet<String>,
 }
 
-/// A prim that is not closed yet.
+/// A prim whose closing brace has not been read.
 #[derive(Default)]
-struct Frame<'a> {
+struct OpenPrim<'a> {
     at: usize,
     name: &'a str,
-    /// True for one that is drawn if it has Gaussians.
+    /// Whether the prim is drawn if it has Gaussians.
     is_defined: bool,
-    /// False if it and all in it is switched off.
+    /// False if the prim and its descendants are switched off.
     is_active: bool,
     kind: &'a str,
     attributes: BTreeMap<&'a str, Span>,
     own: BTreeMap<&'a str, Span>,
     title: Option<Span>,
-    parts: Vec<Part<'a>>,
+    parts: Vec<SplatPrim<'a>>,
 }
 
 /// Reads a layer.
 pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
     if !scanner.starts(MAGIC) {
-        return Err(scanner.bad(0, format!("does not start with `{MAGIC}`; this is no USD layer of text")));
+        return Err(scanner.bad(0, format!("does not start with `{MAGIC}`; this is not a USD text layer")));
     }
     scanner.skip(MAGIC.len());
     let mut layer = Layer::default();
@@ -75,7 +76,7 @@ pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
         layer.note_arc(key);
     }
     let root = if is_z_up { DMat4::from_rotation_x(-FRAC_PI_2) } else { DMat4::IDENTITY };
-    let mut stack: Vec<Frame> = Vec::new();
+    let mut stack: Vec<OpenPrim> = Vec::new();
     while let Some(byte) = scanner.peek() {
         if byte == b'}' {
             let Some(frame) = stack.pop() else {
@@ -103,18 +104,18 @@ pub(super) fn read<'a>(scanner: &mut Scanner<'a>) -> Result<Layer<'a>> {
 
 impl<'a> Layer<'a> {
     fn note_arc(&mut self, key: &str) {
-        if ARCS.contains(&key) {
-            self.notes.insert(format!("its {key} were left out; flatten it first, as usdcat does"));
+        if ARC_KEYS.contains(&key) {
+            self.notes.insert(format!("its {key} were omitted; flatten it first, for example with usdcat"));
         }
     }
 
-    /// Reads an attribute, or a prim up to its attributes.
-    fn statement(&mut self, scanner: &mut Scanner<'a>, stack: &mut Vec<Frame<'a>>) -> Result<()> {
+    /// Reads an attribute, or the start of a prim up to its attributes.
+    fn statement(&mut self, scanner: &mut Scanner<'a>, stack: &mut Vec<OpenPrim<'a>>) -> Result<()> {
         let at = scanner.at();
         match scanner.name("a prim or an attribute")? {
             word @ ("def" | "over" | "class") => {
                 if stack.len() >= DEPTH_MAX {
-                    return Err(scanner.bad(at, format!("is a prim in more than {DEPTH_MAX} others; export it flat")));
+                    return Err(scanner.bad(at, format!("nests prims deeper than {DEPTH_MAX}; export it flat")));
                 }
                 stack.push(self.open(scanner, at, word)?);
             }
@@ -139,11 +140,11 @@ impl<'a> Layer<'a> {
         Ok(())
     }
 
-    /// Reads a prim up to its attributes.
-    fn open(&mut self, scanner: &mut Scanner<'a>, at: usize, word: &str) -> Result<Frame<'a>> {
+    /// Reads the start of a prim up to its attributes.
+    fn open(&mut self, scanner: &mut Scanner<'a>, at: usize, word: &str) -> Result<OpenPrim<'a>> {
         let kind = scanner.word();
         let name = scanner.string()?;
-        let mut frame = Frame { at, name, is_defined: word == "def", is_active: true, kind, ..Frame::default() };
+        let mut frame = OpenPrim { at, name, is_defined: word == "def", is_active: true, kind, ..OpenPrim::default() };
         for (key, value) in metadata(scanner)? {
             match key {
                 "active" => frame.is_active = is_true(scanner.part(value)),
@@ -156,21 +157,21 @@ impl<'a> Layer<'a> {
         Ok(frame)
     }
 
-    /// Returns the prims with Gaussians that a closed one is or has.
-    fn close(&mut self, scanner: &Scanner<'a>, frame: Frame<'a>) -> Result<Vec<Part<'a>>> {
-        let Frame { at, is_defined, is_active, kind, attributes, own, title, mut parts, .. } = frame;
-        // Classes and what is only changed are drawn elsewhere.
+    /// Returns the prims with Gaussians in a closed prim, including itself.
+    fn close(&mut self, scanner: &Scanner<'a>, frame: OpenPrim<'a>) -> Result<Vec<SplatPrim<'a>>> {
+        let OpenPrim { at, is_defined, is_active, kind, attributes, own, title, mut parts, .. } = frame;
+        // Classes and overrides are drawn elsewhere.
         if !is_defined || !is_active {
-            if !parts.is_empty() || kind == SPLATS {
-                self.notes.insert("its prims that are switched off or not defined here were left out".into());
+            if !parts.is_empty() || kind == SPLATS_SCHEMA {
+                self.notes.insert("its prims that are switched off or not defined here were omitted".into());
             }
             return Ok(Vec::new());
         }
-        let semantic = attributes.iter().find(|(name, _)| name.starts_with(SEMANTICS)).map(|(_, &value)| value);
-        let (matrix, is_free) = if parts.is_empty() && kind != SPLATS {
+        let semantic = attributes.iter().find(|(name, _)| name.starts_with(SEMANTICS_PREFIX)).map(|(_, &value)| value);
+        let (matrix, is_free) = if parts.is_empty() && kind != SPLATS_SCHEMA {
             (DMat4::IDENTITY, false)
         } else {
-            place::local(scanner, at, &attributes)?
+            xform::local(scanner, at, &attributes)?
         };
         for part in &mut parts {
             part.semantic = part.semantic.or(semantic);
@@ -178,22 +179,22 @@ impl<'a> Layer<'a> {
                 (part.matrix, part.is_free) = (matrix * part.matrix, is_free);
             }
         }
-        if kind == SPLATS {
-            parts.push(Part { at, attributes, own, title, semantic, matrix, is_free });
+        if kind == SPLATS_SCHEMA {
+            parts.push(SplatPrim { at, attributes, own, title, semantic, matrix, is_free });
         }
         Ok(parts)
     }
 }
 
-/// True for `true` and 1.
+/// Returns true for `true` and 1.
 pub(super) fn is_true(text: &str) -> bool {
     matches!(text, "true" | "1")
 }
 
-/// Reads the attribute that begins with `word`. Returns it if it may be needed and has a value.
+/// Reads the attribute that starts with `word`. Returns it if it has a value and may be needed.
 fn attribute<'a>(scanner: &mut Scanner<'a>, word: &'a str) -> Result<Option<(&'a str, Span)>> {
     let mut kind = word;
-    while MODIFIERS.contains(&kind) {
+    while ATTRIBUTE_MODIFIERS.contains(&kind) {
         kind = scanner.name("the type of an attribute")?;
     }
     if scanner.take(b'[') {
@@ -202,31 +203,32 @@ fn attribute<'a>(scanner: &mut Scanner<'a>, word: &'a str) -> Result<Option<(&'a
     let name = scanner.name("the name of an attribute")?;
     let value = if scanner.take(b'=') { Some(scanner.value()?) } else { None };
     metadata(scanner)?;
-    let numbers = [POSITIONS, ORIENTATIONS, SCALES, OPACITIES, HARMONICS];
+    let numbers =
+        [POSITIONS_ATTRIBUTE, ORIENTATIONS_ATTRIBUTE, SCALES_ATTRIBUTE, OPACITIES_ATTRIBUTE, HARMONICS_ATTRIBUTE];
     let is_needed = numbers.contains(&name.strip_suffix('h').unwrap_or(name))
         || numbers.contains(&name)
-        || [DEGREE, CONFIDENCE].contains(&name)
-        || name.starts_with(SEMANTICS)
-        || name.starts_with(place::OPERATION);
-    // A value of `None` is none.
+        || [DEGREE_ATTRIBUTE, CONFIDENCE_ATTRIBUTE].contains(&name)
+        || name.starts_with(SEMANTICS_PREFIX)
+        || name.starts_with(xform::XFORM_PREFIX);
+    // The value `None` means no value.
     let value = value.filter(|&value| is_needed && scanner.part(value) != "None");
     Ok(value.map(|value| (name, value)))
 }
 
-/// Reads the keys and values in round brackets, if there are any.
+/// Reads the keys and values in parentheses, if there are any.
 fn metadata<'a>(scanner: &mut Scanner<'a>) -> Result<Vec<(&'a str, Span)>> {
     let mut all = Vec::new();
     if !scanner.take(b'(') {
         return Ok(all);
     }
     while !scanner.take(b')') {
-        // A string alone is a comment.
+        // A lone string is a comment.
         if matches!(scanner.peek(), Some(b'"' | b'\'')) {
             scanner.string()?;
             continue;
         }
         let mut key = scanner.name("a key or `)`")?;
-        while MODIFIERS.contains(&key) || key == "reorder" {
+        while ATTRIBUTE_MODIFIERS.contains(&key) || key == "reorder" {
             key = scanner.name("a key")?;
         }
         scanner.need(b'=', key)?;
@@ -235,15 +237,15 @@ fn metadata<'a>(scanner: &mut Scanner<'a>) -> Result<Vec<(&'a str, Span)>> {
     Ok(all)
 }
 
-/// The keys and values of our own dictionary in one; none without.
+/// Returns the keys and values of the labelgs dictionary within a dictionary, or nothing.
 fn own<'a>(scanner: &Scanner<'a>, value: Span) -> Result<BTreeMap<&'a str, Span>> {
-    match dictionary(scanner, value)?.iter().rfind(|(key, _)| *key == OWN) {
+    match dictionary(scanner, value)?.iter().rfind(|(key, _)| *key == OWN_DICTIONARY) {
         Some(&(_, own)) => Ok(dictionary(scanner, own)?.into_iter().collect()),
         None => Ok(BTreeMap::new()),
     }
 }
 
-/// The keys and values of a dictionary.
+/// Returns the keys and values of a dictionary.
 fn dictionary<'a>(scanner: &Scanner<'a>, value: Span) -> Result<Vec<(&'a str, Span)>> {
     let (mut inside, mut all) = (scanner.within(value), Vec::new());
     inside.need(b'{', "a dictionary's name")?;

@@ -1,60 +1,61 @@
-//! USD: prims of the schema `ParticleField3DGaussianSplat` of OpenUSD 26.03, one for each label, in a layer of text or in a
-//! package of it. Other attributes of a prim follow its number of positions.
+//! USD: prims with the schema `ParticleField3DGaussianSplat` of OpenUSD 26.03, one per label, in a text layer or in a
+//! package with one. The number of positions in a prim determines the length of its other attributes.
 //!
-//! A stage without a unit and an axis of its own would be in centimetres, so both are written. Layers of the binary form are
-//! not read.
+//! A stage that does not state its unit and up axis would be in centimetres, so labelgs writes both. Binary layers are
+//! not supported.
 
 mod layer;
-mod place;
 mod read;
 mod text;
 mod write;
+mod xform;
 
+use super::axis_signs::Signs;
 use super::format::ModelFormat;
-use super::turn::Signs;
 
-/// Layers of text by their endings.
-pub(super) const TEXT: ModelFormat = ModelFormat {
+/// The text layer format, with its extensions.
+pub(super) const TEXT_FORMAT: ModelFormat = ModelFormat {
     name: "USD",
-    endings: &[".usda", ".usd"],
+    extensions: &[".usda", ".usd"],
     contents: &["a USD layer of text"],
     read: read::read,
-    write: Some(write::TEXT),
+    write: Some(write::TEXT_WRITER),
 };
 
-/// Packages by their ending.
-pub(super) const PACKAGE: ModelFormat = ModelFormat {
+/// The package format.
+pub(super) const PACKAGE_FORMAT: ModelFormat = ModelFormat {
     name: "USDZ",
-    endings: &[".usdz"],
+    extensions: &[".usdz"],
     contents: &["a zip archive"],
     read: read::read_package,
-    write: Some(write::PACKAGE),
+    write: Some(write::PACKAGE_WRITER),
 };
 
-/// Axes of a stage whose y is up: a half turn about x, so that a camera of COLMAP at the origin looks as one of USD does.
-const AXES: Signs = Signs([1.0, -1.0, -1.0]);
-/// First bytes of a layer of text.
+/// Axes of a stage with y up: a half turn about x, so that a COLMAP camera at the origin looks in the same direction as
+/// a USD camera.
+const USD_AXES: Signs = Signs([1.0, -1.0, -1.0]);
+/// First bytes of a text layer.
 const MAGIC: &str = "#usda 1.0";
 /// The schema of a prim with Gaussians.
-const SPLATS: &str = "ParticleField3DGaussianSplat";
-/// Each with the letter h at its end if it has 16-bit floats.
-const POSITIONS: &str = "positions";
-const ORIENTATIONS: &str = "orientations";
-const SCALES: &str = "scales";
-const OPACITIES: &str = "opacities";
-const HARMONICS: &str = "radiance:sphericalHarmonicsCoefficients";
-const DEGREE: &str = "radiance:sphericalHarmonicsDegree";
-/// Start of the attributes with what a prim shows; the taxonomy follows.
-const SEMANTICS: &str = "semantics:labels:";
-/// The taxonomy whose labels the simulators of NVIDIA draw without further settings.
-const TAXONOMY: &str = "class";
-const CONFIDENCE: &str = "labelgs:confidence";
-/// The dictionary in `customData` with what the schema has no place for, and its keys: the id of the label, 0 for none; the
-/// degree of harmonics before zeros were added; true for an antialiased model.
-const OWN: &str = "labelgs";
+const SPLATS_SCHEMA: &str = "ParticleField3DGaussianSplat";
+/// Attribute names; `h` is appended for 16-bit floats.
+const POSITIONS_ATTRIBUTE: &str = "positions";
+const ORIENTATIONS_ATTRIBUTE: &str = "orientations";
+const SCALES_ATTRIBUTE: &str = "scales";
+const OPACITIES_ATTRIBUTE: &str = "opacities";
+const HARMONICS_ATTRIBUTE: &str = "radiance:sphericalHarmonicsCoefficients";
+const DEGREE_ATTRIBUTE: &str = "radiance:sphericalHarmonicsDegree";
+/// Prefix of the attributes with the semantic labels of a prim; the taxonomy follows.
+const SEMANTICS_PREFIX: &str = "semantics:labels:";
+/// The taxonomy whose labels NVIDIA's simulators draw by default.
+const LABEL_TAXONOMY: &str = "class";
+const CONFIDENCE_ATTRIBUTE: &str = "labelgs:confidence";
+/// The dictionary in `customData` for what the schema cannot store, and its keys: the label id, 0 for none; the SH
+/// degree before zeros were added; true for an antialiased model.
+const OWN_DICTIONARY: &str = "labelgs";
 const OWN_LABEL: &str = "label";
 const OWN_DEGREE: &str = "degree";
 const OWN_ANTIALIASED: &str = "antialiased";
-/// Its keys in `customLayerData`: where the model is seen from at first, in its own axes.
+/// Its keys in `customLayerData`: the initial view, in the axes of labelgs.
 const OWN_UP: &str = "up";
 const OWN_EYE: &str = "eye";

@@ -1,21 +1,21 @@
-//! The words and values of a layer of text.
+//! Scans the words and values of a text layer.
 
 use labelgs_scene::{Error, Result};
 use std::path::Path;
 use std::str::FromStr;
 
-/// A value in the text, from its first to behind its last byte.
+/// A value in the text: byte offsets of its start and end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) start: usize,
     pub(super) end: usize,
 }
 
-/// A place in the text.
+/// A position in the text.
 #[derive(Clone, Debug)]
 pub(super) struct Scanner<'a> {
     path: &'a Path,
-    /// The layer, if it is in a package.
+    /// The layer's name, if it is in a package.
     entry: Option<&'a str>,
     text: &'a str,
     at: usize,
@@ -27,7 +27,7 @@ impl<'a> Scanner<'a> {
         Self { path, entry, text, at: 0, end: text.len() }
     }
 
-    /// A scanner of a value.
+    /// Returns a scanner of a value.
     pub(super) fn within(&self, span: Span) -> Self {
         Self { at: span.start, end: span.end, ..self.clone() }
     }
@@ -40,12 +40,12 @@ impl<'a> Scanner<'a> {
         self.at = (self.at + bytes).min(self.end);
     }
 
-    /// The text of a value.
+    /// Returns the text of a value.
     pub(super) fn part(&self, span: Span) -> &'a str {
         self.text.get(span.start..span.end).unwrap_or_default()
     }
 
-    /// The error of a place.
+    /// Returns an error at a position.
     pub(super) fn bad(&self, at: usize, problem: impl Into<String>) -> Error {
         let before = self.text.as_bytes().get(..at).unwrap_or(self.text.as_bytes());
         let line = format!("line {}", 1 + before.iter().filter(|&&byte| byte == b'\n').count());
@@ -61,7 +61,7 @@ impl<'a> Scanner<'a> {
         self.rest().starts_with(text.as_bytes())
     }
 
-    /// The next byte that is neither white space nor in a comment.
+    /// Returns the next byte that is neither white space nor part of a comment.
     pub(super) fn peek(&mut self) -> Option<u8> {
         loop {
             let byte = *self.rest().first()?;
@@ -77,7 +77,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// Moves behind the next `mark`; to the end if there is none. Returns true if there is one.
+    /// Moves past the next `mark`, or to the end if there is none. Returns whether the mark was found.
     fn skip_to(&mut self, mark: &str) -> bool {
         let mark = mark.as_bytes();
         let found = self.rest().windows(mark.len()).position(|part| part == mark);
@@ -85,14 +85,14 @@ impl<'a> Scanner<'a> {
         found.is_some()
     }
 
-    /// Takes the next byte if it is `expected`.
+    /// Consumes the next byte if it is `expected`.
     pub(super) fn take(&mut self, expected: u8) -> bool {
         let is_there = self.peek() == Some(expected);
         self.at += usize::from(is_there);
         is_there
     }
 
-    /// Takes the next byte, which has to be `expected`.
+    /// Consumes the next byte, which must be `expected`.
     pub(super) fn need(&mut self, expected: u8, after: &str) -> Result<()> {
         if self.take(expected) {
             return Ok(());
@@ -101,7 +101,7 @@ impl<'a> Scanner<'a> {
         Err(self.bad(self.at, format!("expected `{}` after {after}, found {found}", char::from(expected))))
     }
 
-    /// What comes next, for a message.
+    /// Describes what comes next, for a message.
     fn found(&mut self) -> String {
         match self.peek() {
             None => "the end; the file was cut short".into(),
@@ -112,7 +112,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// A name, a number or a type without brackets; empty if something else comes.
+    /// Reads a name, a number or a type without brackets; returns an empty string if anything else comes next.
     pub(super) fn word(&mut self) -> &'a str {
         self.peek();
         let is_part = |byte: &u8| byte.is_ascii_alphanumeric() || b"_:.|+-!".contains(byte) || *byte >= 0x80;
@@ -122,7 +122,7 @@ impl<'a> Scanner<'a> {
         self.part(span)
     }
 
-    /// A word that has to come.
+    /// Reads a required word.
     pub(super) fn name(&mut self, what: &str) -> Result<&'a str> {
         let word = self.word();
         if word.is_empty() {
@@ -132,7 +132,7 @@ impl<'a> Scanner<'a> {
         Ok(word)
     }
 
-    /// Moves over a string and returns what is inside of its quotation marks, as it is written.
+    /// Reads a string and returns the raw text between its quotation marks.
     pub(super) fn string(&mut self) -> Result<&'a str> {
         let start = self.at;
         let quote = match self.peek() {
@@ -149,10 +149,10 @@ impl<'a> Scanner<'a> {
         let inside = self.at;
         loop {
             match self.rest().first() {
-                None => return Err(self.bad(start, "has a string without an end; the file was cut short or changed")),
+                None => return Err(self.bad(start, "has an unterminated string; the file was cut short or changed")),
                 Some(b'\\') => self.skip(2),
                 Some(b'\n') if quote.len() == 1 => {
-                    return Err(self.bad(start, "has a string without an end on its line; close it"));
+                    return Err(self.bad(start, "has a string that does not end on its line; close it"));
                 }
                 Some(_) if self.starts(quote) => break,
                 Some(_) => self.at += 1,
@@ -163,13 +163,13 @@ impl<'a> Scanner<'a> {
         Ok(self.part(span))
     }
 
-    /// Moves over a value of any type.
+    /// Skips a value of any type and returns its span.
     pub(super) fn value(&mut self) -> Result<Span> {
         let first = self.peek();
         let start = self.at;
         self.item(first)?;
         if first == Some(b'@') {
-            // An asset may name a prim in it, and how its times are moved.
+            // An asset may be followed by a prim path and a time offset.
             if self.starts("<") {
                 self.item(Some(b'<'))?;
             }
@@ -200,7 +200,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// Moves over brackets and all that is in them.
+    /// Skips brackets and their content.
     fn brackets(&mut self) -> Result<()> {
         let start = self.at;
         let mut open = Vec::new();
@@ -229,7 +229,7 @@ impl<'a> Scanner<'a> {
         Err(self.bad(start, "has no closing bracket; the file was cut short or changed"))
     }
 
-    /// The numbers of a value of any shape, in order.
+    /// Parses the numbers of a value of any shape, in order.
     pub(super) fn numbers<T: FromStr>(&self, span: Span) -> Result<Vec<T>> {
         let mut inside = self.within(span);
         let mut numbers = Vec::new();
@@ -249,7 +249,7 @@ impl<'a> Scanner<'a> {
         Ok(numbers)
     }
 
-    /// The first string of a value, or the one that it is.
+    /// Returns the first string in a value, or the value itself if it is a string.
     pub(super) fn first_string(&self, span: Span) -> Option<String> {
         let mut inside = self.within(span);
         inside.take(b'[');
@@ -257,7 +257,7 @@ impl<'a> Scanner<'a> {
     }
 }
 
-/// A string without the escapes of its text.
+/// Resolves the escapes of a string.
 fn unescaped(text: &str) -> String {
     let (mut plain, mut rest) = (String::new(), text.chars());
     while let Some(c) = rest.next() {

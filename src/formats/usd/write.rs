@@ -1,8 +1,9 @@
 //! Writes USD.
 
 use super::{
-    AXES, CONFIDENCE, DEGREE, HARMONICS, MAGIC, OPACITIES, ORIENTATIONS, OWN, OWN_ANTIALIASED, OWN_DEGREE, OWN_EYE,
-    OWN_LABEL, OWN_UP, POSITIONS, SCALES, SEMANTICS, SPLATS, TAXONOMY,
+    CONFIDENCE_ATTRIBUTE, DEGREE_ATTRIBUTE, HARMONICS_ATTRIBUTE, LABEL_TAXONOMY, MAGIC, OPACITIES_ATTRIBUTE,
+    ORIENTATIONS_ATTRIBUTE, OWN_ANTIALIASED, OWN_DEGREE, OWN_DICTIONARY, OWN_EYE, OWN_LABEL, OWN_UP,
+    POSITIONS_ATTRIBUTE, SCALES_ATTRIBUTE, SEMANTICS_PREFIX, SPLATS_SCHEMA, USD_AXES,
 };
 use crate::archive;
 use crate::format::{Export, FirstView, ModelWriter};
@@ -14,36 +15,37 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-pub(super) const TEXT: ModelWriter = ModelWriter { losses, write, checksum: None };
-pub(super) const PACKAGE: ModelWriter = ModelWriter { losses: losses_of_package, write: write_package, checksum: None };
+pub(super) const TEXT_WRITER: ModelWriter = ModelWriter { losses, write, checksum: None };
+pub(super) const PACKAGE_WRITER: ModelWriter =
+    ModelWriter { losses: losses_of_package, write: write_package, checksum: None };
 
-/// The layer in a package.
-const LAYER: &str = "model.usda";
-/// Alignment of the files of a package, bytes.
-const ALIGNMENT: u16 = 64;
-/// Most characters of a float, with what keeps it from the next one: `(-1.1754944e-38, `.
-const CHARACTERS: u64 = 17;
-/// Standard deviations from the centre to the end of what a Gaussian shows.
-const EXTENT: f64 = 3.0;
+/// Name of the layer in a package.
+const LAYER_FILE: &str = "model.usda";
+/// Alignment of files in a package, bytes.
+const ALIGNMENT_BYTES: u16 = 64;
+/// Most characters of a float including its separator: `(-1.1754944e-38, `.
+const FLOAT_CHARACTERS_MAX: u64 = 17;
+/// Visible radius of a Gaussian, in standard deviations.
+const EXTENT_DEVIATIONS: f64 = 3.0;
 
 fn losses(export: &Export) -> Result<Vec<String>> {
     if export.rows.is_empty() {
-        return Err(Error::usage("USD", "this model has no Gaussians, so a stage of it shows nothing"));
+        return Err(Error::usage("USD", "this model has no Gaussians, so a stage would be empty"));
     }
     Ok(losses_of_values(export))
 }
 
 fn losses_of_package(export: &Export) -> Result<Vec<String>> {
     let floats = 12 + 3 * (1 + coefficients(written_degree(export))) as u64;
-    let most = CHARACTERS * floats * export.rows.len() as u64;
+    let most = FLOAT_CHARACTERS_MAX * floats * export.rows.len() as u64;
     if most > u64::from(u32::MAX) {
-        let problem = format!("a USDZ holds 4 GiB, and this model may take {most} bytes; write a .usda");
+        let problem = format!("a USDZ holds 4 GiB, but this model may take {most} bytes; write a .usda");
         return Err(Error::usage("USDZ", problem));
     }
     losses(export)
 }
 
-/// The degree of harmonics in the file: 0 or 3, because some renderers draw no other one.
+/// Returns the SH degree in the file: 0 or 3, because some renderers support no other.
 fn written_degree(export: &Export) -> u32 {
     if export.model.sh_degree == 0 { 0 } else { 3 }
 }
@@ -51,7 +53,7 @@ fn written_degree(export: &Export) -> u32 {
 fn write_package(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let mut text = Vec::new();
     write(export, &mut text)?;
-    out.write_all(&archive::pack(vec![(LAYER.into(), text)], ALIGNMENT)?)
+    out.write_all(&archive::pack(vec![(LAYER_FILE.into(), text)], ALIGNMENT_BYTES)?)
 }
 
 fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
@@ -59,7 +61,7 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     let triple = |DVec3 { x, y, z }: DVec3| format!("({x:?}, {y:?}, {z:?})");
     let view = export.options.first_view.map_or(String::new(), |FirstView { up, eye }| {
         format!(
-            "        dictionary {OWN} = {{\n            double3 {OWN_UP} = {}\n            double3 {OWN_EYE} = {}\n        }}\n",
+            "        dictionary {OWN_DICTIONARY} = {{\n            double3 {OWN_UP} = {}\n            double3 {OWN_EYE} = {}\n        }}\n",
             triple(up),
             triple(eye)
         )
@@ -88,12 +90,12 @@ fn write(export: &Export, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "}}")
 }
 
-/// A place in the axes of the file.
+/// Converts a position to the axes of the file.
 fn turned(place: DVec3) -> DVec3 {
-    DVec3::from_array(AXES.0.map(f64::from)) * place
+    DVec3::from_array(USD_AXES.0.map(f64::from)) * place
 }
 
-/// Writes the Gaussians of a label.
+/// Writes the Gaussians of a label as a prim.
 fn prim(export: &Export, label: u32, rows: &[usize], out: &mut dyn Write) -> io::Result<()> {
     let g = export.model;
     let name = export.names.and_then(|names| names.name(label)).filter(|_| label != UNLABELLED);
@@ -109,19 +111,22 @@ fn prim(export: &Export, label: u32, rows: &[usize], out: &mut dyn Write) -> io:
     if g.antialiased {
         let _ = writeln!(own, "                bool {OWN_ANTIALIASED} = 1");
     }
-    writeln!(out, "    def {SPLATS} \"{identifier}\" (")?;
+    writeln!(out, "    def {SPLATS_SCHEMA} \"{identifier}\" (")?;
     if label != UNLABELLED {
-        writeln!(out, "        prepend apiSchemas = [\"SemanticsLabelsAPI:{TAXONOMY}\"]")?;
+        writeln!(out, "        prepend apiSchemas = [\"SemanticsLabelsAPI:{LABEL_TAXONOMY}\"]")?;
     }
     if !own.is_empty() {
-        write!(out, "        customData = {{\n            dictionary {OWN} = {{\n{own}            }}\n        }}\n")?;
+        write!(
+            out,
+            "        customData = {{\n            dictionary {OWN_DICTIONARY} = {{\n{own}            }}\n        }}\n"
+        )?;
     }
     if let Some(name) = name {
         writeln!(out, "        displayName = {}", quoted(name))?;
     }
     write!(out, "    )\n    {{\n")?;
     if label != UNLABELLED {
-        writeln!(out, "        token[] {SEMANTICS}{TAXONOMY} = [{}]", quoted(&title))?;
+        writeln!(out, "        token[] {SEMANTICS_PREFIX}{LABEL_TAXONOMY} = [{}]", quoted(&title))?;
     }
     attributes(export, rows, out)?;
     write!(out, "    }}\n\n")
@@ -131,16 +136,16 @@ fn attributes(export: &Export, rows: &[usize], out: &mut dyn Write) -> io::Resul
     let g = export.model;
     let [low, high] = extent(export, rows);
     writeln!(out, "        float3[] extent = [{}, {}]", tuple(low), tuple(high))?;
-    list(out, &format!("point3f[] {POSITIONS}"), rows, |row| tuple(AXES.position(export.position(row))))?;
-    list(out, &format!("quatf[] {ORIENTATIONS}"), rows, |row| tuple(unit(AXES.quat(g.quats[row]))))?;
-    list(out, &format!("float3[] {SCALES}"), rows, |row| tuple(g.scales[row].map(f32::exp)))?;
-    list(out, &format!("float[] {OPACITIES}"), rows, |row| format!("{:?}", sigmoid(g.opacities[row])))?;
+    list(out, &format!("point3f[] {POSITIONS_ATTRIBUTE}"), rows, |row| tuple(USD_AXES.position(export.position(row))))?;
+    list(out, &format!("quatf[] {ORIENTATIONS_ATTRIBUTE}"), rows, |row| tuple(unit(USD_AXES.quat(g.quats[row]))))?;
+    list(out, &format!("float3[] {SCALES_ATTRIBUTE}"), rows, |row| tuple(g.scales[row].map(f32::exp)))?;
+    list(out, &format!("float[] {OPACITIES_ATTRIBUTE}"), rows, |row| format!("{:?}", sigmoid(g.opacities[row])))?;
     let degree = written_degree(export);
-    writeln!(out, "        uniform int {DEGREE} = {degree}")?;
+    writeln!(out, "        uniform int {DEGREE_ATTRIBUTE} = {degree}")?;
     let zeros = vec![[0.0; 3]; coefficients(degree) - g.rest_per_gaussian()];
-    list(out, &format!("float3[] {HARMONICS}"), rows, |row| {
+    list(out, &format!("float3[] {HARMONICS_ATTRIBUTE}"), rows, |row| {
         let mut rest = g.rest(row).to_vec();
-        AXES.rest(&mut rest);
+        USD_AXES.rest(&mut rest);
         let all = [g.sh0[row]].into_iter().chain(rest).chain(zeros.iter().copied());
         all.map(tuple).collect::<Vec<_>>().join(", ")
     })?;
@@ -149,12 +154,14 @@ fn attributes(export: &Export, rows: &[usize], out: &mut dyn Write) -> io::Resul
         "        uniform token projectionModeHint = \"perspective\"\n        uniform token sortingModeHint = \"zDepth\"\n"
     )?;
     match export.label_confidence() {
-        Some(shares) => list(out, &format!("custom float[] {CONFIDENCE}"), rows, |row| format!("{:?}", shares[row])),
+        Some(shares) => {
+            list(out, &format!("custom float[] {CONFIDENCE_ATTRIBUTE}"), rows, |row| format!("{:?}", shares[row]))
+        }
         None => Ok(()),
     }
 }
 
-/// Writes an attribute with a line for each Gaussian.
+/// Writes an attribute with one line per Gaussian.
 fn list(out: &mut dyn Write, attribute: &str, rows: &[usize], value: impl Fn(usize) -> String) -> io::Result<()> {
     writeln!(out, "        {attribute} = [")?;
     for (at, &row) in rows.iter().enumerate() {
@@ -164,20 +171,20 @@ fn list(out: &mut dyn Write, attribute: &str, rows: &[usize], value: impl Fn(usi
     Ok(())
 }
 
-/// Numbers with the fewest digits that give the same bits.
+/// Formats numbers with the fewest digits that restore the same bits.
 fn tuple<const N: usize>(values: [f32; N]) -> String {
     format!("({})", values.map(|value| format!("{value:?}")).join(", "))
 }
 
-/// The box around the ellipsoids of some rows, in the axes of the file.
+/// Returns the bounding box of some rows' ellipsoids, in the axes of the file.
 fn extent(export: &Export, rows: &[usize]) -> [[f32; 3]; 2] {
     let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
     for &row in rows {
         let [w, x, y, z] = unit(export.model.quats[row]).map(f64::from);
         let turn = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
-        let sizes = export.model.scales[row].map(|scale| EXTENT * f64::from(scale).exp());
+        let sizes = export.model.scales[row].map(|scale| EXTENT_DEVIATIONS * f64::from(scale).exp());
         let axes = turn * DMat3::from_diagonal(sizes.into());
-        // Half of the box of an ellipsoid is the length of each row.
+        // Half the size of an ellipsoid's bounding box is the length of each row.
         let rows_of = axes.transpose();
         let half = DVec3::new(rows_of.x_axis.length(), rows_of.y_axis.length(), rows_of.z_axis.length());
         let centre = turned(DVec3::from_array(export.position(row).map(f64::from)));
@@ -186,7 +193,7 @@ fn extent(export: &Export, rows: &[usize]) -> [[f32; 3]; 2] {
     [low, high].map(|corner| corner.as_vec3().clamp(glam::Vec3::MIN, glam::Vec3::MAX).to_array())
 }
 
-/// The identifier of a prim: ASCII only, because older programs refuse other letters, and unique by the label.
+/// Returns the identifier of a prim: ASCII only, because older programs refuse other letters, and unique by the label.
 fn identifier(name: Option<&str>, label: u32) -> String {
     let safe = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = name.unwrap_or("label").chars().take(60).map(safe).collect();
@@ -194,7 +201,7 @@ fn identifier(name: Option<&str>, label: u32) -> String {
     format!("{start}{name}_{label}")
 }
 
-/// A string in quotation marks.
+/// Quotes a string.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {

@@ -1,35 +1,35 @@
-//! The pictures of a SOG.
+//! The images of a SOG.
 
 use crate::archive::Archive;
 use image_webp::{ColorType, WebPDecoder, WebPEncoder};
 use labelgs_scene::{Error, Result};
 use std::io::{self, Cursor};
 
-/// Most samples that a byte of a picture may stand for, and how many more: pictures of one colour take few bytes.
-const SAMPLES_PER_BYTE: u64 = 8192;
-const SAMPLES_MORE: u64 = 1 << 22;
-/// Largest side of a picture.
+/// Most samples per byte of an image, and an allowance: images of a single colour take few bytes.
+const SAMPLES_PER_BYTE_MAX: u64 = 8192;
+const EXTRA_SAMPLES_MAX: u64 = 1 << 22;
+/// Longest side of an image.
 const SIDE_MAX: u32 = 16_383;
 
-/// A picture of R, G, B, A.
-pub(super) struct Picture {
+/// An RGBA image.
+pub(super) struct Image {
     pub(super) width: usize,
     pub(super) texels: Vec<[u8; 4]>,
 }
 
-/// Returns a picture of an archive.
-pub(super) fn picture(archive: &mut Archive, name: &str) -> Result<Picture> {
+/// Decodes an image of an archive.
+pub(super) fn picture(archive: &mut Archive, name: &str) -> Result<Image> {
     let bytes = archive.file(name)?;
     let bad = |problem: String| Error::data(archive.path(), name, format!("{problem}; export the file again"));
-    let broken = |error: image_webp::DecodingError| bad(format!("is no WebP picture: {error}"));
+    let broken = |error: image_webp::DecodingError| bad(format!("is not a WebP image: {error}"));
     let mut decoder = WebPDecoder::new(Cursor::new(&bytes)).map_err(broken)?;
     let (width, height) = decoder.dimensions();
     let samples = 4 * u64::from(width) * u64::from(height);
-    if width.max(height) > SIDE_MAX || samples > SAMPLES_MORE + SAMPLES_PER_BYTE * bytes.len() as u64 {
+    if width.max(height) > SIDE_MAX || samples > EXTRA_SAMPLES_MAX + SAMPLES_PER_BYTE_MAX * bytes.len() as u64 {
         return Err(bad(format!("is {width} x {height} in {} bytes, more than they can hold", bytes.len())));
     }
     if decoder.is_animated() {
-        return Err(bad("is animated; expected one picture".into()));
+        return Err(bad("is animated; expected a single image".into()));
     }
     let size = decoder.output_buffer_size().ok_or_else(|| bad(format!("is {width} x {height}, too large")))?;
     let mut pixels = vec![0; size];
@@ -39,10 +39,10 @@ pub(super) fn picture(archive: &mut Archive, name: &str) -> Result<Picture> {
     } else {
         pixels.as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, 255]).collect()
     };
-    Ok(Picture { width: width as usize, texels })
+    Ok(Image { width: width as usize, texels })
 }
 
-/// Encodes a picture of this width without loss; missing pixels at the end are 0.
+/// Encodes an image of this width losslessly; missing pixels at the end are 0.
 pub(super) fn encode(texels: &[[u8; 4]], width: usize, height: usize) -> io::Result<Vec<u8>> {
     let mut pixels = texels.as_flattened().to_vec();
     pixels.resize(4 * width * height, 0);
