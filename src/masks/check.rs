@@ -1,4 +1,4 @@
-//! Checks of masks, by comparison with the masks of the other photos. This module reads no files.
+//! Checks each mask by comparing it with the masks of the other photos. This module reads no files.
 
 use super::shortened;
 use super::soft_edges::{self, Edges};
@@ -8,23 +8,24 @@ use labelgs_scene::{Camera, Dataset, LabelMap, Point, Setting, View};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of the image border above which an object surrounds the image. It is a little below 1, because the true object
-/// may touch the border.
-pub const INVERTED_BORDER: f64 = 0.9;
-/// Share of the image above which an object covers most of it. Objects of interest rarely do; backgrounds always do.
-pub const INVERTED_SHARE: f64 = 0.5;
-/// Border share up to which an id in the other masks does not surround the image.
-pub const INVERTED_ELSEWHERE: f64 = 0.5;
-/// Labelled area relative to the median below which a mask is nearly empty. Distance and image borders change areas by
-/// small factors; lost tracks leave nothing or specks.
-pub const EMPTY_MASK: f64 = 0.05;
-/// The same for one object. It is lower, because an object may really show a sliver behind another.
-pub const EMPTY_OBJECT: f64 = 0.005;
+/// An object whose share of the image border exceeds this value surrounds the image. The value is a little below 1,
+/// because the true object may touch the border.
+pub const INVERTED_BORDER_MIN: f64 = 0.9;
+/// An object whose share of the image exceeds this value covers most of it. Objects of interest rarely do; backgrounds
+/// always do.
+pub const INVERTED_SHARE_MIN: f64 = 0.5;
+/// Largest border share of an id in the other masks for it not to surround the image.
+pub const INVERTED_ELSEWHERE_MAX: f64 = 0.5;
+/// A mask is nearly empty if its labelled area relative to the median is below this value. Distance and image borders
+/// change areas by small factors; lost tracks leave nothing or a few pixels.
+pub const EMPTY_MASK_RATIO_MAX: f64 = 0.05;
+/// The same for a single object. It is lower, because an object may really show only a sliver behind another.
+pub const EMPTY_OBJECT_RATIO_MAX: f64 = 0.005;
 /// Fewest masks with an object before one of them is compared with their median.
-pub const VIEWS_FOR_MEDIAN: usize = 4;
-/// Least share of the image that an object has in both neighbours for its absence between them to count. Smaller
-/// objects may really disappear.
-pub const BLINK_SHARE: f64 = 0.002;
+pub const MEDIAN_VIEWS_MIN: usize = 4;
+/// Smallest share of the image that an object must have in both neighbours for its absence between them to count.
+/// Smaller objects may really disappear.
+pub const BLINK_SHARE_MIN: f64 = 0.002;
 
 /// A kind of problem in masks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -32,27 +33,27 @@ pub const BLINK_SHARE: f64 = 0.002;
 pub enum Problem {
     /// A photo has no mask.
     Missing,
-    /// A file belongs to no photo.
+    /// A file does not belong to any photo.
     Misnamed,
     /// No scale brings the mask to the size of the photo.
     Missized,
-    /// The file is no id mask.
+    /// The file is not an id mask.
     Unreadable,
-    /// Only photos that are held out have masks.
+    /// Only held-out photos have masks.
     HeldOut,
     /// No mask marks an object.
     NoObject,
-    /// Every mask is one area of one id.
+    /// Every mask is a single area with a single id.
     OneArea,
-    /// Values of areas mix at their edges.
+    /// Pixels along edges mix the values of both sides.
     SoftEdges,
-    /// Object and background look swapped.
+    /// Object and background seem swapped.
     Inverted,
-    /// Much less is labelled than in the other masks.
+    /// Much less is labelled than in other masks.
     NearlyEmpty,
-    /// Only one mask has the id.
+    /// Only one mask contains the id.
     SingleView,
-    /// An id is absent between two masks that have it.
+    /// An id is missing between two masks that contain it.
     Blink,
 }
 
@@ -68,16 +69,16 @@ impl Problem {
 pub struct Finding {
     /// Kind of problem.
     pub problem: Problem,
-    /// Name of the photo, if the problem is about one.
+    /// Name of the photo, if the problem concerns one.
     pub view: Option<String>,
-    /// Id of the object, if the problem is about one.
+    /// Id of the object, if the problem concerns one.
     pub id: Option<u32>,
     /// Description.
     pub text: String,
 }
 
 impl Finding {
-    /// Makes one about no photo and no object.
+    /// Creates a finding about the whole scene.
     pub(super) fn of_scene(problem: Problem, text: String) -> Self {
         Self { problem, view: None, id: None, text }
     }
@@ -89,9 +90,9 @@ struct Area {
     border: u64,
 }
 
-/// The measurements of a mask that the checks need.
+/// Measurements of a mask, as needed by the checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Look {
+pub struct MaskStats {
     pixels: u64,
     border: u64,
     objects: BTreeMap<u16, Area>,
@@ -100,8 +101,8 @@ pub struct Look {
     at_points: Vec<Option<u16>>,
 }
 
-impl Look {
-    /// Measures a mask. `camera` is that of the photo, at any scale. Lens distortion is ignored, because positions need
+impl MaskStats {
+    /// Measures a mask. `camera` is the photo's camera at any scale. Lens distortion is ignored, because positions need
     /// only be approximate.
     pub fn new(map: &LabelMap, camera: &Camera, points: &[Point]) -> Self {
         let mut objects: BTreeMap<u16, Area> = BTreeMap::new();
@@ -129,7 +130,13 @@ impl Look {
             inside.then(|| map.at(x as u32, y as u32))
         };
         let at_points = points.iter().map(at).collect();
-        Self { pixels: map.ids.len() as u64, border, objects, edges: Edges::of(&map.ids, width, height), at_points }
+        Self {
+            pixels: map.ids.len() as u64,
+            border,
+            objects,
+            edges: Edges::measure(&map.ids, width, height),
+            at_points,
+        }
     }
 
     /// Returns the ids in the mask.
@@ -150,9 +157,9 @@ impl Look {
     }
 }
 
-/// Checks masks, given with the names of their photos and sorted by name. A problem of all masks stands alone, because it
-/// makes many others.
-pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
+/// Checks masks, given with the names of their photos and sorted by name. A problem that all masks share is reported
+/// alone, because it causes many others.
+pub fn findings(masks: &[(&str, &MaskStats)]) -> Vec<Finding> {
     if let Some((problem, text)) = problem_of_all(masks) {
         return vec![Finding::of_scene(problem, text)];
     }
@@ -168,7 +175,7 @@ pub fn findings(masks: &[(&str, &Look)]) -> Vec<Finding> {
     found
 }
 
-fn problem_of_all(masks: &[(&str, &Look)]) -> Option<(Problem, String)> {
+fn problem_of_all(masks: &[(&str, &MaskStats)]) -> Option<(Problem, String)> {
     let (_, first) = masks.first()?;
     if masks.iter().all(|(_, look)| look.objects.is_empty()) {
         return Some((Problem::NoObject, no_object(masks.len())));
@@ -182,7 +189,7 @@ fn problem_of_all(masks: &[(&str, &Look)]) -> Option<(Problem, String)> {
     soft_edges::problem(&edges).map(|text| (Problem::SoftEdges, text))
 }
 
-/// What is wrong with masks of which none marks an object.
+/// Describes masks of which none marks an object.
 pub fn no_object(masks: usize) -> String {
     format!(
         "no mask marks an object: every pixel of all {masks} masks is 0. Make the masks again with an id above 0 for each \
@@ -190,15 +197,16 @@ pub fn no_object(masks: usize) -> String {
     )
 }
 
-/// What is wrong with masks of one area.
+/// Describes masks that are a single area.
 pub fn one_area(masks: usize, id: u16) -> String {
     format!(
-        "no mask tells an object from what is around it: every pixel of all {masks} masks is {id}. Make the masks again \
-         with 0 where no object is"
+        "no mask separates an object from its surroundings: every pixel of all {masks} masks is {id}. Make the masks \
+         again with 0 where no object is"
     )
 }
 
-/// What is wrong if only photos that are held out have masks. `has_mask` tells of a photo to train on or held out.
+/// Describes the problem if only held-out photos have masks. `has_mask` applies to photos for training and held-out
+/// photos.
 pub fn held_out(dataset: &Dataset, has_mask: impl Fn(&View) -> bool) -> Option<String> {
     if dataset.train.iter().any(&has_mask) {
         return None;
@@ -206,7 +214,7 @@ pub fn held_out(dataset: &Dataset, has_mask: impl Fn(&View) -> bool) -> Option<S
     let photos: Vec<&str> = dataset.test.iter().filter(|view| has_mask(view)).map(|view| view.name.as_str()).collect();
     let text = || {
         format!(
-            "only photos that are held out for scores have masks, and nothing learns from these: {}. Add masks of other \
+            "only held-out photos have masks, so training cannot use them: {}. Add masks of other \
              photos, or hold out others by {} of the training",
             shortened(&photos),
             Setting("test_every")
@@ -223,63 +231,63 @@ fn percent(share: f64) -> String {
     format!("{:.2} %", share * 100.0)
 }
 
-/// Finds masks in which an id surrounds and fills the image, although it does not in the other masks or is the only id.
-/// A scene has one floor or wall in most views; an object that is all around in one photo only is its background.
-fn inverted(masks: &[(&str, &Look)], id: u16, only: bool) -> Vec<Finding> {
-    let with: Vec<&(&str, &Look)> = masks.iter().filter(|(_, look)| look.objects.contains_key(&id)).collect();
-    let surrounds = |look: &Look| look.border_share(id) >= INVERTED_BORDER && look.share(id) >= INVERTED_SHARE;
+/// Finds masks in which an id surrounds and fills the image, although the id does not do so in the other masks or is
+/// the only one. A scene has the same floor or wall in most views, so an object that surrounds only one photo is its
+/// background.
+fn inverted(masks: &[(&str, &MaskStats)], id: u16, only: bool) -> Vec<Finding> {
+    let with: Vec<&(&str, &MaskStats)> = masks.iter().filter(|(_, look)| look.objects.contains_key(&id)).collect();
+    let surrounds =
+        |look: &MaskStats| look.border_share(id) >= INVERTED_BORDER_MIN && look.share(id) >= INVERTED_SHARE_MIN;
     let elsewhere = |own: &str| {
         let others = with.iter().filter(|(name, _)| *name != own).map(|(_, look)| look.border_share(id));
-        median(others).is_some_and(|share| share <= INVERTED_ELSEWHERE)
+        median(others).is_some_and(|share| share <= INVERTED_ELSEWHERE_MAX)
     };
     let found = with.iter().filter(|(name, look)| surrounds(look) && (only || elsewhere(name)));
-    let text = |look: &Look| {
+    let text = |look: &MaskStats| {
         let (share, border) = (percent(look.share(id)), percent(look.border_share(id)));
-        let unlike = if only { "it is the only object" } else { "in the other masks it does not surround the picture" };
-        format!(
-            "covers {share} of the picture and {border} of its border, and {unlike}: object and surroundings swapped?"
-        )
+        let unlike = if only { "it is the only object" } else { "it does not surround the image in the other masks" };
+        format!("covers {share} of the image and {border} of its border, and {unlike}: object and background swapped?")
     };
     found.map(|(name, look)| finding(Problem::Inverted, name, Some(id), text(look))).collect()
 }
 
-fn nearly_empty_masks(masks: &[(&str, &Look)]) -> Vec<Finding> {
+fn nearly_empty_masks(masks: &[(&str, &MaskStats)]) -> Vec<Finding> {
     let usual = median(masks.iter().map(|(_, look)| look.labelled())).unwrap_or(0.0);
-    let few = |look: &Look| look.labelled() < usual * EMPTY_MASK;
-    let text = |look: &Look| {
-        format!("{} of the picture is labelled, in the median mask {}", percent(look.labelled()), percent(usual))
+    let few = |look: &MaskStats| look.labelled() < usual * EMPTY_MASK_RATIO_MAX;
+    let text = |look: &MaskStats| {
+        format!("{} of the image is labelled; the median is {}", percent(look.labelled()), percent(usual))
     };
     let found = masks.iter().filter(|(_, look)| few(look));
     found.map(|(name, look)| finding(Problem::NearlyEmpty, name, None, text(look))).collect()
 }
 
-fn nearly_empty_objects(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
+fn nearly_empty_objects(masks: &[(&str, &MaskStats)], id: u16) -> Vec<Finding> {
     let with: Vec<(&str, f64)> =
         masks.iter().map(|(name, look)| (*name, look.share(id))).filter(|(_, share)| *share > 0.0).collect();
-    if with.len() < VIEWS_FOR_MEDIAN {
+    if with.len() < MEDIAN_VIEWS_MIN {
         return Vec::new();
     }
     let usual = median(with.iter().map(|(_, share)| *share)).unwrap_or(0.0);
-    let few = with.into_iter().filter(|(_, share)| *share < usual * EMPTY_OBJECT);
-    let text = |share| format!("covers {} of the picture, in the median mask {}", percent(share), percent(usual));
+    let few = with.into_iter().filter(|(_, share)| *share < usual * EMPTY_OBJECT_RATIO_MAX);
+    let text = |share| format!("covers {} of the image; the median is {}", percent(share), percent(usual));
     few.map(|(name, share)| finding(Problem::NearlyEmpty, name, Some(id), text(share))).collect()
 }
 
-fn single_view(masks: &[(&str, &Look)], id: u16) -> Option<Finding> {
+fn single_view(masks: &[(&str, &MaskStats)], id: u16) -> Option<Finding> {
     let mut with = masks.iter().filter(|(_, look)| look.objects.contains_key(&id));
     let (name, look) = with.next()?;
     let text = || {
         let (share, masks) = (percent(look.share(id)), masks.len());
-        format!("is in this mask only, of {masks}, and covers {share} of it: an object lost and found under two ids?")
+        format!("occurs only in this mask of {masks}, with {share} of it: an object that changed its id?")
     };
     (masks.len() > 1 && with.next().is_none()).then(|| finding(Problem::SingleView, name, Some(id), text()))
 }
 
-/// Finds masks without an object between two neighbours by name that both show it. Points of the scene that lie on the
-/// object in both neighbours can excuse the absence: either none of them is in the image, or most of those in the image
-/// are on other objects that both neighbours show too and that may hide the object.
-fn blinks(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
-    let shown = |look: &Look| look.share(id) >= BLINK_SHARE;
+/// Finds masks without an object that both neighbours by name show. Scene points on the object in both neighbours can
+/// excuse the absence: none of them is inside the image, or most of those inside are on other objects that both
+/// neighbours also show and that may hide the object.
+fn blinks(masks: &[(&str, &MaskStats)], id: u16) -> Vec<Finding> {
+    let shown = |look: &MaskStats| look.share(id) >= BLINK_SHARE_MIN;
     let blinking = masks.windows(3).filter(|three| {
         let [(_, before), (_, between), (_, after)] = three else { return false };
         let absent = !between.objects.contains_key(&id);
@@ -289,13 +297,13 @@ fn blinks(masks: &[(&str, &Look)], id: u16) -> Vec<Finding> {
     blinking.map(|three| finding(Problem::Blink, three[1].0, Some(id), text(three[0].0, three[2].0))).collect()
 }
 
-fn excused(before: &Look, between: &Look, after: &Look, id: u16) -> bool {
+fn excused(before: &MaskStats, between: &MaskStats, after: &MaskStats, id: u16) -> bool {
     let sides = before.at_points.iter().zip(&after.at_points);
     let on_object = sides.zip(&between.at_points).filter(|((a, b), _)| **a == Some(id) && **b == Some(id));
     let between: Vec<Option<u16>> = on_object.map(|(_, between)| *between).collect();
     let inside: Vec<u16> = between.iter().copied().flatten().collect();
     let known = |other: &&u16| before.objects.contains_key(other) && after.objects.contains_key(other);
     let behind = inside.iter().filter(known).count();
-    // Without a point on the object there is no excuse.
+    // Without points on the object, nothing excuses the absence.
     !between.is_empty() && (inside.is_empty() || behind * 2 > inside.len())
 }

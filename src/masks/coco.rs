@@ -1,6 +1,6 @@
-//! Instances of COCO: one JSON with all photos. CVAT and Label Studio export it too.
+//! COCO instances: a single JSON with all photos. CVAT and Label Studio also export it.
 
-use super::marks::{Found, Mark, Shape, require_aspect};
+use super::marks::{FoundMarks, Mark, Shape, require_aspect};
 use super::names;
 use super::photos::PhotoIndex;
 use super::polygon::Polygons;
@@ -24,7 +24,7 @@ struct File {
 struct Image {
     id: Value,
     file_name: String,
-    /// Label Studio leaves out sizes that it does not know.
+    /// Label Studio omits unknown sizes.
     width: Option<u32>,
     height: Option<u32>,
 }
@@ -52,18 +52,18 @@ struct Category {
     name: String,
 }
 
-const EXPECTED: &str = r#"expected instances of COCO: {"images": [{"id": 1, "file_name": "a.jpg"}], "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "segmentation": [[x, y, ...]]}], "categories": [{"id": 1, "name": "cup"}]}"#;
+const EXPECTED_FORM: &str = r#"expected instances of COCO: {"images": [{"id": 1, "file_name": "a.jpg"}], "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "segmentation": [[x, y, ...]]}], "categories": [{"id": 1, "name": "cup"}]}"#;
 
-/// Folders in which tools put the file, below the one that they export.
-const FOLDERS: [&str; 2] = ["", "annotations"];
+/// Folders in which tools put the file, relative to the exported one.
+const COCO_FOLDERS: [&str; 2] = ["", "annotations"];
 
-/// Returns the files of this kind in a folder, or the path if it is a file.
+/// Returns the COCO files in a folder, or the path if it is a file.
 pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>> {
     if path.is_file() {
         return Ok(vec![path.to_owned()]);
     }
     let mut found = Vec::new();
-    for folder in FOLDERS.map(|name| path.join(name)).iter().filter(|folder| folder.is_dir()) {
+    for folder in COCO_FOLDERS.map(|name| path.join(name)).iter().filter(|folder| folder.is_dir()) {
         for file in read::folder(folder)? {
             let is_json = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
             if is_json && file.is_file() && looks_like_it(&read::bytes(&file)?) {
@@ -75,32 +75,32 @@ pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// A broken file must also be found, so that the reader can tell what is wrong.
+/// Recognises broken files too, so that the reader can explain what is wrong.
 fn looks_like_it(text: &[u8]) -> bool {
     let has = |key: &str| text.windows(key.len()).any(|part| part == key.as_bytes());
     has("\"images\"") && has("\"annotations\"") && has("\"image_id\"")
 }
 
-/// Returns the only file of this kind.
+/// Returns the only COCO file.
 pub(super) fn file(path: &Path) -> Result<PathBuf> {
     match &files(path)?[..] {
         [file] => Ok(file.clone()),
-        [] => Err(Error::data(path, "", format!("has no JSON with images and annotations; {EXPECTED}"))),
+        [] => Err(Error::data(path, "", format!("has no JSON with images and annotations; {EXPECTED_FORM}"))),
         several => {
             let names: Vec<String> = several.iter().map(|file| file.display().to_string()).collect();
-            Err(Error::data(path, "", format!("has several files of COCO; name one of them: {}", names.join(", "))))
+            Err(Error::data(path, "", format!("has several COCO files; name one of them: {}", names.join(", "))))
         }
     }
 }
 
 /// Reads the file.
-pub(super) fn read(path: &Path, views: &[&View]) -> Result<Found> {
-    let file: File = read::json(path, EXPECTED)?;
+pub(super) fn read(path: &Path, views: &[&View]) -> Result<FoundMarks> {
+    let file: File = read::json(path, EXPECTED_FORM)?;
     let photos = names(views);
     let images = images(path, &photos, &file.images)?;
     let names: HashMap<String, &str> =
         file.categories.iter().map(|category| (category.id.to_string(), category.name.as_str())).collect();
-    let mut found = Found { of_photo: vec![Vec::new(); views.len()], ..Found::default() };
+    let mut found = FoundMarks { of_photo: vec![Vec::new(); views.len()], ..FoundMarks::default() };
     found.names = file.categories.iter().map(|category| category.name.clone()).collect();
     let mut boxes = 0;
     for (at, annotation) in file.annotations.iter().enumerate() {
@@ -130,13 +130,13 @@ pub(super) fn read(path: &Path, views: &[&View]) -> Result<Found> {
     found.strays.dedup();
     if boxes > 0 {
         found.notes.push(format!(
-            "{boxes} of {} annotations have no outline, as boxes, and were left out",
+            "{boxes} of {} annotations are boxes without an outline and were omitted",
             file.annotations.len()
         ));
     }
     if boxes > 0 && found.of_photo.iter().all(Vec::is_empty) {
         let problem = format!(
-            "none of the {boxes} annotations has a `segmentation`: boxes mark no pixels, export polygons or masks"
+            "none of the {boxes} annotations has a `segmentation`: boxes mark no pixels; export polygons or masks"
         );
         return Err(Error::data(path, "annotations", problem));
     }
@@ -145,7 +145,7 @@ pub(super) fn read(path: &Path, views: &[&View]) -> Result<Found> {
     Ok(found)
 }
 
-/// Returns the images by id, each with its photo.
+/// Returns the images by id, with their photos.
 fn images<'a>(
     path: &Path,
     photos: &[&str],
@@ -159,7 +159,7 @@ fn images<'a>(
         let photo = index.find(&image.file_name);
         let other = photo.and_then(|photo| owners.insert(photo, &image.file_name));
         if let (Some(photo), Some(other)) = (photo, other) {
-            return wrong(format!("and image `{other}` are both the photo {}; keep one of them", photos[photo]));
+            return wrong(format!("and image `{other}` both belong to the photo {}; keep one of them", photos[photo]));
         }
         if found.insert(image.id.to_string(), (photo, image)).is_some() {
             return wrong(format!("has the id {} of another image; ids must be unique", image.id));
@@ -173,7 +173,7 @@ fn mark(annotation: &Annotation, names: &HashMap<String, &str>, shape: Shape) ->
         Value::Null => None,
         id => Some(names.get(&id.to_string()).map_or_else(|| format!("category {id}"), |name| (*name).to_owned())),
     };
-    // CVAT puts the track of a video among the attributes.
+    // CVAT stores the track of a video among the attributes.
     let tracks = [Some(&annotation.track_id), annotation.attributes.get("track_id")];
     let track = tracks.into_iter().flatten().find(|track| !track.is_null()).map(Value::to_string);
     let is_crowd =
@@ -181,7 +181,7 @@ fn mark(annotation: &Annotation, names: &HashMap<String, &str>, shape: Shape) ->
     Mark { track, is_crowd, ..Mark::new(name, shape) }
 }
 
-/// Returns the pixels, or none for a box; an error is what is wrong.
+/// Returns the pixels, or `None` for a box. The error describes what is wrong.
 fn shape(annotation: &Annotation, image: &Image, view: &View) -> Result<Option<Shape>, String> {
     let photo = view.camera.size();
     match &annotation.segmentation {

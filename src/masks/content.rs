@@ -1,6 +1,6 @@
 //! Converts the samples of a PNG to source ids, or to black and white.
 
-use super::mask::{Header, Raw, read_raw};
+use super::mask::{Header, RawPng, read_raw};
 use labelgs_scene::{Error, Result, Setting};
 use png::{BitDepth, ColorType};
 use std::collections::BTreeSet;
@@ -13,13 +13,13 @@ pub(super) enum Kind {
     Grey16,
     Palette,
     Rgb,
-    /// 16-bit colours: no ids.
+    /// 16-bit colours, which cannot be ids.
     Rgb16,
 }
 
 impl Kind {
-    /// Opacity makes no other kind. Colours with the same value in all channels are grey, which only pixels show.
-    pub(super) fn of(header: &Header) -> Self {
+    /// Ignores opacity. Colours may still be grey, which only their pixels show.
+    pub(super) fn from_header(header: &Header) -> Self {
         match (header.colour, header.depth) {
             (ColorType::Indexed, _) => Self::Palette,
             (ColorType::Rgb | ColorType::Rgba, BitDepth::Sixteen) => Self::Rgb16,
@@ -29,7 +29,7 @@ impl Kind {
         }
     }
 
-    /// Returns the kind of a picture of colours whose channels have the same values.
+    /// Returns the kind of a colour image whose channels are all equal.
     pub(super) fn as_grey(self) -> Self {
         match self {
             Self::Rgb => Self::Grey8,
@@ -49,12 +49,12 @@ impl Kind {
     }
 }
 
-/// Returns true if the picture has one value per pixel, in whatever channels.
+/// Returns true if the image has one value per pixel, whatever its channels.
 pub(super) fn is_grey(path: &Path) -> Result<bool> {
     Ok(read_raw(path, |_| Ok(()))?.values(path)?.is_some())
 }
 
-/// Reads size and ids of a PNG of the kind `expected`, one per pixel: value, index, or R + 256 G + 65536 B.
+/// Reads the size and the ids of a PNG of kind `expected`, one per pixel: value, index, or R + 256 G + 65536 B.
 pub(super) fn read_ids(
     path: &Path,
     expected: Kind,
@@ -62,14 +62,14 @@ pub(super) fn read_ids(
 ) -> Result<((u32, u32), Vec<u32>)> {
     let wrong = |found: Kind| {
         let problem = format!(
-            "is a {} picture where {} is expected; set {} to what the folder holds",
+            "is a {} image where {} is expected; set {} to the format of the folder",
             found.text(),
             expected.text(),
             Setting("format")
         );
         Error::data(path, "", problem)
     };
-    let raw = read_raw(path, |header| match Kind::of(header) {
+    let raw = read_raw(path, |header| match Kind::from_header(header) {
         found if found == expected || found.as_grey() == expected => accept(header.size),
         found => Err(wrong(found)),
     })?;
@@ -77,7 +77,7 @@ pub(super) fn read_ids(
         let id = |rgb: &[u16]| u32::from(rgb[0]) + (u32::from(rgb[1]) << 8) + (u32::from(rgb[2]) << 16);
         raw.opaque(path)?.0.chunks_exact(3).map(id).collect()
     } else {
-        let values = raw.values(path)?.ok_or_else(|| wrong(Kind::of(&raw.header)))?;
+        let values = raw.values(path)?.ok_or_else(|| wrong(Kind::from_header(&raw.header)))?;
         values.into_iter().map(u32::from).collect()
     };
     Ok((raw.header.size, ids))
@@ -88,12 +88,12 @@ pub(super) struct Binary {
     pub(super) size: (u32, u32),
     /// True for pixels of the object, row-major.
     pub(super) inside: Vec<bool>,
-    /// True if the pixels have only one value besides 0, so that no threshold was needed.
+    /// Whether the pixels have a single value besides 0, so that no threshold was needed.
     pub(super) sharp: bool,
 }
 
-/// Reads a black and white PNG of any kind. If there is one value besides 0, it is the object. If there are more, the
-/// object is the upper half of the range, as in the scorers of LERF-Mask.
+/// Reads a black and white PNG of any kind. A single value besides 0 is the object. With more values, the object is the
+/// upper half of the range, as in the LERF-Mask scorers.
 pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<Binary> {
     let raw = read_raw(path, |header| accept(header.size))?;
     let size = raw.header.size;
@@ -109,8 +109,8 @@ pub(super) fn read_binary(path: &Path, accept: impl FnOnce((u32, u32)) -> Result
     Ok(Binary { size, inside: values.iter().map(inside).collect(), sharp })
 }
 
-/// Returns the value of each pixel: grey, index, or the largest of its colours.
-fn brightness(path: &Path, raw: &Raw) -> Result<Vec<u16>> {
+/// Returns the value of each pixel: grey, index, or its largest colour channel.
+fn brightness(path: &Path, raw: &RawPng) -> Result<Vec<u16>> {
     let (samples, channels) = raw.opaque(path)?;
     Ok(samples.chunks_exact(channels).map(|pixel| pixel.iter().copied().max().unwrap_or(0)).collect())
 }

@@ -1,4 +1,4 @@
-//! The masks of a photo as one map of source ids.
+//! Combines the masks of a photo into a map of source ids.
 
 use super::Overlap;
 use super::content::{read_binary, read_ids};
@@ -11,14 +11,14 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Numbers of pixels that two source ids share, the smaller id first.
-pub(super) type Shared = BTreeMap<(u32, u32), u64>;
+/// Number of pixels that two source ids share, with the smaller id first.
+pub(super) type SharedPixels = BTreeMap<(u32, u32), u64>;
 
 /// The mask of a photo with source ids.
-pub(super) struct Decoded {
+pub(super) struct DecodedMask {
     pub(super) size: (u32, u32),
     pub(super) ids: Vec<u32>,
-    pub(super) shared: Shared,
+    pub(super) shared: SharedPixels,
     /// Number of pixels that several objects share.
     pub(super) shared_pixels: u64,
     /// Number of black and white images that needed a threshold.
@@ -26,12 +26,12 @@ pub(super) struct Decoded {
 }
 
 /// Reads the masks of a photo.
-pub(super) fn decode(reading: &Reading, photo: usize, view: &View) -> Result<Decoded> {
+pub(super) fn decode(reading: &Reading, photo: usize, view: &View) -> Result<DecodedMask> {
     match &reading.content {
         Content::Ids { kind, of_photo, .. } => {
             let path = reading.root.join(of_photo[photo].as_deref().unwrap_or_default());
             let (size, ids) = read_ids(&path, *kind, |found| fits(&path, found, view))?;
-            Ok(Decoded { size, ids, shared: Shared::new(), shared_pixels: 0, cut: 0 })
+            Ok(DecodedMask { size, ids, shared: SharedPixels::new(), shared_pixels: 0, cut: 0 })
         }
         Content::Marks { of_photo, .. } => blend(&reading.root, &of_photo[photo], view, reading.overlap),
     }
@@ -42,7 +42,7 @@ fn fits(path: &Path, found: (u32, u32), view: &View) -> Result<()> {
 }
 
 /// Paints the masks of a photo over each other.
-fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Decoded> {
+fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<DecodedMask> {
     let mut layers = Vec::with_capacity(marks.len());
     let (mut size, mut cut) = (None, 0);
     let photo = view.camera.size();
@@ -52,9 +52,9 @@ fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Deco
                 let path = root.join(file);
                 let mask = read_binary(&path, |found| fits(&path, found, view))?;
                 cut += usize::from(!mask.sharp);
-                (mask.size, Spans::of(&mask.inside))
+                (mask.size, Spans::from_mask(&mask.inside))
             }
-            // Shapes without pixels of their own get those of the photo.
+            // Shapes without a size of their own get the photo's.
             Shape::Rle(rle) => (photo, check_size(root, photo).map(|()| rle.spans(photo))?),
             Shape::Polygons(polygons) => (photo, check_size(root, photo).map(|()| polygons.spans(photo))?),
         };
@@ -73,13 +73,16 @@ fn blend(root: &Path, marks: &[Mark], view: &View, rule: Overlap) -> Result<Deco
     layers.sort_by_key(|(order, ..)| *order);
     let size = size.unwrap_or(photo);
     let (ids, shared, shared_pixels) = paint(size, layers.iter().map(|(_, id, spans)| (*id, spans)));
-    Ok(Decoded { size, ids, shared, shared_pixels, cut })
+    Ok(DecodedMask { size, ids, shared, shared_pixels, cut })
 }
 
-fn paint<'a>((width, height): (u32, u32), layers: impl Iterator<Item = (u32, &'a Spans)>) -> (Vec<u32>, Shared, u64) {
+fn paint<'a>(
+    (width, height): (u32, u32),
+    layers: impl Iterator<Item = (u32, &'a Spans)>,
+) -> (Vec<u32>, SharedPixels, u64) {
     let mut ids = vec![0; width as usize * height as usize];
     let mut counted = vec![false; ids.len()];
-    let mut shared = Shared::new();
+    let mut shared = SharedPixels::new();
     for (id, spans) in layers {
         for run in spans.runs() {
             let (ids, counted) = (&mut ids[run.clone()], &mut counted[run]);

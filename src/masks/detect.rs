@@ -1,8 +1,8 @@
-//! Detects the format of a folder of masks. Two formats that both fit are an error.
+//! Detects the format of a mask folder. An ambiguous folder is an error.
 
 use super::content::{Kind, is_grey, read_binary};
 use super::folder::{Claims, Layouts, layouts, root};
-use super::marks::{Found, Mark, Numbering, Object, Shape, number};
+use super::marks::{FoundMarks, Mark, Numbering, Object, Shape, number};
 use super::mask::read_header;
 use super::pred::Pred;
 use super::{Format, ImportOptions, ObjectPer, Overlap, names, shortened, tools};
@@ -15,16 +15,16 @@ use std::path::{Path, PathBuf};
 
 /// The masks of all photos.
 pub(super) enum Content {
-    /// One id picture for each photo that has one.
+    /// One id image per photo.
     Ids { kind: Kind, of_photo: Vec<Option<String>>, pred: Option<Pred> },
-    /// Masks of one object each.
+    /// Masks of single objects.
     Marks { of_photo: Vec<Vec<Mark>>, numbering: Numbering },
 }
 
-/// The detected format of a folder of masks.
+/// The detected format of a mask folder.
 pub(super) struct Reading {
     pub(super) format: Format,
-    /// Folder or file of the masks, possibly below the given one.
+    /// Folder or file of the masks, possibly inside the given folder.
     pub(super) root: PathBuf,
     pub(super) content: Content,
     /// Images without a photo.
@@ -46,7 +46,7 @@ impl Reading {
         }
     }
 
-    /// The objects of masks of one object each.
+    /// Returns the objects, if each mask shows a single object.
     pub(super) fn objects(&self) -> Option<&[Object]> {
         match &self.content {
             Content::Ids { .. } => None,
@@ -54,7 +54,7 @@ impl Reading {
         }
     }
 
-    /// The list of ids that came with id pictures.
+    /// Returns the list of ids that came with id images.
     pub(super) fn pred(&self) -> Option<&Pred> {
         match &self.content {
             Content::Ids { pred, .. } => pred.as_ref(),
@@ -63,7 +63,7 @@ impl Reading {
     }
 }
 
-/// What to set for pictures in folders.
+/// Returns the settings to try for images in folders.
 fn nested_formats() -> String {
     let format = |name| Setting("format").to(name);
     format!(
@@ -77,21 +77,21 @@ fn nested_formats() -> String {
 pub(super) fn detect(views: &[&View], options: &ImportOptions) -> Result<Reading> {
     let photos = names(views);
     if !options.folder.exists() {
-        return Err(Error::data(&options.folder, "", "there is no such folder of masks"));
+        return Err(Error::data(&options.folder, "", "there is no such mask folder"));
     }
     let tool = match options.format {
         Format::Auto => tools::recognise(&options.folder, &photos)?,
-        format => Some((format, "as asked for".to_owned())),
+        format => Some((format, "as requested".to_owned())),
     };
     if let Some((format, why)) = tool
         && let Some((root, found)) = tools::read(&options.folder, format, views)?
     {
-        return of_marks(root, &photos, found, format, why, options);
+        return reading_from_marks(root, &photos, found, format, why, options);
     }
     folders(&photos, options)
 }
 
-/// Detects the format of masks that no tool marks as its own.
+/// Detects the format of masks that no tool's files identify.
 fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let root = root(&options.folder, options.format)?;
     let files = below(&root)?;
@@ -100,7 +100,7 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let pred = pred.as_deref().map(Pred::read).transpose()?;
     let (format, why) = match options.format {
         Format::Auto => recognise(&root, &layouts, pred.as_ref(), photos)?,
-        format => (format, "as asked for".to_owned()),
+        format => (format, "as requested".to_owned()),
     };
     let (claims, ids) = match format {
         Format::DevaLong => (layouts.flat, Some(Kind::Rgb)),
@@ -117,10 +117,17 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     let claims = if format == Format::Binary { claims.into_one_object() } else { claims };
     let Some(kind) = ids else {
         let notes = if format == Format::ThreeDOvs { classes_without_mask(&root, &claims)? } else { Vec::new() };
-        return of_marks(root, photos, Found { notes, ..of_claims(claims) }, format, why, options);
+        return reading_from_marks(
+            root,
+            photos,
+            FoundMarks { notes, ..marks_from_claims(claims) },
+            format,
+            why,
+            options,
+        );
     };
     if options.object_per != ObjectPer::Auto {
-        let problem = "belongs to masks of one object each, and these are id pictures; leave it out";
+        let problem = "belongs to masks of single objects, but these are id images; omit it";
         return Err(Error::usage(Setting("object_per"), problem));
     }
     let of_photo = claims.of_photo.into_iter().map(|files| files.into_iter().next().map(|(_, file)| file)).collect();
@@ -128,8 +135,8 @@ fn folders(photos: &[&str], options: &ImportOptions) -> Result<Reading> {
     Ok(Reading { format, root, content, strays: claims.strays, overlap: Overlap::Error, why, notes: Vec::new() })
 }
 
-/// Gives black and white pictures the names of their objects.
-fn of_claims(claims: Claims) -> Found {
+/// Uses the names of black and white images as object names.
+fn marks_from_claims(claims: Claims) -> FoundMarks {
     let names = claims.objects();
     let rank = |object: &String| names.iter().position(|name| name == object);
     let marks = |mut files: Vec<(String, String)>| {
@@ -137,19 +144,19 @@ fn of_claims(claims: Claims) -> Found {
         files.into_iter().map(|(object, file)| Mark::new(Some(object), Shape::Png(file))).collect()
     };
     let of_photo = claims.of_photo.into_iter().map(marks).collect();
-    Found { of_photo, names, strays: claims.strays, notes: Vec::new() }
+    FoundMarks { of_photo, names, strays: claims.strays, notes: Vec::new() }
 }
 
-fn of_marks(
+fn reading_from_marks(
     root: PathBuf,
     photos: &[&str],
-    mut found: Found,
+    mut found: FoundMarks,
     format: Format,
     why: String,
     options: &ImportOptions,
 ) -> Result<Reading> {
     if options.pred.is_some() {
-        let problem = "belongs to id pictures, and here are masks of one object each; leave it out";
+        let problem = "belongs to id images, but these are masks of single objects; omit it";
         return Err(Error::usage(Setting("pred"), problem));
     }
     let numbering = number(&root, photos, &mut found, options.object_per)?;
@@ -167,11 +174,11 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
         (true, false, false) => flat_format(root, flat, pred),
         (false, true, false) => {
             let count = by_object.objects().len();
-            Ok((Format::BinaryFolders, format!("{count} folders hold a black and white picture per photo")))
+            Ok((Format::BinaryFolders, format!("{count} folders hold a black and white image per photo")))
         }
         (false, false, true) => {
             let named = |name: &str| root.file_name().is_some_and(|found| found == name);
-            let why = format!("{} folders named after photos hold black and white pictures", by_photo.photos());
+            let why = format!("{} folders named after photos hold black and white images", by_photo.photos());
             Ok(if root.join("classes.txt").is_file() {
                 (Format::ThreeDOvs, format!("{why}, and there is a classes.txt"))
             } else if named("test_mask") {
@@ -183,9 +190,9 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
         (false, false, false) => Err(match object_grey.or(photo_grey).flatten() {
             Some(file) => {
                 let problem = format!(
-                    "pictures in folders must be black and white to be recognised, with one value besides 0, and \
+                    "images in folders must be black and white to be recognised, with one value besides 0, but \
                      {file} is not. If it has soft edges, set {}: values in the upper half are then the object. Id \
-                     pictures belong into one folder, named like the photos",
+                     images belong in one folder, named like the photos",
                     nested_formats()
                 );
                 Error::data(root, "", problem)
@@ -212,18 +219,18 @@ fn recognise(root: &Path, layouts: &Layouts, pred: Option<&Pred>, photos: &[&str
     }
 }
 
-/// Returns the first image that is not black and white, if there is one. Unreadable images count too.
+/// Returns the first image that is not black and white or cannot be read.
 fn first_grey(root: &Path, claims: &Claims) -> Option<String> {
     let files: Vec<&str> = claims.files().collect();
     let grey = files.par_iter().find_first(|file| !read_binary(&root.join(file), |_| Ok(())).is_ok_and(|b| b.sharp));
     grey.map(|file| (*file).to_owned())
 }
 
-/// Returns the files of each kind. Pictures of colours are grey if all of them are: a single one may be black.
+/// Returns the files of each kind. Colour images are grey if all of them are: a single one may be black.
 fn kinds<'a>(root: &Path, claims: &'a Claims) -> Result<BTreeMap<Kind, Vec<&'a str>>> {
     let mut kinds: BTreeMap<Kind, Vec<&str>> = BTreeMap::new();
     for file in claims.files() {
-        kinds.entry(Kind::of(&read_header(&root.join(file))?)).or_default().push(file);
+        kinds.entry(Kind::from_header(&read_header(&root.join(file))?)).or_default().push(file);
     }
     let colours = kinds.iter().filter(|(kind, _)| kind.as_grey() != **kind);
     let colours: Vec<&str> = colours.flat_map(|(_, files)| files.iter().copied()).collect();
@@ -244,14 +251,14 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
     if kinds.len() > 1 {
         let counts = kinds.iter().map(|(kind, files)| format!("{} {} ({})", files.len(), kind.text(), files[0]));
         let problem = format!(
-            "holds pictures of different kinds, {}; ids of different kinds cannot be matched. Keep the \
+            "holds images of different kinds, {}; ids of different kinds cannot be matched. Keep the \
              pictures of one kind",
             counts.collect::<Vec<_>>().join(", ")
         );
         return Err(Error::data(root, "", problem));
     }
     let Some((kind, files)) = kinds.into_iter().next() else { return Err(Error::Bug("no mask has a kind".into())) };
-    let mut why = format!("{} pictures named after photos, all {}", files.len(), kind.text());
+    let mut why = format!("{} images named after photos, all {}", files.len(), kind.text());
     if let Some(pred) = pred {
         why += &format!(", with ids of {}", pred.path.display());
     }
@@ -266,16 +273,16 @@ fn flat_format(root: &Path, claims: &Claims, pred: Option<&Pred>) -> Result<(For
         Kind::Rgb if pred.is_some() => Format::DevaLong,
         Kind::Rgb => {
             let problem = format!(
-                "holds RGB pictures and no pred.json, so they may be ids as of DEVA or colours for looking at. Set {} if \
-                 R + 256 G + 65536 B is the id, or {} to the pred.json of the run; colours for looking at cannot be read, \
-                 import the id pictures that they were made from",
+                "holds RGB images and no pred.json, so they may be DEVA ids or display colours. Set {} if \
+                 R + 256 G + 65536 B is the id, or {} to the pred.json of the run; display colours cannot be read, \
+                 so import the id images that they were made from",
                 Setting("format").to("deva-long"),
                 Setting("pred")
             );
             return Err(Error::data(root, "", problem));
         }
         Kind::Rgb16 => {
-            let problem = format!("{} is {}, which holds no ids; import the id pictures", files[0], kind.text());
+            let problem = format!("{} is {}, which cannot hold ids; import the id images", files[0], kind.text());
             return Err(Error::data(root, "", problem));
         }
     };
@@ -291,7 +298,7 @@ fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
         files => format!("it holds {}", shortened(files)),
     };
     let problem = format!(
-        "no picture belongs to a photo of the scene: expected for example {name}.png, OBJECT/{name}.png or \
+        "no image belongs to a photo of the scene: expected for example {name}.png, OBJECT/{name}.png or \
          {name}/OBJECT.png, and {there}. Masks have the names of the photos and are PNG, because JPEG changes ids"
     );
     Error::data(root, "", problem)
@@ -301,7 +308,7 @@ fn nothing_found(root: &Path, files: &[String], photos: &[&str]) -> Error {
 fn classes_without_mask(root: &Path, claims: &Claims) -> Result<Vec<String>> {
     let path = root.join("classes.txt");
     if !path.is_file() {
-        return Ok(vec![format!("{} is not there", path.display())]);
+        return Ok(vec![format!("{} is missing", path.display())]);
     }
     let text = read::text(&path)?;
     let objects = claims.objects();

@@ -1,13 +1,13 @@
-//! Which of nested things are objects: masks of a photo, or groups of masks of many photos.
+//! Chooses objects among nested candidates: masks of a photo, or groups of masks across photos.
 
 use std::collections::BTreeSet;
 
-/// Share of a thing inside of a larger one above which it is a part of it.
+/// A candidate is a part of a larger one if at least this share of it is inside.
 const INSIDE_SHARE_MIN: f64 = 0.85;
-/// Least ratio of the areas of a whole and its part.
+/// Smallest area ratio of a whole to its part.
 const LARGER_RATIO_MIN: f64 = 1.15;
 
-/// Returns the parts of each thing, by the areas of all and what pairs of them share.
+/// Returns the parts of each candidate, given all areas and the areas that pairs share.
 pub fn parts_of(areas: &[f64], shared: impl Iterator<Item = ((usize, usize), f64)>) -> Vec<Vec<usize>> {
     let mut parts = vec![Vec::new(); areas.len()];
     for ((a, b), both) in shared {
@@ -21,9 +21,9 @@ pub fn parts_of(areas: &[f64], shared: impl Iterator<Item = ((usize, usize), f64
     parts
 }
 
-/// Chooses objects from the parts up: a whole stands if its area times its quality is at least what the best choice inside of it
-/// explains, a sum of the best quality everywhere, which `explained` returns of a choice. No size is asked for: a sheet with
-/// everything on it falls, because the things on it are surer than it is.
+/// Chooses objects from the parts upwards. A whole is chosen if its area times its quality is at least what the best
+/// choice among its parts explains; `explained` returns that for a choice, summing the best quality everywhere. There
+/// is no limit on size: a sheet with everything on it is rejected, because the things on it have higher quality.
 pub fn objects(
     areas: &[f64],
     qualities: &[f64],

@@ -1,4 +1,4 @@
-//! The files in a folder of masks, and the photo of each.
+//! Assigns the files in a mask folder to photos.
 
 use super::Format;
 use super::mask_folder::png_key;
@@ -9,20 +9,20 @@ use labelgs_scene::{Error, Result, Setting};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Folders in which data sets and trackers keep masks, with their formats.
-const KNOWN: [(&str, &[Format]); 4] = [
+/// Subfolders in which data sets and trackers keep masks, with their formats.
+const KNOWN_SUBFOLDERS: [(&str, &[Format]); 4] = [
     ("Annotations", &[Format::DevaLong, Format::DevaShort, Format::Palette]),
     ("object_mask", &[Format::ObjectMask]),
     ("test_mask", &[Format::LerfMask]),
     ("segmentations", &[Format::ThreeDOvs]),
 ];
 
-/// Returns the folder of the masks: `folder`, or a known subfolder.
+/// Returns the folder with the masks: `folder` or a known subfolder.
 pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
     if !folder.is_dir() {
-        return Err(Error::data(folder, "", "there is no such folder of masks"));
+        return Err(Error::data(folder, "", "there is no such mask folder"));
     }
-    let inside = KNOWN.iter().filter(|(name, _)| folder.join(name).is_dir());
+    let inside = KNOWN_SUBFOLDERS.iter().filter(|(name, _)| folder.join(name).is_dir());
     if format != Format::Auto {
         let fitting = inside.into_iter().find(|(_, formats)| formats.contains(&format));
         return Ok(fitting.map_or(folder.to_owned(), |(name, _)| folder.join(name)));
@@ -39,7 +39,7 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
             let names: Vec<&str> = several.iter().map(|(name, _)| *name).collect();
             let formats: Vec<String> = several.iter().map(|(_, format)| Setting("format").to(format.name())).collect();
             let problem = format!(
-                "holds more than one kind of masks ({}); name one of these folders, or set {}",
+                "holds masks in more than one format ({}); name one of these folders, or set {}",
                 names.join(", "),
                 formats.join(" or ")
             );
@@ -51,7 +51,7 @@ pub(super) fn root(folder: &Path, format: Format) -> Result<PathBuf> {
 /// The files of each photo in one layout.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Claims {
-    /// For each photo, its files and their objects; the object is empty if the file shows all.
+    /// For each photo, its files and their objects. The object is empty if the file shows all objects.
     pub(super) of_photo: Vec<Vec<(String, String)>>,
     /// PNG files without a photo.
     pub(super) strays: Vec<String>,
@@ -66,13 +66,13 @@ impl Claims {
         self.of_photo.iter().flatten().map(|(_, file)| file.as_str())
     }
 
-    /// Gives the object of files that show all a name.
+    /// Uses a name for the object of files that show all objects.
     pub(super) fn into_one_object(mut self) -> Self {
         self.of_photo.iter_mut().flatten().for_each(|(object, _)| *object = "object".to_owned());
         self
     }
 
-    /// Returns the names of the objects: in numeric order if all are numbers, else in alphabetical order.
+    /// Returns the names of the objects, in numeric order if all are numbers, otherwise in alphabetical order.
     pub(super) fn objects(&self) -> Vec<String> {
         let names: BTreeSet<&String> = self.of_photo.iter().flatten().map(|(object, _)| object).collect();
         let mut names: Vec<String> = names.into_iter().cloned().collect();

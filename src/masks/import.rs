@@ -1,9 +1,9 @@
 //! Imports masks of any known format.
 //!
-//! It reads and checks everything before it writes the first file.
+//! Reads and checks everything before writing the first file.
 
 use super::check::no_object;
-use super::decode::{Decoded, Shared, decode};
+use super::decode::{DecodedMask, SharedPixels, decode};
 use super::detect::{Content, Reading, detect};
 use super::soft_edges::{self, Edges};
 use super::{Format, ImportOptions, ObjectPer, Overlap, names, shortened};
@@ -18,21 +18,21 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Pixels that several black and white masks share.
+/// Pixels shared by several black and white masks.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Overlaps {
-    /// Rule that decided them.
+    /// Rule that resolves them.
     pub rule: Overlap,
     /// Number over all photos.
     pub pixels: u64,
-    /// Number of photos with such pixels.
+    /// Number of photos with shared pixels.
     pub photos: usize,
 }
 
-/// What makes two masks of one object each one object.
+/// How masks are grouped into objects.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Objects {
-    /// The rule; not `Auto`. With [`ObjectPer::Mask`] the ids of each photo are its own.
+    /// The rule; not `Auto`. With [`ObjectPer::Mask`], each photo has separate ids.
     pub per: ObjectPer,
     /// Reason for it.
     pub why: String,
@@ -40,16 +40,16 @@ pub struct Objects {
 
 /// The result of an import.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Imported {
+pub struct ImportSummary {
     /// Format of the source.
     pub format: Format,
     /// Reason for the format.
     pub why: String,
-    /// Folder or file of the source masks, possibly below the given one.
+    /// Folder or file of the source masks, possibly inside the given folder.
     pub source: PathBuf,
     /// Path of the `pred.json`, if one was used.
     pub pred: Option<PathBuf>,
-    /// How masks became objects; `None` for id pictures.
+    /// How masks were grouped into objects; `None` for id images.
     pub objects: Option<Objects>,
     /// Number of photos in the scene.
     pub photos: usize,
@@ -59,7 +59,7 @@ pub struct Imported {
     pub bits: u8,
     /// The labels, as in `labels.json`.
     pub labels: Vec<LabelEntry>,
-    /// Pixels that several black and white masks share.
+    /// Pixels shared by several black and white masks.
     pub overlaps: Overlaps,
     /// Photos without a mask.
     pub photos_without_mask: Vec<String>,
@@ -69,18 +69,18 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// The part of a mask that is kept between the two passes.
+/// What is kept of a mask between the two passes.
 struct Survey {
     pixels: BTreeMap<u32, u64>,
-    shared: Shared,
+    shared: SharedPixels,
     shared_pixels: u64,
     cut: usize,
-    /// Those of id pictures.
+    /// Areas in an id image.
     edges: Edges,
 }
 
 /// Imports the masks of the photos of `dataset` into the folder `output`, which must be new or empty.
-pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<Imported> {
+pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Result<ImportSummary> {
     atomic::require_empty("output", output)?;
     let views = dataset.all();
     let names = names(&views);
@@ -106,7 +106,7 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     let files = output_names(&names);
     let write = |&photo: &usize| {
         let decoded = decode(photo)?;
-        // The first pass found every id; other pixels become 0.
+        // The first pass found every id; any other pixel becomes 0.
         let ids = decoded.ids.iter().map(|id| new_ids.get(id).copied().unwrap_or(0));
         let (path, (width, height)) = (output.join(&files[photo]), decoded.size);
         match bits {
@@ -127,7 +127,7 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
         Content::Marks { numbering, .. } => Some(Objects { per: numbering.per, why: numbering.why.clone() }),
     };
     let pred = reading.pred().map(|pred| pred.path.clone());
-    Ok(Imported {
+    Ok(ImportSummary {
         photos_without_mask: without.map(|at| names[at].to_owned()).collect(),
         format: reading.format,
         why: reading.why,
@@ -144,7 +144,7 @@ pub fn import(dataset: &Dataset, options: &ImportOptions, output: &Path) -> Resu
     })
 }
 
-fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
+fn survey(reading: &Reading, decoded: DecodedMask) -> Result<Survey> {
     let mut pixels = BTreeMap::new();
     // Count whole runs, because neighbours mostly have the same id.
     for run in decoded.ids.chunk_by(|a, b| a == b).filter(|run| run[0] != 0) {
@@ -153,9 +153,9 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
     if pixels.len() > LABEL_MAX as usize {
         return Err(too_many(&reading.root, pixels.len()));
     }
-    let Decoded { size: (width, height), ids, shared, shared_pixels, cut } = decoded;
+    let DecodedMask { size: (width, height), ids, shared, shared_pixels, cut } = decoded;
     let edges = match reading.content {
-        Content::Ids { .. } => Edges::of(&ids, width, height),
+        Content::Ids { .. } => Edges::measure(&ids, width, height),
         Content::Marks { .. } => Edges::default(),
     };
     Ok(Survey { pixels, shared, shared_pixels, cut, edges })
@@ -163,7 +163,7 @@ fn survey(reading: &Reading, decoded: Decoded) -> Result<Survey> {
 
 fn too_many(root: &Path, count: usize) -> Error {
     let problem = format!(
-        "{count} different ids, and a label is at most {LABEL_MAX}; if these are colours and not ids, \
+        "{count} different ids, but a label is at most {LABEL_MAX}; if these are colours and not ids, \
          import the id pictures, otherwise remove small tracks first"
     );
     Error::data(root, "", problem)
@@ -196,11 +196,11 @@ fn overlaps<'a>(reading: &Reading, surveys: &[Survey], name: impl Fn(usize) -> &
     Ok(Overlaps { rule, pixels, photos })
 }
 
-/// Returns the entries of the new labels, and a map from source ids to new ids.
+/// Returns the new labels, and a map from source ids to label ids.
 fn labels(reading: &Reading, surveys: &[Survey]) -> Result<(Vec<LabelEntry>, HashMap<u32, u16>)> {
     let mut found: BTreeMap<u32, (u64, u32)> = BTreeMap::new();
     if let Some(objects) = reading.objects() {
-        // An object without pixels keeps its id, so that ids depend on names only.
+        // An object without pixels keeps its id, so that ids depend only on names.
         found.extend((1..=objects.len() as u32).map(|id| (id, (0, 0))));
     }
     for (id, pixels) in surveys.iter().flat_map(|survey| &survey.pixels) {
@@ -234,8 +234,8 @@ fn labels(reading: &Reading, surveys: &[Survey]) -> Result<(Vec<LabelEntry>, Has
     Ok((entries, new_ids))
 }
 
-/// Returns the names of the masks: the photo's name with `.png` in place of the extension, or appended if two photos
-/// differ only in the extension.
+/// Returns the names of the masks: the photo's name with `.png` instead of its extension, or appended if two photos
+/// differ only in their extensions.
 fn output_names(photos: &[&str]) -> Vec<String> {
     let bare = |name: &str| Path::new(name).with_extension("").to_string_lossy().into_owned();
     let mut count: HashMap<String, usize> = HashMap::new();

@@ -1,6 +1,6 @@
-//! Checks a folder of masks against its scene.
+//! Checks a mask folder against its scene.
 
-use super::check::{Finding, Look, Problem, findings, held_out};
+use super::check::{Finding, MaskStats, Problem, findings, held_out};
 use super::mask::{read_header, read_mask};
 use super::mask_folder::masks_of_photos;
 use super::names;
@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The content of a folder of masks, and its problems.
+/// The content of a mask folder, and its problems.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Report {
     /// Number of photos in the scene.
@@ -33,11 +33,11 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     let views = dataset.all();
     let masks = masks_of_photos(folder, &names(&views))?;
     let paths: Vec<Option<&Path>> = views.iter().map(|view| masks.find(&view.name)).collect();
-    // A look remembers what is at each point.
+    // A look stores the id at each scene point.
     let points = dataset.points.iter().step_by(every(dataset.points.len(), views.len()));
     let points: Vec<Point> = points.copied().collect();
     let stage = Stage::new("checking masks", views.len());
-    let looks: Vec<Result<Look, Finding>> =
+    let looks: Vec<Result<MaskStats, Finding>> =
         views.par_iter().zip(&paths).map(|(view, path)| stage.counted(|| look(&points, view, *path))).collect();
     drop(stage);
 
@@ -57,7 +57,7 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     Ok(Report { photos: views.len(), masks: usable.len(), ids: ids.into_iter().collect(), findings: found })
 }
 
-fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Finding> {
+fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<MaskStats, Finding> {
     let finding = |problem, text: String| Finding { view: Some(view.name.clone()), ..Finding::of_scene(problem, text) };
     let Some(path) = path else { return Err(finding(Problem::Missing, "has no mask".into())) };
     let unreadable = |error: Error| finding(Problem::Unreadable, error.to_string());
@@ -66,13 +66,13 @@ fn look(points: &[Point], view: &View, path: Option<&Path>) -> Result<Look, Find
         return Err(finding(Problem::Missized, text));
     }
     let map = read_mask(path).map_err(unreadable)?;
-    Ok(Look::new(&map, &view.camera, points))
+    Ok(MaskStats::new(&map, &view.camera, points))
 }
 
 fn misnamed(folder: &Path, used: &[Option<&Path>]) -> Result<Vec<Finding>> {
     let used: BTreeSet<&Path> = used.iter().copied().flatten().collect();
     let unused =
         below(folder)?.into_iter().filter(|file| file != FILE_NAME && !used.contains(folder.join(file).as_path()));
-    let finding = |file| Finding::of_scene(Problem::Misnamed, format!("{file} belongs to no photo"));
+    let finding = |file| Finding::of_scene(Problem::Misnamed, format!("{file} does not belong to any photo"));
     Ok(unused.map(finding).collect())
 }

@@ -1,7 +1,7 @@
-//! Folders of masks: [`import`] converts the formats of trackers, segmenters, annotation tools and data sets, [`inspect`]
+//! Mask folders: [`import`] converts the formats of trackers, segmenters, annotation tools and data sets; [`inspect`]
 //! checks a folder.
 //!
-//! Our own format is one grey PNG per photo with the photo's name, whose pixel value is the id, and a `labels.json`
+//! The format of labelgs is a grey PNG per photo, with the photo's name and ids as pixel values, and a `labels.json`
 //! ([`LabelTable`](labelgs_files::LabelTable)).
 
 pub mod check;
@@ -27,7 +27,7 @@ mod spans;
 pub mod tools;
 
 pub use check::{Finding, Problem};
-pub use import::{Imported, Objects, Overlaps, import};
+pub use import::{ImportSummary, Objects, Overlaps, import};
 pub use inspect::{Report, inspect};
 pub use mask::read_mask;
 
@@ -41,12 +41,12 @@ fn names<'a>(views: &[&'a View]) -> Vec<&'a str> {
     views.iter().map(|view| view.name.as_str()).collect()
 }
 
-/// The format of a folder of masks.
+/// The format of a mask folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// The format that fits, if only one does.
+    /// Detect the format. An ambiguous folder is an error.
     #[default]
     Auto,
     /// DEVA with --use_short_id: 8-bit grey, the value is the id.
@@ -57,7 +57,7 @@ pub enum Format {
     Palette,
     /// 16-bit grey, the value is the id.
     Grey16,
-    /// A black and white image per photo, of one object: NAME.png.
+    /// A black and white image per photo, for a single object: NAME.png.
     Binary,
     /// A folder per object with a black and white image per photo: OBJECT/NAME.png.
     BinaryFolders,
@@ -71,7 +71,7 @@ pub enum Format {
     #[serde(rename = "3d-ovs")]
     #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
-    /// JSON with instances as in COCO, also as CVAT and Label Studio export it.
+    /// COCO instances as JSON, also as exported by CVAT and Label Studio.
     Coco,
     /// Folders of Segment Anything's amg.py: NAME/0.png and NAME/metadata.csv.
     SamFolders,
@@ -86,49 +86,50 @@ impl Format {
     }
 }
 
-/// The rule for pixels that two masks of a photo share. Crowds of COCO yield to all others.
+/// How to resolve pixels that two masks of a photo share. COCO crowds yield to all others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
-    /// That of the format: smaller for Segment Anything, later for COCO, else error.
+    /// The format's rule: `Smaller` for Segment Anything, `Later` for COCO, otherwise `Error`.
     #[default]
     Auto,
-    /// The import fails and reports their number.
+    /// The import fails and reports the number of shared pixels.
     Error,
-    /// The mask with fewer pixels in this photo wins; between equals, the later one.
+    /// The mask with fewer pixels in this photo wins, or the later one if they are equal.
     Smaller,
-    /// The later mask of the file wins; of black and white pictures, that with the larger id.
+    /// The later mask of the file wins; among black and white images, the one with the larger id.
     Later,
 }
 
-/// What makes two masks of one object each one object.
+/// How masks of single objects are grouped into objects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectPer {
-    /// Track, if every mask has one; else name, if every mask has one and no photo has two of one name; else mask.
+    /// By track if every mask has one; by name if every mask has one and no photo repeats a name; otherwise each mask
+    /// is an object.
     #[default]
     Auto,
-    /// Masks with one track are one object in all photos.
+    /// Masks with the same track are one object in all photos.
     Track,
-    /// Masks with one name are one object in all photos.
+    /// Masks with the same name are one object in all photos.
     Name,
-    /// Each mask is an object of its own, and the ids of each photo are its own.
+    /// Each mask is a separate object, and each photo has separate ids.
     Mask,
 }
 
 /// The options of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// Folder with the masks, or a JSON of COCO.
+    /// Folder with the masks, or a COCO JSON file.
     pub folder: PathBuf,
     /// Format of the folder.
     pub format: Format,
-    /// The `pred.json` of DEVA; `None` looks for one beside the masks.
+    /// DEVA's `pred.json`; `None` looks for one beside the masks.
     pub pred: Option<PathBuf>,
     /// Rule for shared pixels.
     pub overlap: Overlap,
-    /// Rule for objects, where masks show one object each.
+    /// Rule for objects, if masks show single objects.
     pub object_per: ObjectPer,
 }

@@ -1,4 +1,4 @@
-//! Masks of one object in one photo each, of any tool, and the ids that they get.
+//! Masks of single objects in single photos, from any tool, and the ids assigned to them.
 
 use super::polygon::Polygons;
 use super::rle::Rle;
@@ -22,12 +22,12 @@ pub(super) enum Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Mark {
     pub(super) name: Option<String>,
-    /// What the tool calls the object in all photos.
+    /// The tool's name of the object in all photos.
     pub(super) track: Option<String>,
-    /// It covers several objects and yields to all other masks.
+    /// The mask covers several objects and yields to all other masks.
     pub(super) is_crowd: bool,
     pub(super) shape: Shape,
-    /// Id among all objects, from 1; [`number`] sets it.
+    /// Id among all objects, from 1; set by [`number`].
     pub(super) id: u32,
 }
 
@@ -37,36 +37,36 @@ impl Mark {
     }
 }
 
-/// What a reader found.
+/// The masks that a reader found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Found {
-    /// For each photo, its masks in the order of the source.
+pub(super) struct FoundMarks {
+    /// The masks of each photo in the order of the source.
     pub(super) of_photo: Vec<Vec<Mark>>,
-    /// Names in the order of their ids; others follow by alphabet.
+    /// Names in the order of their ids; others follow alphabetically.
     pub(super) names: Vec<String>,
-    /// What belongs to no photo.
+    /// Files and images that do not belong to any photo.
     pub(super) strays: Vec<String>,
     pub(super) notes: Vec<String>,
 }
 
-/// An object: its display name, and what the source calls it.
+/// An object: its display name, and its name in the source.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Object {
     pub(super) name: Option<String>,
     pub(super) source: Option<String>,
 }
 
-/// The objects of all photos, by id from 1, and what made them.
+/// The objects of all photos, by id from 1, and the rule that formed them.
 #[derive(Clone, Debug)]
 pub(super) struct Numbering {
     pub(super) objects: Vec<Object>,
     pub(super) per: ObjectPer,
-    /// Reason for it.
+    /// Reason for the rule.
     pub(super) why: String,
 }
 
-/// Gives every mask the id of its object. `source` is the file or folder, for messages.
-pub(super) fn number(source: &Path, photos: &[&str], found: &mut Found, asked: ObjectPer) -> Result<Numbering> {
+/// Assigns each mask the id of its object. `source` is the file or folder, for messages.
+pub(super) fn number(source: &Path, photos: &[&str], found: &mut FoundMarks, asked: ObjectPer) -> Result<Numbering> {
     let (per, why) = rule(source, photos, found, asked)?;
     let own: BTreeSet<&str> = found.of_photo.iter().flatten().filter_map(|mark| mark.name.as_deref()).collect();
     let known: BTreeSet<&str> = found.names.iter().map(String::as_str).collect();
@@ -77,7 +77,7 @@ pub(super) fn number(source: &Path, photos: &[&str], found: &mut Found, asked: O
     tracks.dedup();
     let rank = |all: &[String]| all.iter().cloned().zip(0..).collect::<BTreeMap<String, usize>>();
     let (name_ranks, track_ranks) = (rank(&names), rank(&tracks));
-    // Masks without a name come last. The second number tells objects of one name apart.
+    // Masks without a name come last. The second number distinguishes objects with the same name.
     let mut keys: Vec<Vec<(usize, usize)>> = Vec::with_capacity(found.of_photo.len());
     for marks in &found.of_photo {
         let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
@@ -110,8 +110,8 @@ pub(super) fn number(source: &Path, photos: &[&str], found: &mut Found, asked: O
     Ok(Numbering { objects: all.iter().map(object).collect(), per, why })
 }
 
-/// Decides what makes two masks one object.
-fn rule(source: &Path, photos: &[&str], found: &Found, asked: ObjectPer) -> Result<(ObjectPer, String)> {
+/// Decides how masks are grouped into objects.
+fn rule(source: &Path, photos: &[&str], found: &FoundMarks, asked: ObjectPer) -> Result<(ObjectPer, String)> {
     let all = || found.of_photo.iter().flatten();
     let (nameless, trackless) =
         (all().filter(|mark| mark.name.is_none()).count(), all().filter(|mark| mark.track.is_none()).count());
@@ -134,19 +134,19 @@ fn rule(source: &Path, photos: &[&str], found: &Found, asked: ObjectPer) -> Resu
         }
         ObjectPer::Auto => Ok(match twice {
             Some(twice) => (ObjectPer::Mask, twice),
-            None => (ObjectPer::Name, "no photo has two masks of one name".to_owned()),
+            None => (ObjectPer::Name, "no photo has two masks with the same name".to_owned()),
         }),
-        asked => Ok((asked, "as asked for".to_owned())),
+        asked => Ok((asked, "as requested".to_owned())),
     }
 }
 
-/// Refuses a source of which nothing belongs to a photo; `named` are the photos that it names.
-pub(super) fn require_photo(source: &Path, photos: &[&str], found: &Found, named: &[String]) -> Result<()> {
+/// Refuses a source without masks for any photo; `named` lists the photos that it names.
+pub(super) fn require_photo(source: &Path, photos: &[&str], found: &FoundMarks, named: &[String]) -> Result<()> {
     if found.of_photo.iter().any(|marks| !marks.is_empty()) {
         return Ok(());
     }
     let problem = format!(
-        "no mask belongs to a photo of the scene: the scene has {}, and the masks are of {}. Use the names of the \
+        "no mask belongs to a photo of the scene: the scene has {}, but the masks are for {}. Use the names of the \
          scene's photos, or import with the scene of these masks",
         shortened(photos),
         if named.is_empty() { "no photo".to_owned() } else { shortened(named) }
@@ -154,7 +154,7 @@ pub(super) fn require_photo(source: &Path, photos: &[&str], found: &Found, named
     Err(Error::data(source, "", problem))
 }
 
-/// Fails with what is wrong if no scale makes a mask of the photo's size. `what` has that size.
+/// Fails with a description if no scale brings a mask to the photo's size. `what` has the given size.
 pub(super) fn require_aspect(what: &str, size: (u32, u32), view: &View) -> Result<(), String> {
     let problem = aspect_problem((what, size), (&format!("its photo {}", view.name), view.camera.size()));
     problem.map_or(Ok(()), |problem| Err(problem + "; use masks of the same photos"))

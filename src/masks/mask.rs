@@ -1,8 +1,8 @@
 //! Id masks: the object at each pixel of a photo.
 //!
-//! The pixel value is the id, and 0 is unlabelled. The file is a grey PNG of any depth, also one that is stored as colour,
-//! or a palette PNG, whose *index* is the id. Colours never become ids: two palette entries may share a colour, and a
-//! colour code needs its legend.
+//! The pixel value is the id; 0 is unlabelled. The file is a grey PNG of any depth, even if stored as colour, or a
+//! palette PNG whose *index* is the id. Colours never become ids: two palette entries may share a colour, and a colour
+//! code needs its legend.
 
 use labelgs_files::image::{check_png_length, check_size};
 use labelgs_files::read;
@@ -11,8 +11,8 @@ use png::DecodingError;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 
-/// How a JPEG begins.
-const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
+/// First bytes of a JPEG.
+const JPEG_START: &[u8] = &[0xff, 0xd8, 0xff];
 
 type Reader = png::Reader<BufReader<read::Source>>;
 
@@ -25,7 +25,7 @@ fn unreadable(path: &Path, error: DecodingError) -> Error {
 }
 
 fn problem(path: &Path, problem: impl std::fmt::Display) -> Error {
-    Error::data(path, "", format!("is no readable PNG: {problem}; write the file again"))
+    Error::data(path, "", format!("is not a readable PNG: {problem}; write the file again"))
 }
 
 /// The header of a PNG.
@@ -40,14 +40,14 @@ pub struct Header {
 }
 
 /// A PNG with its samples as stored.
-pub struct Raw {
+pub struct RawPng {
     /// Size, channels and bits.
     pub header: Header,
     bytes: Vec<u8>,
     line_size: usize,
 }
 
-impl Raw {
+impl RawPng {
     /// Returns all samples, row-major, channels interleaved.
     pub fn samples(&self) -> Vec<u16> {
         let Header { size, colour, depth } = self.header;
@@ -56,8 +56,8 @@ impl Raw {
         lines.flat_map(|line| unpack(line, depth, per_line)).collect()
     }
 
-    /// Returns all samples without opacity, and the number of channels. Pixels that are not black must be opaque: they may
-    /// or may not belong to the object.
+    /// Returns all samples without opacity, and the number of channels. Errors if a coloured pixel is transparent,
+    /// because it is unclear whether such a pixel belongs to the object.
     pub fn opaque(&self, path: &Path) -> Result<(Vec<u16>, usize)> {
         let (mut samples, channels) = (self.samples(), self.header.colour.samples());
         if channels % 2 == 1 {
@@ -74,7 +74,7 @@ impl Raw {
         let is_hidden = pixels().all(|(colour, _)| is_black(colour))
             && pixels().any(|(_, alpha)| alpha[0] != samples[channels - 1]);
         if is_hidden {
-            let problem = "is black everywhere and only its opacity differs; write the opacity as a grey picture";
+            let problem = "is black everywhere and only its opacity differs; save the opacity as a grey image";
             return Err(Error::data(path, "", problem));
         }
         let mut at = 0;
@@ -85,7 +85,7 @@ impl Raw {
         Ok((samples, channels - 1))
     }
 
-    /// Returns the one value of each pixel: grey, palette index, or colours that are equal. `None` for other colours.
+    /// Returns a single value per pixel: grey, palette index, or equal colour channels. `None` for other colours.
     pub fn values(&self, path: &Path) -> Result<Option<Vec<u16>>> {
         let (samples, channels) = self.opaque(path)?;
         if channels == 1 {
@@ -99,7 +99,7 @@ impl Raw {
 
 fn open(path: &Path) -> Result<(Reader, Header)> {
     let mut file = read::open(path)?;
-    if file.fill_buf().map_err(Error::read(path))?.starts_with(JPEG) {
+    if file.fill_buf().map_err(Error::read(path))?.starts_with(JPEG_START) {
         let problem = "is a JPEG, whose compression changes ids; make the masks again as PNG";
         return Err(Error::data(path, "", problem));
     }
@@ -120,17 +120,17 @@ pub fn read_header(path: &Path) -> Result<Header> {
 }
 
 /// Reads a PNG of any kind. `accept` checks the header before decoding.
-pub fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<Raw> {
+pub fn read_raw(path: &Path, accept: impl FnOnce(&Header) -> Result<()>) -> Result<RawPng> {
     let (mut reader, header) = open(path)?;
     accept(&header)?;
     let length = reader.output_buffer_size().ok_or_else(|| problem(path, "too large"))?;
     let mut bytes = vec![0; length];
     let frame = reader.next_frame(&mut bytes).map_err(|error| unreadable(path, error))?;
-    Ok(Raw { header, bytes, line_size: frame.line_size })
+    Ok(RawPng { header, bytes, line_size: frame.line_size })
 }
 
-/// Reads an id image: grey of 8 or 16 bits, palette indices, either with 1, 2 or 4 bits, or colours with the same value in
-/// all channels. Opacity must say nothing.
+/// Reads an id image: 8 or 16-bit grey, palette indices, either with 1, 2 or 4 bits, or colours with equal channels.
+/// Opacity must carry no information.
 pub fn read_mask(path: impl AsRef<Path>) -> Result<LabelMap> {
     read_checked(path.as_ref(), |_| Ok(()))
 }
@@ -140,8 +140,8 @@ pub fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) 
     let raw = read_raw(path, |header| accept(header.size))?;
     let Some(ids) = raw.values(path)? else {
         let text = format!(
-            "a mask holds one id per pixel as grey value or palette index; this PNG is {:?} with colours. Import the \
-             folder first: the import reads ids coded as R + 256 G + 65536 B; for display colours use \
+            "a mask holds one id per pixel as grey value or palette index, but this PNG is {:?} with colours. Import \
+             the folder first: the import reads ids coded as R + 256 G + 65536 B; for display colours use \
              the id image they were made from",
             raw.header.colour
         );
@@ -152,11 +152,11 @@ pub fn read_checked(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) 
 }
 
 /// Reads a picture of what to ignore, a PNG of any kind: 1 where a colour or a palette index is not 0, which black is.
-/// `accept` checks the size before decoding.
+/// Reads an ignore mask, a PNG of any kind: 1 where a colour channel or the palette index is not 0.
 pub fn read_ignored(path: &Path, accept: impl FnOnce((u32, u32)) -> Result<()>) -> Result<LabelMap> {
     let raw = read_raw(path, |header| accept(header.size))?;
     let Header { size: (width, height), colour, .. } = raw.header;
-    // Opacity, the last of two or four channels, says nothing.
+    // Opacity, the last of two or four channels, is ignored.
     let colours = colour.samples() - usize::from(colour.samples() % 2 == 0);
     let is_ignored = |pixel: &[u16]| u16::from(pixel[..colours].iter().any(|&value| value != 0));
     Ok(LabelMap { width, height, ids: raw.samples().chunks_exact(colour.samples()).map(is_ignored).collect() })

@@ -1,25 +1,25 @@
-//! Nested masks of photos: all that a segmenter found in each, with how sure it was, in the form of Segment Anything.
+//! Nested masks of photos: all masks that a segmenter found, with scores, in the format of Segment Anything.
 
 use super::mask_folder::png_key;
 use super::rle::Rle;
-use super::sam::{LIST, annotations, is_list, of_photos};
+use super::sam::{LIST_SUFFIX, annotations, is_list};
 use labelgs_files::names::below;
 use labelgs_files::{atomic, label_table};
 use labelgs_scene::{Error, LabelMap, Result};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// The masks of a photo as few id pictures: in each, masks do not overlap.
+/// The masks of a photo in few layers; within a layer, masks do not overlap.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NestedMasks {
-    /// Numbers of masks, from 1; 0 where none is. All layers have one size.
+    /// Mask numbers from 1, or 0 for none. All layers have the same size.
     pub layers: Vec<LabelMap>,
-    /// How far each mask is to be trusted ([`quality`]).
+    /// How far each mask can be trusted ([`quality`]).
     pub qualities: Vec<f64>,
 }
 
 impl NestedMasks {
-    /// Lays masks of one size, each as the pixels inside, into as few layers as the first fit finds.
+    /// Distributes masks of the same size over as few layers as first fit finds.
     fn new((width, height): (u32, u32), masks: &[Vec<bool>], qualities: Vec<f64>) -> Self {
         let mut layers: Vec<LabelMap> = Vec::new();
         for (mask, number) in masks.iter().zip(1_u16..) {
@@ -35,28 +35,28 @@ impl NestedMasks {
     }
 }
 
-/// Returns how far a mask is to be trusted, 0 to 1, from its score times its stability. The power sets good masks apart from
-/// middling ones, so that a whole stands for its parts only if it is as sure as they are.
+/// Returns how far a mask can be trusted, 0 to 1, from its score times its stability. The exponent separates good masks
+/// from mediocre ones, so that a whole replaces its parts only if it is as reliable as they are.
 pub fn quality(sure: f64) -> f64 {
     sure.clamp(0.0, 1.0).powi(4)
 }
 
-/// True if a folder has lists of masks and no pictures.
+/// Returns true if a folder contains mask lists and no images.
 pub fn has_lists(folder: &Path) -> Result<bool> {
     let files = below(folder)?;
     if files.iter().any(|file| png_key(file).is_some()) {
         return Ok(false);
     }
-    let list = files.iter().find(|file| file.ends_with(LIST) && !file.ends_with(label_table::FILE_NAME));
+    let list = files.iter().find(|file| file.ends_with(LIST_SUFFIX) && !file.ends_with(label_table::FILE_NAME));
     list.map_or(Ok(false), |file| is_list(&folder.join(file)))
 }
 
-/// Returns the file of each photo's nested masks in a folder, by names of photos; `None` if the folder has no such file.
+/// Returns the nested mask file of each photo in a folder, or `None` if the folder has none.
 pub fn files_of_photos(folder: &Path, photos: &[&str]) -> Result<Option<Vec<Option<PathBuf>>>> {
     let files = below(folder)?;
-    let found = of_photos(photos, &files, LIST);
+    let found = super::sam::files_of_photos(photos, &files, LIST_SUFFIX);
     let any = found.iter().any(Option::is_some);
-    let path = |name: String| folder.join(format!("{name}{LIST}"));
+    let path = |name: String| folder.join(format!("{name}{LIST_SUFFIX}"));
     Ok(any.then(|| found.into_iter().map(|name| name.map(path)).collect()))
 }
 
@@ -68,14 +68,14 @@ pub fn read(path: &Path) -> Result<NestedMasks> {
         let wrong = |problem: String| Error::data(path, format!("mask {at}"), problem);
         let rle = Rle::read(&annotation.segmentation).map_err(wrong)?;
         if *size.get_or_insert(rle.size) != rle.size {
-            return Err(wrong(format!("has {} x {} px, and the first mask has another size", rle.size.0, rle.size.1)));
+            return Err(wrong(format!("has {} x {} px, unlike the first mask", rle.size.0, rle.size.1)));
         }
         let mut inside = vec![false; rle.size.0 as usize * rle.size.1 as usize];
         rle.spans(rle.size).runs().for_each(|run| inside[run].fill(true));
         masks.push(inside);
         let sure = annotation.predicted_iou.unwrap_or(1.0) * annotation.stability_score.unwrap_or(1.0);
         if !sure.is_finite() {
-            return Err(wrong("has a score that is no finite number".to_owned()));
+            return Err(wrong("has a score that is not a finite number".to_owned()));
         }
         qualities.push(quality(sure));
     }
@@ -87,13 +87,13 @@ pub fn read(path: &Path) -> Result<NestedMasks> {
 pub struct FoundMask {
     /// Pixels inside, `[height][width]`.
     pub inside: Vec<bool>,
-    /// What the network expects of its IoU with an object.
+    /// The network's estimate of the mask's IoU with an object.
     pub score: f32,
-    /// IoU of the mask cut at a higher and at a lower level.
+    /// IoU between the mask cut at a higher and at a lower level.
     pub stability: f32,
 }
 
-/// Writes the masks of a photo, of a size in px.
+/// Writes the masks of a photo; its size is in px.
 pub fn write(path: &Path, (width, height): (u32, u32), masks: &[FoundMask]) -> Result<()> {
     let entry = |mask: &FoundMask| -> Value {
         // Down the columns, outside first.

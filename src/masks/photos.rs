@@ -1,28 +1,28 @@
-//! The photo that a file of an annotation tool names, whatever folder or server it had the photo in.
+//! Finds the photo that an annotation tool's file refers to, whatever folder or server the tool read it from.
 
 use labelgs_files::names::folded;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Photos by the ends of their paths, as they are spelt and folded.
+/// Photos by the ends of their paths, as spelt and case-folded.
 pub(super) struct PhotoIndex {
     spelt: Paths,
     folded: Paths,
 }
 
 struct Paths {
-    /// Whole names, with extension and without.
+    /// Full names, with and without extension.
     whole: HashMap<String, Vec<usize>>,
-    /// The same without one or more of the first folders.
+    /// The same without one or more leading folders.
     ends: HashMap<String, Vec<usize>>,
 }
 
-/// Returns the name and the name without its extension.
+/// Returns the name with and without its extension.
 fn forms(name: &str) -> [String; 2] {
     [name.to_owned(), Path::new(name).with_extension("").to_string_lossy().into_owned()]
 }
 
-/// Returns the path without its first folder, and so on.
+/// Returns the path without its first folder, without its first two, and so on.
 fn tails(name: &str) -> impl Iterator<Item = &str> {
     name.match_indices('/').map(|(at, _)| &name[at + 1..])
 }
@@ -60,14 +60,14 @@ impl Paths {
 }
 
 impl PhotoIndex {
-    /// Makes it from the names of all photos.
+    /// Builds the index from the names of all photos.
     pub(super) fn new(photos: &[&str]) -> Self {
         let names = photos.iter().map(|name| name.replace('\\', "/"));
         Self { spelt: Paths::new(names.clone()), folded: Paths::new(names.map(|name| folded(&name))) }
     }
 
-    /// Returns the photo of a path or address: the one with the whole name, else the only one with the same end. Without
-    /// one it leaves out the eight digits that Label Studio puts before the names of uploaded files.
+    /// Returns the photo of a path or address: the one with the full name, or the only one with the same end. Failing
+    /// that, ignores the eight digits that Label Studio prepends to uploaded files.
     pub(super) fn find(&self, listed: &str) -> Option<usize> {
         let name = plain(listed);
         let own = self.find_plain(&name);
@@ -85,7 +85,7 @@ impl PhotoIndex {
     }
 }
 
-/// Returns the path in an address or a path of Windows: `/data/local-files/?d=a%20b.jpg` is `a b.jpg`.
+/// Extracts the path from an address or a Windows path: `/data/local-files/?d=a%20b.jpg` is `a b.jpg`.
 fn plain(listed: &str) -> String {
     let listed = listed.replace('\\', "/");
     let path = match listed.split_once("?d=") {

@@ -1,40 +1,40 @@
-//! Polygons as pixels: a pixel is inside if its centre is, by the even-odd rule. Several polygons are one area.
+//! Rasterises polygons: a pixel is inside if its centre is, by the even-odd rule. Several polygons form a single area.
 
 use super::spans::Spans;
 use serde_json::Value;
 
-/// Largest coordinate; no picture is as large.
+/// Largest coordinate, beyond any image.
 const COORDINATE_MAX: f64 = 1e6;
 
-/// The outlines of an object in a picture.
+/// The outlines of an object in an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polygons {
-    /// Width and height of the picture, px.
+    /// Width and height of the image, px.
     pub(super) size: (u32, u32),
     outlines: Vec<Vec<[f64; 2]>>,
 }
 
 impl Polygons {
-    /// Reads a list of lists `[x, y, x, y, ...]`; an error is what is wrong with it.
+    /// Reads a list of lists `[x, y, x, y, ...]`. The error describes what is wrong.
     pub(super) fn read(lists: &[Value], size: (u32, u32)) -> Result<Self, String> {
         let outline = |(at, list): (usize, &Value)| {
             let numbers: Option<Vec<f64>> = list.as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
             let Some(numbers) = numbers else {
-                return Err(format!("polygon {} is no list of numbers; expected [x, y, x, y, x, y]", at + 1));
+                return Err(format!("polygon {} is not a list of numbers; expected [x, y, x, y, x, y]", at + 1));
             };
             if numbers.len() < 6 || numbers.len() % 2 == 1 {
                 let count = numbers.len();
                 return Err(format!("polygon {} has {count} numbers; expected x and y of 3 points or more", at + 1));
             }
             if let Some(far) = numbers.iter().find(|number| !(number.abs() <= COORDINATE_MAX)) {
-                return Err(format!("polygon {} has the coordinate {far}; expected pixels of the picture", at + 1));
+                return Err(format!("polygon {} has the coordinate {far}; expected pixels of the image", at + 1));
             }
             Ok(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
         };
         Ok(Self { size, outlines: lists.iter().enumerate().map(outline).collect::<Result<_, _>>()? })
     }
 
-    /// Returns the pixels in a picture of another size.
+    /// Returns the pixels in an image of another size.
     pub(super) fn spans(&self, (width, height): (u32, u32)) -> Spans {
         let scale = [f64::from(width) / f64::from(self.size.0), f64::from(height) / f64::from(self.size.1)];
         let mut inside = vec![false; width as usize * height as usize];
@@ -42,11 +42,11 @@ impl Polygons {
             let points: Vec<[f64; 2]> = outline.iter().map(|[x, y]| [x * scale[0], y * scale[1]]).collect();
             fill(&points, (width as usize, height as usize), &mut inside);
         }
-        Spans::of(&inside)
+        Spans::from_mask(&inside)
     }
 }
 
-/// Returns the first of `most` places whose centre is not before `at`.
+/// Returns the first of `most` positions whose centre is not before `at`.
 fn first(at: f64, most: usize) -> usize {
     // The cast of a negative number is 0.
     ((at - 0.5).ceil() as usize).min(most)
@@ -112,8 +112,8 @@ mod tests {
     #[test]
     fn wrong_polygons_are_told() {
         for (lists, expected) in [
-            (json!([5]), "polygon 1 is no list"),
-            (json!([[1, 2, 3, 4, 5, 6], [1, "x"]]), "polygon 2 is no list"),
+            (json!([5]), "polygon 1 is not a list"),
+            (json!([[1, 2, 3, 4, 5, 6], [1, "x"]]), "polygon 2 is not a list"),
             (json!([[1, 2, 3, 4]]), "4 numbers"),
             (json!([[1, 2, 3, 4, 5, 6, 7]]), "7 numbers"),
             (json!([[1, 2, 3, 1e300, 5, 6]]), "the coordinate"),

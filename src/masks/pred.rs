@@ -1,4 +1,4 @@
-//! `pred.json` of DEVA: the ids of a run and their categories.
+//! DEVA's `pred.json`: the ids of a run and their categories.
 
 use super::shortened;
 use labelgs_files::read;
@@ -33,7 +33,7 @@ struct Category {
     name: String,
 }
 
-/// The ids of a run of DEVA.
+/// The ids of a DEVA run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Pred {
     pub(super) path: PathBuf,
@@ -68,7 +68,7 @@ impl Pred {
         Ok(Self { path: path.to_owned(), ids })
     }
 
-    /// Returns the path of the file for a folder of masks: in it, or beside it if it is called `Annotations`.
+    /// Returns the path of the file for a mask folder: inside it, or beside it if the folder is called `Annotations`.
     pub(super) fn find(root: &Path) -> Option<PathBuf> {
         let beside = root.file_name().filter(|name| *name == "Annotations").and(root.parent());
         [Some(root), beside].into_iter().flatten().map(|folder| folder.join("pred.json")).find(|path| path.is_file())
@@ -82,7 +82,7 @@ impl Pred {
             return Ok(());
         }
         let problem = format!(
-            "{} of {} ids in the pictures are not in {} (such as {}): the pictures are display colours or of another \
+            "{} of {} ids in the images are not in {} (such as {}): the images are display colours or from another \
              run; name the right file in {}, or move the wrong one away and set {}",
             unknown.len(),
             found.len(),

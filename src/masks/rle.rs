@@ -1,12 +1,12 @@
-//! Run lengths of COCO: numbers of pixels outside and inside by turns, down the columns.
+//! COCO run lengths: alternating numbers of pixels outside and inside, down the columns.
 //!
-//! `counts` is a list, or text in which each number takes bytes of 6 bits from `0` on: 5 bits of the number, the lowest
-//! first, and one that says that more follow. From the fourth on a number is the difference from the one two before.
+//! `counts` is a list, or a text of bytes from `0` on with 6 bits each: 5 bits of the number, lowest first, and a bit
+//! that says that more follow. From the fourth number on, a number is the difference from the one two before.
 
-use super::spans::{Spans, first_beyond, place_of};
+use super::spans::{Spans, cell_of, first_beyond};
 use serde_json::Value;
 
-/// The pixels of an object in a picture.
+/// The pixels of an object in an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Rle {
     /// Width and height, px.
@@ -15,23 +15,23 @@ pub(super) struct Rle {
     runs: Vec<(u64, u64)>,
 }
 
-/// What a segmentation of this kind looks like, for messages.
-pub(super) const EXPECTED: &str = r#"expected {"size": [height, width], "counts": a text or a list of numbers}"#;
+/// The expected form of such a segmentation, for messages.
+pub(super) const EXPECTED_FORM: &str = r#"expected {"size": [height, width], "counts": a text or a list of numbers}"#;
 
 impl Rle {
-    /// Reads the object of a JSON file; an error is what is wrong with it.
+    /// Reads the object of a JSON file. The error describes what is wrong.
     pub(super) fn read(value: &Value) -> Result<Self, String> {
         let side = |at: usize| {
             let side = value.get("size").and_then(|size| size.get(at)).and_then(Value::as_u64);
             side.and_then(|side| u32::try_from(side).ok()).filter(|&side| side > 0)
         };
         let (Some(height), Some(width)) = (side(0), side(1)) else {
-            return Err(format!("has no `size` of two numbers above 0; {EXPECTED}"));
+            return Err(format!("has no `size` with two numbers above 0; {EXPECTED_FORM}"));
         };
         let counts = match value.get("counts") {
-            Some(Value::String(text)) => unpacked(text)?,
-            Some(Value::Array(list)) => listed(list)?,
-            _ => return Err(format!("has no `counts`; {EXPECTED}")),
+            Some(Value::String(text)) => parse_text(text)?,
+            Some(Value::Array(list)) => parse_list(list)?,
+            _ => return Err(format!("has no `counts`; {EXPECTED_FORM}")),
         };
         let pixels = u64::from(width) * u64::from(height);
         let (mut runs, mut at) = (Vec::new(), 0_u64);
@@ -47,18 +47,18 @@ impl Rle {
         }
         let sum = counts.iter().fold(0_u64, |sum, &count| sum.saturating_add(count));
         if sum != pixels {
-            let problem = "the file is cut or of another picture; export it again";
-            return Err(format!("the run lengths add up to {sum} and {width} x {height} px are {pixels}: {problem}"));
+            let problem = "the file is truncated or belongs to another image; export it again";
+            return Err(format!("the run lengths add up to {sum}, but {width} x {height} px are {pixels}: {problem}"));
         }
         Ok(Self { size: (width, height), runs })
     }
 
-    /// Returns the pixels in a picture of another size: those whose centre is inside.
+    /// Returns the pixels in an image of another size: those whose centre is inside.
     pub(super) fn spans(&self, (width, height): (u32, u32)) -> Spans {
         let own = u64::from(self.size.1);
         let mut inside = vec![false; width as usize * height as usize];
         for x in 0..width {
-            let column = place_of(x, width, self.size.0) * own;
+            let column = cell_of(x, width, self.size.0) * own;
             let first = self.runs.partition_point(|&(_, end)| end <= column);
             for &(start, end) in self.runs[first..].iter().take_while(|(start, _)| *start < column + own) {
                 let (start, end) = (start.max(column) - column, end.min(column + own) - column);
@@ -66,17 +66,17 @@ impl Rle {
                 rows.for_each(|y| inside[y * width as usize + x as usize] = true);
             }
         }
-        Spans::of(&inside)
+        Spans::from_mask(&inside)
     }
 }
 
-fn listed(list: &[Value]) -> Result<Vec<u64>, String> {
+fn parse_list(list: &[Value]) -> Result<Vec<u64>, String> {
     let number =
-        |value: &Value| value.as_u64().ok_or_else(|| format!("`counts` has {value}, expected a number of pixels"));
+        |value: &Value| value.as_u64().ok_or_else(|| format!("`counts` has {value}; expected a number of pixels"));
     list.iter().map(number).collect()
 }
 
-fn unpacked(text: &str) -> Result<Vec<u64>, String> {
+fn parse_text(text: &str) -> Result<Vec<u64>, String> {
     let mut counts: Vec<i64> = Vec::new();
     let (mut number, mut bits) = (0_i64, 0);
     for (at, byte) in text.bytes().enumerate() {
@@ -85,7 +85,7 @@ fn unpacked(text: &str) -> Result<Vec<u64>, String> {
         let Some(six) = byte.checked_sub(b'0').filter(|six| *six < 64) else {
             return wrong("expected characters from `0` to `o`");
         };
-        // A picture has fewer than 2^32 pixels, and differences have a sign.
+        // An image has fewer than 2^32 pixels, and differences are signed.
         if bits > 30 {
             return wrong("a number has more than 35 bits");
         }
@@ -103,13 +103,13 @@ fn unpacked(text: &str) -> Result<Vec<u64>, String> {
             number += before;
         }
         if number < 0 {
-            return wrong("a run has fewer than 0 pixels");
+            return wrong("a run has a negative length");
         }
         counts.push(number);
         (number, bits) = (0, 0);
     }
     if bits > 0 {
-        return Err("`counts` ends within a number; export it again".to_owned());
+        return Err("`counts` ends in the middle of a number; export it again".to_owned());
     }
     Ok(counts.into_iter().map(|count| count as u64).collect())
 }
@@ -153,12 +153,12 @@ mod tests {
             (json!({"counts": [4]}), "no `size`"),
             (json!({"size": [0, 2], "counts": [4]}), "no `size`"),
             (json!({"size": [2, 2]}), "no `counts`"),
-            (json!({"size": [2, 2], "counts": [3]}), "add up to 3 and 2 x 2 px are 4"),
+            (json!({"size": [2, 2], "counts": [3]}), "add up to 3, but 2 x 2 px are 4"),
             (json!({"size": [2, 2], "counts": [1, u64::MAX]}), "add up to"),
             (json!({"size": [2, 2], "counts": [-1, 5]}), "`counts` has -1"),
             (json!({"size": [2, 2], "counts": "é"}), "character 1: expected characters"),
-            (json!({"size": [2, 2], "counts": "4P"}), "ends within a number"),
-            (json!({"size": [2, 2], "counts": "OOO"}), "fewer than 0"),
+            (json!({"size": [2, 2], "counts": "4P"}), "ends in the middle of a number"),
+            (json!({"size": [2, 2], "counts": "OOO"}), "negative length"),
             (json!({"size": [2, 2], "counts": "oooooooooooooo"}), "35 bits"),
         ] {
             assert!(message(value.clone()).contains(expected), "{expected}: {}", message(value));

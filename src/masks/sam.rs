@@ -1,7 +1,7 @@
-//! What the script `amg.py` of Segment Anything writes: for each photo a folder `NAME` with `0.png`, `1.png`, ... and
-//! `metadata.csv`, or `NAME.json` with run lengths.
+//! Output of Segment Anything's script `amg.py`: for each photo, a folder `NAME` with `0.png`, `1.png`, ... and
+//! `metadata.csv`, or a file `NAME.json` with run lengths.
 
-use super::marks::{Found, Mark, Shape, require_aspect};
+use super::marks::{FoundMarks, Mark, Shape, require_aspect};
 use super::mask_folder::png_key;
 use super::names;
 use super::rle::Rle;
@@ -15,49 +15,50 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// What follows the name of a photo in the path of its table of pictures, and in that of its list of run lengths.
-pub(super) const TABLE: &str = "/metadata.csv";
-pub(super) const LIST: &str = ".json";
+/// What follows a photo's name in the path of its image table and of its run-length list.
+pub(super) const TABLE_SUFFIX: &str = "/metadata.csv";
+pub(super) const LIST_SUFFIX: &str = ".json";
 
-/// Returns for each photo the file with an ending that belongs to it, without the ending.
-pub(super) fn of_photos(photos: &[&str], files: &[String], ending: &str) -> Vec<Option<String>> {
+/// Returns for each photo the file that belongs to it, with `ending` removed.
+pub(super) fn files_of_photos(photos: &[&str], files: &[String], ending: &str) -> Vec<Option<String>> {
     let there = files.iter().filter_map(|file| file.strip_suffix(ending)).collect();
     claim(&photo_keys(photos), &there)
 }
 
-/// True if the file is a list of masks. A broken one must also be found, so that the reader can tell what is wrong.
+/// Returns true if the file is a list of masks. Recognises broken lists too, so that the reader can explain what is
+/// wrong.
 pub(super) fn is_list(path: &Path) -> Result<bool> {
     let text = read::bytes(path)?;
     let has = |key: &[u8]| text.windows(key.len()).any(|part| part == key);
     Ok(has(b"\"segmentation\"") && !has(b"\"image_id\""))
 }
 
-/// Reads the folders of pictures.
-pub(super) fn read_folders(root: &Path, views: &[&View], files: &[String]) -> Result<Found> {
+/// Reads the folders of images.
+pub(super) fn read_folders(root: &Path, views: &[&View], files: &[String]) -> Result<FoundMarks> {
     let others = |folder: &str| folder.to_owned();
-    read_all(root, views, (files, TABLE), others, |folder, _| pictures(root, folder, files))
+    read_all(root, views, (files, TABLE_SUFFIX), others, |folder, _| pictures(root, folder, files))
 }
 
-/// Reads the lists of run lengths.
-pub(super) fn read_lists(root: &Path, views: &[&View], files: &[String]) -> Result<Found> {
-    let file = |name: &str| format!("{name}{LIST}");
-    read_all(root, views, (files, LIST), file, |name, view| masks(&root.join(file(name)), view))
+/// Reads the run-length lists.
+pub(super) fn read_lists(root: &Path, views: &[&View], files: &[String]) -> Result<FoundMarks> {
+    let file = |name: &str| format!("{name}{LIST_SUFFIX}");
+    read_all(root, views, (files, LIST_SUFFIX), file, |name, view| masks(&root.join(file(name)), view))
 }
 
-/// Reads what `read` finds of each photo by the name of its file without the ending; `stray` is how such a name is told if
-/// it belongs to no photo.
+/// Reads the masks of each photo with `read`, by the name of its file without the ending. `stray` formats a name that
+/// does not belong to any photo.
 fn read_all(
     root: &Path,
     views: &[&View],
     (files, ending): (&[String], &str),
     stray: impl Fn(&str) -> String,
     read: impl Fn(&str, &View) -> Result<Vec<Mark>> + Sync,
-) -> Result<Found> {
+) -> Result<FoundMarks> {
     let photos = names(views);
-    let own = of_photos(&photos, files, ending);
+    let own = files_of_photos(&photos, files, ending);
     let marks = |(name, view): (&Option<String>, &&View)| name.as_ref().map_or(Ok(Vec::new()), |name| read(name, view));
     let of_photo = own.par_iter().zip(views).map(marks).collect::<Vec<Result<Vec<Mark>>>>();
-    let mut found = Found { of_photo: of_photo.into_iter().collect::<Result<_>>()?, ..Found::default() };
+    let mut found = FoundMarks { of_photo: of_photo.into_iter().collect::<Result<_>>()?, ..FoundMarks::default() };
     let own: BTreeSet<&str> = own.iter().flatten().map(String::as_str).collect();
     let others = files.iter().filter_map(|file| file.strip_suffix(ending)).filter(|name| !own.contains(name));
     found.strays = others.map(stray).collect();
@@ -65,16 +66,16 @@ fn read_all(
     Ok(found)
 }
 
-/// Returns the pictures that the table of a photo lists.
+/// Returns the images listed in the table of a photo.
 fn pictures<'a>(root: &Path, folder: &str, files: &'a [String]) -> Result<Vec<Mark>> {
-    let path = root.join(format!("{folder}{TABLE}"));
+    let path = root.join(format!("{folder}{TABLE_SUFFIX}"));
     let text = read::text(&path)?;
     let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     if lines.next().is_none_or(|(_, line)| line.split(',').next() != Some("id")) {
         return Err(Error::data(
             &path,
             "line 1",
-            "does not begin with `id,area`; expected the table that amg.py writes",
+            "does not begin with `id,area`; expected the table written by amg.py",
         ));
     }
     let key = |file: &'a String| Some((png_key(file)?.strip_prefix(folder)?.strip_prefix('/')?, file));
@@ -86,23 +87,23 @@ fn pictures<'a>(root: &Path, folder: &str, files: &'a [String]) -> Result<Vec<Ma
         let id = line.split(',').next().unwrap_or_default().trim();
         if id.parse::<u32>().is_err() || !listed.insert(id) {
             let problem =
-                format!("begins with `{}`, expected the number of a picture that no other line has", id.escape_debug());
+                format!("begins with `{}`; expected the number of an image that no other line has", id.escape_debug());
             return Err(Error::data(&path, place(), problem));
         }
         let Some(&file) = there.get(id) else {
-            let problem = format!("lists the mask {id}, and {folder}/{id}.png is not there; copy the whole folder");
+            let problem = format!("lists the mask {id}, but {folder}/{id}.png is missing; copy the whole folder");
             return Err(Error::data(&path, place(), problem));
         };
         marks.push(Mark::new(None, Shape::Png(file.clone())));
     }
     if let Some(other) = there.keys().find(|name| name.parse::<u32>().is_ok() && !listed.contains(*name)) {
-        let problem = format!("does not list {folder}/{other}.png: pictures of another run? Segment the photo again");
+        let problem = format!("does not list {folder}/{other}.png: images of another run? Segment the photo again");
         return Err(Error::data(&path, "", problem));
     }
     Ok(marks)
 }
 
-/// The masks of a photo, alone or with what the data set SA-1B says of the photo.
+/// The masks of a photo, alone or with the data set SA-1B's description of the photo.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum List {
@@ -118,14 +119,14 @@ pub(super) struct Annotation {
     pub(super) stability_score: Option<f64>,
 }
 
-const EXPECTED: &str = r#"expected what amg.py writes as run lengths: [{"segmentation": {"size": [height, width], "counts": "..."}, "area": 9}]"#;
+const EXPECTED_FORM: &str = r#"expected what amg.py writes as run lengths: [{"segmentation": {"size": [height, width], "counts": "..."}, "area": 9}]"#;
 
-/// Reads the list of a photo's masks.
+/// Reads the masks of a photo.
 pub(super) fn annotations(path: &Path) -> Result<Vec<Annotation>> {
-    // The message of a type with two forms tells neither line nor reason.
-    let value: Value = read::json(path, EXPECTED)?;
-    let list =
-        serde_json::from_value(value).map_err(|_| Error::data(path, "", format!("is no list of masks; {EXPECTED}")))?;
+    // Errors for a type with two forms have neither line nor reason, so parse in two steps.
+    let value: Value = read::json(path, EXPECTED_FORM)?;
+    let list = serde_json::from_value(value)
+        .map_err(|_| Error::data(path, "", format!("is not a list of masks; {EXPECTED_FORM}")))?;
     let (List::Alone(list) | List::WithImage { annotations: list }) = list;
     Ok(list)
 }

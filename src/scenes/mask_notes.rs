@@ -38,7 +38,7 @@ fn soft(masks: &PhotoFiles) -> Option<String> {
     let chosen: Vec<_> = files.iter().step_by(files.len().div_ceil(SAMPLE_MAX).max(1)).collect();
     let edges = |&&(name, path): &&(&'_ str, &Path)| {
         let map = read_mask(path).ok()?;
-        Some((name.to_owned(), Edges::of(&map.ids, map.width, map.height)))
+        Some((name.to_owned(), Edges::measure(&map.ids, map.width, map.height)))
     };
     let edges: Vec<(String, Edges)> = chosen.par_iter().filter_map(edges).collect();
     soft_edges::problem(&edges.iter().map(|(name, edges)| (name.as_str(), edges)).collect::<Vec<_>>())

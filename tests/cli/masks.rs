@@ -55,7 +55,7 @@ fn imported_masks_pass_the_check_until_they_are_broken() {
     let output = labelgs(&check);
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stderr).contains("1 missing, 1 misnamed"), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("4.png belongs to no photo"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("4.png does not belong to any photo"), "{}", text(&output.stdout));
     let report = json(&labelgs(&[&check[..], &["--json"]].concat()), 1);
     assert_eq!((&report["counts"]["missing"], &report["report"]["masks"]), (&1.into(), &8.into()));
     assert_eq!(report["report"]["findings"][0]["problem"], "missing");

@@ -1,9 +1,10 @@
-//! Masks of segmenters and annotation tools, in files as those tools write them; broken files are refused by place.
+//! Masks of segmenters and annotation tools, in files as those tools write them. Broken files are refused with their
+//! location.
 
 use super::fixtures::*;
 use super::forms::*;
 use super::import::{auto, names, run, same_as_truth, sources};
-use labelgs_masks::{Format, ImportOptions, Imported, ObjectPer, Overlap, read_mask};
+use labelgs_masks::{Format, ImportOptions, ImportSummary, ObjectPer, Overlap, read_mask};
 use png::{BitDepth, ColorType};
 use serde_json::{Value, json};
 use std::fs;
@@ -15,11 +16,11 @@ fn golden(name: &str) -> Vec<u8> {
     fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-fn per(done: &Imported) -> ObjectPer {
-    done.objects.as_ref().expect("masks of one object each").per
+fn per(done: &ImportSummary) -> ObjectPer {
+    done.objects.as_ref().expect("masks of single objects").per
 }
 
-/// The folders of `amg.py`; the first mask is around the objects 1 and 2.
+/// The folders of `amg.py`; the first mask surrounds the objects 1 and 2.
 fn sam_folders(scene: &Scene) {
     for photo in 0..PHOTOS {
         let folder = format!("m/{}", name(photo));
@@ -42,7 +43,7 @@ fn instances_of_coco_come_back() {
     let by_category = [Some("cup"), Some("bottle"), Some("big bowl")];
     let by_list = [Some("big bowl"), Some("bottle"), Some("cup")];
     let cases = [
-        // COCO's own: polygons, lists of runs, and runs as text.
+        // COCO's own forms: polygons, lists of runs, and runs as text.
         ("coco.json", "m/instances_train.json", by_category, [1, 2, 3]),
         ("cvat.json", "m/annotations/instances_default.json", by_category, [1, 2, 3]),
         ("label-studio-coco.json", "m/result.json", by_list, [3, 2, 1]),
@@ -78,7 +79,7 @@ fn tracks_are_objects_of_all_photos() {
         (vec![Some("track 0"), Some("track 1"), Some("track 7")], ObjectPer::Track)
     );
     same_as_truth(&scene, &done, [1, 2, 3]);
-    // Two cups in a photo: by mask they are numbered in each photo, by name they are one.
+    // Two cups in a photo: by mask, ids differ between photos; by name, the cups are one object.
     let each = run(&scene, "m", |options| options.object_per = ObjectPer::Mask).expect("imported");
     assert_eq!(sources(&each), [Some("cup"), Some("cup"), Some("big bowl")]);
     let one = run(&scene, "m", |options| options.object_per = ObjectPer::Name).expect("imported");
@@ -103,14 +104,14 @@ fn masks_of_segment_anything_come_back_small_over_large() {
         let message = refusal(run(&scene, "m", |options| options.object_per = ObjectPer::Name));
         assert!(message.contains("15 of 15 masks have no name; set `object_per = mask`"), "{message}");
     }
-    // A photo of the data set SA-1B says more than its masks.
+    // A photo of the data set SA-1B has a description besides its masks.
     let scene = scene();
     let masks: Value = serde_json::from_slice(&golden("sam/00.json")).expect("JSON");
     scene.write("m/00.json", json!({"image": {"file_name": "00.jpg"}, "annotations": masks}).to_string());
     assert_eq!(auto(&scene, "m").expect("imported").masks, 1);
 }
 
-/// Forms that only one tool writes are named with the export that is read.
+/// Unsupported forms of a tool are named together with the export that can be read.
 #[test]
 fn other_exports_of_tools_are_named_with_a_cure() {
     for (file, tool) in [
@@ -140,7 +141,7 @@ fn a_crowd_yields_and_later_annotations_win() {
     let file = json!({"images": [{"id": 1, "file_name": "00.png", "width": 24, "height": 16}, {"id": 2, "file_name": "x.png"}],
         "annotations": list, "categories": categories.collect::<Vec<_>>()});
     scene.write("a.json", file.to_string());
-    // The outlines are of a picture of twice the size, so half of each remains.
+    // The outlines belong to an image of twice the size, so half of each remains.
     let row = |rule| {
         let done = run(&scene, "a.json", |options| options.overlap = rule).expect("imported");
         assert!(done.notes.iter().any(|note| note.contains("1 of 4 annotations")), "{:?}", done.notes);
@@ -153,7 +154,7 @@ fn a_crowd_yields_and_later_annotations_win() {
     assert!(message.contains("a and b") || message.contains("many"), "{message}");
 }
 
-/// A file of COCO with one change, and what the message says of it.
+/// A COCO file with one change, and the expected message.
 #[test]
 fn each_broken_file_of_coco_has_its_message() {
     let whole: Value = serde_json::from_slice(&golden("coco.json")).expect("JSON");
@@ -171,11 +172,11 @@ fn each_broken_file_of_coco_has_its_message() {
         |path: &'static str, new: Value| move |value: &mut Value| *value.pointer_mut(path).expect(path) = new.clone();
     let first = "annotation 1768 (photo 00.png)";
     refused(&put("/annotations/0/segmentation", json!([[1, 2, 3, 4]])), &[first, "polygon 1 has 4 numbers"]);
-    refused(&put("/annotations/0/segmentation", json!([[1, 2, "x", 4, 5, 6]])), &[first, "no list of numbers"]);
+    refused(&put("/annotations/0/segmentation", json!([[1, 2, "x", 4, 5, 6]])), &[first, "not a list of numbers"]);
     refused(&put("/annotations/0/segmentation", json!([[1, 2, 1e9, 4, 5, 6]])), &[first, "the coordinate 1000000000"]);
     refused(
         &put("/annotations/1/segmentation/counts", json!([1])),
-        &["annotation 1769", "add up to 1 and 12 x 8 px are 96"],
+        &["annotation 1769", "add up to 1, but 12 x 8 px are 96"],
     );
     refused(&put("/annotations/1/segmentation/size", json!([8])), &["annotation 1769", "`size`", "expected {\"size\""]);
     refused(&put("/annotations/2/segmentation/counts", json!("1~")), &["annotation 1770", "character 2"]);
@@ -184,7 +185,7 @@ fn each_broken_file_of_coco_has_its_message() {
         &["annotation 1770", "8 x 8 px"],
     );
     refused(&put("/annotations/3/image_id", json!(5)), &["annotation 1771", "of image 5", "does not list"]);
-    refused(&put("/images/1/file_name", json!("00.jpg")), &["image `00.jpg`", "both the photo 00.png"]);
+    refused(&put("/images/1/file_name", json!("00.jpg")), &["image `00.jpg`", "both belong to the photo 00.png"]);
     refused(&put("/images/1/id", json!(397_133)), &["image `01.png`", "unique"]);
     refused(&put("/images/0/width", json!(8)), &[first, "the image has 8 x 8 px"]);
     refused(&put("/images/0/width", json!(0)), &[first, "the image has 0 x 8 px"]);
@@ -195,7 +196,7 @@ fn each_broken_file_of_coco_has_its_message() {
         let images = value["images"].as_array_mut().expect("a list");
         images.iter_mut().enumerate().for_each(|(at, image)| image["file_name"] = json!(format!("other{at}.png")));
     };
-    refused(&renamed, &["the scene has 00.png", "the masks are of other0.png"]);
+    refused(&renamed, &["the scene has 00.png", "the masks are for other0.png"]);
     let boxes = |value: &mut Value| {
         let list = value["annotations"].as_array_mut().expect("a list");
         list.iter_mut().for_each(|annotation| annotation["segmentation"] = json!([]));
@@ -239,14 +240,14 @@ fn each_broken_folder_of_a_tool_has_its_message() {
     };
     let put = |name: &'static str, text: &'static str| move |scene: &Scene| drop(scene.write(name, text));
     let gone = |name: &'static str| move |scene: &Scene| fs::remove_file(scene.path().join(name)).expect("removed");
-    refused(sam_folders, &gone("m/01/2.png"), &["01/metadata.csv: line 4", "01/2.png is not there"]);
+    refused(sam_folders, &gone("m/01/2.png"), &["01/metadata.csv: line 4", "01/2.png is missing"]);
     refused(sam_folders, &put("m/01/metadata.csv", "area\n"), &["01/metadata.csv: line 1", "`id,area`"]);
     refused(sam_folders, &put("m/01/metadata.csv", "id,area\nx,1\n"), &["line 2: begins with `x`"]);
     refused(sam_folders, &put("m/01/metadata.csv", "id,area\n0,1\n0,1\n"), &["line 3: begins with `0`"]);
     refused(sam_folders, &put("m/01/metadata.csv", "id,area\n0,1\n"), &["does not list 01/1.png"]);
-    refused(sam_folders, &put("m/01/1.png", "x"), &["01/1.png", "no readable PNG"]);
+    refused(sam_folders, &put("m/01/1.png", "x"), &["01/1.png", "not a readable PNG"]);
     refused(sam_lists, &put("m/01.json", "[{\"segmentation\": "), &["01.json: line 1", "amg.py"]);
-    refused(sam_lists, &put("m/01.json", "[{\"area\": 1}]"), &["01.json: is no list of masks"]);
+    refused(sam_lists, &put("m/01.json", "[{\"area\": 1}]"), &["01.json: is not a list of masks"]);
     let cut = "[{\"segmentation\": {\"size\": [8, 12], \"counts\": [5]}}]";
     refused(sam_lists, &put("m/01.json", cut), &["01.json: mask 0", "add up to 5"]);
     let other = "[{\"segmentation\": {\"size\": [8, 8], \"counts\": [64]}}]";

@@ -1,9 +1,9 @@
-//! `masks check` finds each kind of planted fault, and nothing in clean masks.
+//! `masks check` finds each kind of planted problem, and none in clean masks.
 
 use super::forms::*;
 use glam::{DMat3, DVec3};
 use labelgs_files::image::write_png_grey8;
-use labelgs_masks::check::{Look, findings};
+use labelgs_masks::check::{MaskStats, findings};
 use labelgs_masks::{Finding, Problem, Report, inspect};
 use labelgs_scene::{Camera, Dataset, LabelMap, Point};
 use labelgs_scenes::{self as scenes, LoadOptions};
@@ -14,24 +14,25 @@ use std::path::Path;
 use std::sync::LazyLock;
 use tempfile::TempDir;
 
-const WIDTH: u32 = 96;
-const HEIGHT: u32 = 72;
+const MASK_WIDTH: u32 = 96;
+const MASK_HEIGHT: u32 = 72;
 
-/// A made scene of 24 views with masks by a ray tracer.
-static MADE: LazyLock<Dataset> = LazyLock::new(|| {
-    let options = SynthOptions { width: WIDTH, height: HEIGHT, views: 24, points: 800, ..SynthOptions::default() };
+/// A synthetic scene of 24 views with ray-traced masks.
+static SYNTHETIC_SCENE: LazyLock<Dataset> = LazyLock::new(|| {
+    let options =
+        SynthOptions { width: MASK_WIDTH, height: MASK_HEIGHT, views: 24, points: 800, ..SynthOptions::default() };
     synth::dataset(&options, 0)
 });
 
 /// The scene, and a folder with its masks in `masks`.
 fn made() -> (TempDir, &'static Dataset) {
     let folder = tempfile::tempdir().expect("folder");
-    for view in MADE.all() {
+    for view in SYNTHETIC_SCENE.all() {
         let map = view.mask().expect("read").expect("a mask");
         let ids: Vec<u8> = map.ids.iter().map(|&id| id as u8).collect();
         write_png_grey8(folder.path().join("masks").join(&view.name), map.width, map.height, &ids).expect("written");
     }
-    (folder, &MADE)
+    (folder, &SYNTHETIC_SCENE)
 }
 
 fn report(folder: &TempDir, dataset: &Dataset) -> Report {
@@ -65,10 +66,21 @@ fn files_that_do_not_fit_their_photos_are_found() {
     fs::rename(masks.join("003.png"), masks.join("3.png")).expect("renamed");
     write_png_grey8(masks.join("005.png"), 72, 72, &[1; 72 * 72]).expect("written");
     // Half of the size is a scale.
-    write_png_grey8(masks.join("006.png"), WIDTH / 2, HEIGHT / 2, &vec![1; (WIDTH * HEIGHT / 4) as usize])
-        .expect("written");
+    write_png_grey8(
+        masks.join("006.png"),
+        MASK_WIDTH / 2,
+        MASK_HEIGHT / 2,
+        &vec![1; (MASK_WIDTH * MASK_HEIGHT / 4) as usize],
+    )
+    .expect("written");
     fs::write(masks.join("007.png"), "text").expect("written");
-    png(&masks.join("008.png"), (WIDTH, HEIGHT), png::ColorType::Rgb, png::BitDepth::Eight, &[1, 2, 3].repeat(96 * 72));
+    png(
+        &masks.join("008.png"),
+        (MASK_WIDTH, MASK_HEIGHT),
+        png::ColorType::Rgb,
+        png::BitDepth::Eight,
+        &[1, 2, 3].repeat(96 * 72),
+    );
     fs::write(masks.join("009.jpg"), "text").expect("written");
     fs::write(masks.join("labels.json"), "belongs here").expect("written");
     let report = report(&folder, dataset);
@@ -95,7 +107,7 @@ fn a_mask_with_object_and_surroundings_swapped_is_found() {
     let found = report(&folder, dataset).findings;
     let inverted: Vec<Finding> = found.into_iter().filter(|finding| finding.problem == Problem::Inverted).collect();
     assert_eq!(short(&inverted), [(Problem::Inverted, Some("004.png"), Some(2))]);
-    // A single object, swapped everywhere.
+    // A single object, swapped in all masks.
     for view in dataset.all() {
         edit(&folder, &view.name, |_, id| u16::from(id != 1));
     }
@@ -120,7 +132,7 @@ fn nearly_empty_masks_and_objects_are_found() {
             _ => 0,
         }
     };
-    let look = |pixels: usize| Look::new(&map(30, 20, id(pixels)), &camera(30, 20), &[]);
+    let look = |pixels: usize| MaskStats::new(&map(30, 20, id(pixels)), &camera(30, 20), &[]);
     let (usual, speck) = (look(400), look(1));
     let masks = [("a", &usual), ("b", &usual), ("c", &speck), ("d", &usual), ("e", &usual)];
     assert_eq!(short(&findings(&masks)), [(Problem::NearlyEmpty, Some("c"), Some(4))]);
@@ -129,23 +141,23 @@ fn nearly_empty_masks_and_objects_are_found() {
     assert_eq!(findings(&masks), []);
 }
 
-/// Replaces all masks by those that `change` makes of their ids.
+/// Replaces all masks by the result of `change` on their ids.
 fn replace(folder: &TempDir, change: impl Fn(&LabelMap) -> LabelMap) {
-    for view in MADE.all() {
+    for view in SYNTHETIC_SCENE.all() {
         let map = change(&view.mask().expect("read").expect("a mask"));
         let ids: Vec<u8> = map.ids.iter().map(|&id| id as u8).collect();
         write_png_grey8(folder.path().join("masks").join(&view.name), map.width, map.height, &ids).expect("written");
     }
 }
 
-/// Half of the size, by a function of the four pixels.
+/// Halves the size by a function of four pixels.
 fn halved(map: &LabelMap, of: impl Fn([u16; 4]) -> u16) -> LabelMap {
     let pixel = |at: u32| {
-        let (x, y) = (at % (WIDTH / 2) * 2, at / (WIDTH / 2) * 2);
+        let (x, y) = (at % (MASK_WIDTH / 2) * 2, at / (MASK_WIDTH / 2) * 2);
         of([map.at(x, y), map.at(x + 1, y), map.at(x, y + 1), map.at(x + 1, y + 1)])
     };
-    let ids = (0..WIDTH * HEIGHT / 4).map(pixel).collect();
-    LabelMap { width: WIDTH / 2, height: HEIGHT / 2, ids }
+    let ids = (0..MASK_WIDTH * MASK_HEIGHT / 4).map(pixel).collect();
+    LabelMap { width: MASK_WIDTH / 2, height: MASK_HEIGHT / 2, ids }
 }
 
 #[test]
@@ -163,7 +175,7 @@ fn soft_masks_are_one_finding() {
         let found = report(&folder, dataset).findings;
         assert_eq!(short(&found), [(Problem::SoftEdges, None, None)], "{at}: {found:?}");
     }
-    // The nearest pixel keeps ids.
+    // Nearest-neighbour resizing preserves ids.
     for by in [1, 30] {
         replace(&folder, |map| halved(&scaled(by)(map), |four| four[0]));
         let found = report(&folder, dataset).findings;
@@ -208,9 +220,9 @@ fn an_id_that_is_lost_for_one_view_is_found() {
     let (folder, dataset) = made();
     let mask = |name: &str| labelgs_masks::read_mask(folder.path().join("masks").join(name)).expect("a mask");
     let shown = |id: u16| {
-        ["013.png", "014.png", "015.png"]
-            .iter()
-            .all(|name| mask(name).ids.iter().filter(|&&found| found == id).count() * 100 > (WIDTH * HEIGHT) as usize)
+        ["013.png", "014.png", "015.png"].iter().all(|name| {
+            mask(name).ids.iter().filter(|&&found| found == id).count() * 100 > (MASK_WIDTH * MASK_HEIGHT) as usize
+        })
     };
     let id = (1..=8).find(|&id| shown(id)).expect("an object in all three views");
     edit(&folder, "014.png", |_, found| if found == id { 0 } else { found });
@@ -236,17 +248,17 @@ fn map(width: u32, height: u32, id: impl Fn(usize) -> u16) -> LabelMap {
     LabelMap { width, height, ids: (0..(width * height) as usize).map(id).collect() }
 }
 
-/// A missing id is no finding if the points of the object are out of the picture or hidden in all three masks.
+/// A missing id is not a finding if the object's points are outside the image or hidden in all three masks.
 #[test]
 fn points_excuse_an_absence() {
-    // Points at depth 1 of a camera with a focal length of 100 px: 100 times their place from the middle.
+    // Points at depth 1 of a camera with a focal length of 100 px: 100 times their offset from the centre.
     let points: Vec<Point> = [[-0.05, 0.0, 1.0], [-0.06, 0.02, 1.0]]
         .map(|position| Point { position: glam::DVec3::from_array(position), colour: [0; 3] })
         .to_vec();
     let left = |inside: u16, outside: u16| map(20, 20, move |index| if index % 20 < 10 { inside } else { outside });
     let looks = |between: &LabelMap, between_camera: &Camera, points: &[Point]| {
-        let shown = Look::new(&left(3, 5), &camera(20, 20), points);
-        let between = Look::new(between, between_camera, points);
+        let shown = MaskStats::new(&left(3, 5), &camera(20, 20), points);
+        let between = MaskStats::new(between, between_camera, points);
         findings(&[("a", &shown), ("b", &between), ("c", &shown)])
     };
     let here = camera(20, 20);
@@ -267,7 +279,7 @@ fn points_excuse_an_absence() {
 #[test]
 fn pictures_of_one_pixel_and_one_line_are_measured() {
     for (width, height) in [(1, 1), (5, 1), (1, 5), (2, 2)] {
-        let look = Look::new(&map(width, height, |_| 1), &camera(width, height), &[]);
+        let look = MaskStats::new(&map(width, height, |_| 1), &camera(width, height), &[]);
         let found = findings(&[("a", &look), ("b", &look)]);
         assert_eq!(short(&found), [(Problem::OneArea, None, None)], "{found:?}");
     }

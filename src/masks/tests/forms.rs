@@ -1,16 +1,16 @@
-//! Writers of every mask format that can be imported, from one ground truth.
+//! Writers of all importable mask formats, from a single ground truth.
 
 use super::fixtures::{Scene, simple};
 use std::fs;
 use std::path::Path;
 
-/// Size of the pictures; that of the photos of `simple`.
+/// Size of the images; it is that of the photos of `simple`.
 pub const SIZE: (u32, u32) = (12, 8);
 
 /// Photos of the scene.
 pub const PHOTOS: usize = 5;
 
-/// True ids 0 to 3 per pixel: three objects that move a little and leave 0 around.
+/// True ids 0 to 3 per pixel: three objects that move a little on a background of 0.
 pub fn truth(photo: usize) -> Vec<u16> {
     let at = |x: usize, y: usize| match (x.wrapping_sub(photo), y) {
         (0..3, 1..5) => 1,
@@ -36,7 +36,7 @@ pub fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::Bi
     encoder.set_color(colour);
     encoder.set_depth(depth);
     if colour == png::ColorType::Indexed {
-        // All entries have one colour, so a reader of colours loses the ids.
+        // All entries have the same colour, so a reader of colours loses the ids.
         encoder.set_palette(vec![9; 768]);
     }
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");
@@ -46,7 +46,7 @@ pub fn grey8(path: &Path, bytes: &[u8]) {
     png(path, SIZE, png::ColorType::Grayscale, png::BitDepth::Eight, bytes);
 }
 
-/// Id pictures `folder/NAME.png` in which the objects 1, 2 and 3 are called `ids`.
+/// Id images `folder/NAME.png` in which the objects 1, 2 and 3 have the given `ids`.
 pub fn id_pictures(folder: &Path, colour: png::ColorType, depth: png::BitDepth, ids: [u32; 3]) {
     for photo in 0..PHOTOS {
         let source = truth(photo).into_iter().map(|id| if id == 0 { 0 } else { ids[usize::from(id) - 1] });
@@ -59,7 +59,7 @@ pub fn id_pictures(folder: &Path, colour: png::ColorType, depth: png::BitDepth, 
     }
 }
 
-/// Black and white pictures at `path(object, photo)`, for the objects of these numbers.
+/// Black and white images at `path(object, photo)`, for these object numbers.
 pub fn binary(white: u8, objects: &[u16], path: impl Fn(u16, usize) -> std::path::PathBuf) {
     for photo in 0..PHOTOS {
         for &object in objects {
@@ -69,7 +69,7 @@ pub fn binary(white: u8, objects: &[u16], path: impl Fn(u16, usize) -> std::path
     }
 }
 
-/// The `pred.json` of DEVA for these ids; the first two are of categories.
+/// DEVA's `pred.json` for these ids; the first two have categories.
 pub fn pred(ids: [u32; 3]) -> String {
     let segments: Vec<String> = ids
         .iter()

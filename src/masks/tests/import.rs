@@ -4,7 +4,7 @@ use super::fixtures::*;
 use super::forms::*;
 use labelgs_files::LabelTable;
 use labelgs_files::label_table::FILE_NAME;
-use labelgs_masks::{Format, ImportOptions, Imported, Overlap, import, read_mask};
+use labelgs_masks::{Format, ImportOptions, ImportSummary, Overlap, import, read_mask};
 use labelgs_scene::{Dataset, Error};
 use labelgs_scenes::{self as scenes, LoadOptions};
 use png::{BitDepth, ColorType};
@@ -16,7 +16,11 @@ fn dataset(scene: &Scene) -> Dataset {
         .expect("a scene")
 }
 
-pub fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions)) -> labelgs_scene::Result<Imported> {
+pub fn run(
+    scene: &Scene,
+    folder: &str,
+    change: impl FnOnce(&mut ImportOptions),
+) -> labelgs_scene::Result<ImportSummary> {
     let mut options = ImportOptions { folder: scene.path().join(folder), ..ImportOptions::default() };
     change(&mut options);
     let output = scene.path().join("out");
@@ -24,13 +28,13 @@ pub fn run(scene: &Scene, folder: &str, change: impl FnOnce(&mut ImportOptions))
     import(&dataset(scene), &options, &output)
 }
 
-pub fn auto(scene: &Scene, folder: &str) -> labelgs_scene::Result<Imported> {
+pub fn auto(scene: &Scene, folder: &str) -> labelgs_scene::Result<ImportSummary> {
     run(scene, folder, |_| ())
 }
 
 /// Checks that imported masks equal the ground truth with ids 1, 2, 3 replaced by `ids`, and that training reads them.
 #[track_caller]
-pub fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
+pub fn same_as_truth(scene: &Scene, done: &ImportSummary, ids: [u16; 3]) {
     let masks = scene.path().join("out");
     for photo in 0..PHOTOS {
         let expected: Vec<u16> =
@@ -48,11 +52,11 @@ pub fn same_as_truth(scene: &Scene, done: &Imported, ids: [u16; 3]) {
     assert!(scenes::open(scene.path(), &options).expect("a scene").all().iter().all(|view| view.mask.is_some()));
 }
 
-pub fn names(done: &Imported) -> Vec<Option<&str>> {
+pub fn names(done: &ImportSummary) -> Vec<Option<&str>> {
     done.labels.iter().map(|entry| entry.name.as_deref()).collect()
 }
 
-pub fn sources(done: &Imported) -> Vec<Option<&str>> {
+pub fn sources(done: &ImportSummary) -> Vec<Option<&str>> {
     done.labels.iter().map(|entry| entry.source.as_deref()).collect()
 }
 
@@ -96,7 +100,7 @@ fn a_run_of_deva_is_found_by_its_folder_and_named_by_its_categories() {
     scene.write("deva/pred.json", pred(ids));
     scene.photo("deva/Visualizations/00.jpg", 12, 8);
     for folder in ["deva", "deva/Annotations"] {
-        // The name of the parent folder identifies the run only if the pictures were not moved.
+        // The name of the parent folder identifies the run only if the images were not moved.
         let done = run(&scene, folder, |o| o.pred = Some(scene.path().join("deva/pred.json"))).expect("imported");
         assert_eq!(
             (done.format, names(&done)),
@@ -217,7 +221,7 @@ fn soft_id_pictures_are_imported_only_as_told() {
     (0..PHOTOS).for_each(|photo| grey8(&scene.path().join(format!("m/{}.png", name(photo))), &row.repeat(8)));
     let message = refusal(auto(&scene, "m"));
     assert!(
-        message.contains("5 of 5 masks looked at have soft edges") && message.contains("`format = binary`"),
+        message.contains("5 of 5 examined masks have soft edges") && message.contains("`format = binary`"),
         "{message}"
     );
     let told = run(&scene, "m", |options| options.format = Format::DevaShort).expect("imported");
@@ -247,7 +251,7 @@ fn grey_that_is_stored_as_colours_is_read_as_grey() {
     let done = auto(&scene, "m").expect("imported");
     assert_eq!(done.format, Format::DevaShort);
     same_as_truth(&scene, &done, [2, 1, 3]);
-    // One picture with colours, and the black frame of a tracker is of the same kind.
+    // A single coloured image; the black frame of a tracker is of the same kind.
     id_pictures(&scene.path().join("long"), ColorType::Rgb, BitDepth::Eight, [300, 256, 70_000]);
     png(&scene.path().join("long/03.png"), SIZE, ColorType::Rgb, BitDepth::Eight, &[0; 288]);
     scene.write("long/pred.json", pred([300, 256, 70_000]));
@@ -256,7 +260,7 @@ fn grey_that_is_stored_as_colours_is_read_as_grey() {
 
 #[test]
 fn ambiguous_masks_are_refused_with_the_flags_that_decide() {
-    // A mirrored folder of black and white id pictures, or the object `left`.
+    // A folder of mirrored black and white id images, or the object `left`.
     let scene = Scene::new();
     scene.colmap_bin("sparse/0", &[pinhole()], &["left/a.png", "left/b.png"]);
     ["left/a.png", "left/b.png"].iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
@@ -272,7 +276,7 @@ fn ambiguous_masks_are_refused_with_the_flags_that_decide() {
     assert_eq!(sources_as(Format::DevaShort).as_deref(), Some("1"));
     assert_eq!(sources_as(Format::BinaryFolders).as_deref(), Some("left"));
     assert!(scene.path().join("out/left/b.png").is_file());
-    // With three values it can only be id pictures.
+    // With three values it can only be id images.
     grey8(&scene.path().join("m/left/a.png"), &(0..96).map(|index| index % 3).collect::<Vec<u8>>());
     assert_eq!(auto(&scene, "m").expect("imported").format, Format::DevaShort);
 }
@@ -307,7 +311,7 @@ fn each_broken_folder_has_its_message() {
         assert!(!scene.path().join("out").exists());
     };
     let gone = |folder: &Path| fs::remove_dir_all(folder).expect("removed");
-    refused(&|folder| gone(folder), "no such folder");
+    refused(&|folder| gone(folder), "no such mask folder");
     refused(
         &|folder| {
             gone(folder);
@@ -349,9 +353,9 @@ fn each_broken_folder_has_its_message() {
                 png(&folder.join(name(photo)).with_extension("png"), SIZE, ColorType::Rgb, BitDepth::Sixteen, &bytes);
             }
         },
-        "holds no ids",
+        "cannot hold ids",
     );
-    refused(&|folder| fs::write(folder.join("01.png"), b"no png").expect("written"), "no readable PNG");
+    refused(&|folder| fs::write(folder.join("01.png"), b"no png").expect("written"), "not a readable PNG");
     refused(
         &|folder| {
             gone(folder);
@@ -374,7 +378,7 @@ fn a_named_form_that_the_pictures_do_not_have_is_refused() {
     let scene = scene();
     id_pictures(&scene.path().join("m"), ColorType::Grayscale, BitDepth::Eight, [1, 2, 3]);
     let message = refusal(run(&scene, "m", |options| options.format = Format::Palette));
-    assert!(message.contains("8-bit grey picture where palette is expected"), "{message}");
+    assert!(message.contains("8-bit grey image where palette is expected"), "{message}");
     assert!(refusal(run(&scene, "m", |options| options.format = Format::LerfMask)).contains("00/OBJECT.png"));
     fs::create_dir_all(scene.path().join("full/x")).expect("made");
     let options = ImportOptions { folder: scene.path().join("m"), ..ImportOptions::default() };
@@ -402,7 +406,7 @@ fn photos_that_differ_only_in_their_extension_get_masks_of_their_own() {
     photos.iter().for_each(|name| scene.photo(&format!("images/{name}"), 12, 8));
     grey8(&scene.path().join("m/a.jpg.png"), &[5; 96]);
     grey8(&scene.path().join("m/a.png.png"), &[6; 96]);
-    // DEVA cuts four characters off.
+    // DEVA removes four characters.
     grey8(&scene.path().join("m/b..png"), &[7; 96]);
     auto(&scene, "m").expect("imported");
     let id = |name: &str| read_mask(scene.path().join("out").join(name)).expect(name).ids[0];

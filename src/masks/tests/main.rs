@@ -1,4 +1,4 @@
-//! Folders of masks: imported, checked.
+//! Mask folders are imported and checked.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,

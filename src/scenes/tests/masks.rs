@@ -132,7 +132,7 @@ fn masks_without_objects_are_noted() {
     // The first and the ninth are held out.
     flat(&scene, &files[0], 1);
     flat(&scene, &files[8], 1);
-    has("only photos that are held out for scores have masks, and nothing learns from these: 00.png, 08.png");
+    has("only held-out photos have masks, so training cannot use them: 00.png, 08.png");
     files.iter().for_each(|file| flat(&scene, file, 0));
     has("every pixel of all 8 masks is 0");
     files.iter().for_each(|file| flat(&scene, file, 255));
@@ -150,14 +150,14 @@ fn soft_masks_are_noted_once() {
         png(&path, (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &row.repeat(8));
     });
     let notes = open(&scene, None).expect("a scene").notes;
-    assert!(notes.len() == 1 && notes[0].contains("3 of 3 masks looked at have soft edges"), "{notes:?}");
+    assert!(notes.len() == 1 && notes[0].contains("3 of 3 examined masks have soft edges"), "{notes:?}");
     assert!(notes[0].contains("`format = binary`"), "{notes:?}");
 }
 
 #[test]
 fn a_folder_of_another_form_names_the_import() {
     let scene = simple(2);
-    let cure = format!("by `masks import {}` with the scene", scene.path().join("masks").display());
+    let cure = format!("with `masks import {}` and the scene", scene.path().join("masks").display());
     let refused = |file: &str, text: &str| {
         let _ = fs::remove_dir_all(scene.path().join("masks"));
         flat(&scene, "masks/00/0.png", 255);

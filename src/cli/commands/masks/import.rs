@@ -4,7 +4,7 @@ use super::open_photos;
 use crate::Result;
 use crate::cli::support::{Context, ReadArgs, quoted};
 use crate::files::label_table::LabelEntry;
-use crate::masks::{Format, ImportOptions, Imported, ObjectPer, Objects, Overlap, import};
+use crate::masks::{Format, ImportOptions, ImportSummary, ObjectPer, Objects, Overlap, import};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -66,7 +66,7 @@ fn line(entry: &LabelEntry) -> String {
     format!("{:>6} {:>12} {:>6}  {name:<24} {source}\n", entry.id, entry.pixels, entry.views)
 }
 
-fn warn(done: &Imported) {
+fn warn(done: &ImportSummary) {
     let listed = |names: &[String]| names.join(", ");
     if !done.masks_without_photo.is_empty() {
         let names = &done.masks_without_photo;
