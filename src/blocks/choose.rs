@@ -101,11 +101,11 @@ fn seen_share(camera: &Camera, zone: &Zone) -> f64 {
     let longest = camera.width.max(camera.height);
     let count = |side: u32| (side * RAYS_PER_LONG_SIDE).div_ceil(longest).max(1);
     let (columns, rows) = (count(camera.width), count(camera.height));
-    let from = zone.place(camera.centre());
+    let from = zone.to_axes(camera.centre());
     let hits = (0..rows * columns).filter(|at| {
         let share = |index: u32, count: u32, side: u32| (f64::from(index) + 0.5) / f64::from(count) * f64::from(side);
         let pixel = DVec2::new(share(at % columns, columns, camera.width), share(at / columns, rows, camera.height));
-        passes(from, zone.place(camera.rotation.transpose() * camera.ray(pixel)), zone)
+        passes(from, zone.to_axes(camera.rotation.transpose() * camera.ray(pixel)), zone)
     });
     hits.count() as f64 / f64::from(rows * columns)
 }

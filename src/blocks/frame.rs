@@ -22,7 +22,7 @@ pub(super) struct Frame {
 impl Frame {
     /// Fits the frame to cameras. `up` is the world's up direction, if known.
     pub(super) fn from_cameras(cameras: &[&Camera], extent: f64, up: Option<DVec3>) -> Self {
-        let seen = Overview::of(cameras.iter().copied()).map(|overview| overview.up);
+        let seen = Overview::from_cameras(cameras.iter().copied()).map(|overview| overview.up);
         let up = up.or(seen).and_then(DVec3::try_normalize).unwrap_or(DVec3::Z);
         // If up is close to a world axis, the other world axes are kept.
         let aside = [DVec3::X, DVec3::Y].into_iter().find(|axis| axis.dot(up).abs() < 0.75).unwrap_or(DVec3::X);
@@ -33,7 +33,7 @@ impl Frame {
 
     /// Converts a world point to the ground frame.
     pub(super) fn place(&self, world: DVec3) -> DVec3 {
-        self.zone(&Bounds::ALL).place(world)
+        self.zone(&Bounds::ALL).to_axes(world)
     }
 
     pub(super) fn zone(&self, bounds: &Bounds) -> Zone {

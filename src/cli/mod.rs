@@ -4,7 +4,7 @@ pub mod command;
 pub mod commands;
 pub mod support;
 
-use crate::error::speak_of;
+use crate::error::name_settings;
 use crate::{Error, version};
 use clap::FromArgMatches;
 use command::{Cli, command, has_json, with_headings};
@@ -67,7 +67,7 @@ impl From<clap::Error> for Exit {
 fn run(args: Vec<OsString>) -> Result<(), Exit> {
     let mut command = with_headings(command());
     let typed = command.try_get_matches_from_mut(args).map_err(number_errors::in_words)?;
-    speak_of(setting_names::names(&command, &typed));
+    name_settings(setting_names::names(&command, &typed));
     if let Some(("train", words)) = typed.subcommand()
         && let Some(only) = settings::asked(words)
     {

@@ -220,7 +220,7 @@ impl Engine {
     /// Adds the box in which Gaussians grow.
     pub(crate) fn with_grow_box(&self, uniforms: StepUniforms, zone: &Zone) -> StepUniforms {
         let [grow_axis0, grow_axis1, grow_axis2] = zone.axes.map(|axis| axis.as_vec3().to_array());
-        let origin = zone.place(self.origin);
+        let origin = zone.to_axes(self.origin);
         // Open sides stay open.
         let corner = |at: DVec3| (at - origin).clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into()));
         let (grow_low, grow_high) = (corner(zone.low).as_vec3().to_array(), corner(zone.high).as_vec3().to_array());

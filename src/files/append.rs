@@ -20,7 +20,7 @@ impl LineFile {
     /// Opens or creates a file and keeps its first `bytes`.
     pub fn open(path: &Path, bytes: u64) -> Result<Self> {
         let open = || {
-            fault::of_file("write")?;
+            fault::inject_file("write")?;
             let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
             file.set_len(bytes)?;
             Ok(file)

@@ -76,17 +76,17 @@ fn replace(target: &Path, fill: impl FnOnce(&tempfile::NamedTempFile) -> io::Res
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    fault::of_file("write")?;
+    fault::inject_file("write")?;
     fs::create_dir_all(folder)?;
     clean_once(folder);
-    fault::of_file("write")?;
+    fault::inject_file("write")?;
     let temporary = temporary_in(folder)?;
     fill(&temporary)?;
-    fault::of_file("write")?;
+    fault::inject_file("write")?;
     temporary.as_file().sync_all()?;
-    fault::of_file("write")?;
+    fault::inject_file("write")?;
     temporary.persist(target).map_err(|failed| failed.error)?;
-    fault::of_file("write")?;
+    fault::inject_file("write")?;
     sync_folder(folder)
 }
 
@@ -132,7 +132,7 @@ pub struct FaultyFile<'a>(pub &'a File);
 
 impl Write for FaultyFile<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match fault::of_transfer("write") {
+        match fault::inject_transfer("write") {
             Ok(false) => self.0.write(bytes),
             Ok(true) => self.0.write(&bytes[..bytes.len().min(1)]),
             Err(error) => {

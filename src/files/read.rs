@@ -29,7 +29,7 @@ impl Source {
 impl Read for Source {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let mut once = || {
-            let is_short = fault::of_transfer("read")?;
+            let is_short = fault::inject_transfer("read")?;
             let most = if is_short { buffer.len().min(1) } else { buffer.len() };
             self.0.read(&mut buffer[..most])
         };
@@ -50,7 +50,7 @@ impl Seek for Source {
 }
 
 fn source(path: &Path) -> io::Result<Source> {
-    fault::of_file("read")?;
+    fault::inject_file("read")?;
     Ok(Source(File::open(path)?))
 }
 
@@ -119,7 +119,7 @@ pub fn require_version(path: &Path, found: u32, known: u32) -> Result<()> {
 /// Lists the paths in a folder, in no particular order.
 pub fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     let all = || {
-        fault::of_file("read")?;
+        fault::inject_file("read")?;
         fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<io::Result<_>>()
     };
     all().map_err(Error::read(path))

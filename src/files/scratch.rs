@@ -84,7 +84,7 @@ impl State {
         let mut file = match self.file.take() {
             Some(file) => file,
             None => {
-                fault::of_file("write")?;
+                fault::inject_file("write")?;
                 std::fs::create_dir_all(folder)?;
                 tempfile::tempfile_in(folder)?
             }

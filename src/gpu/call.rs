@@ -17,8 +17,8 @@ pub(crate) fn vk_call<T>(call: &'static str, function: impl FnOnce() -> ash::pre
 
 /// The injected fault for this call, if any.
 pub(super) fn fault(call: &str) -> Option<vk::Result> {
-    let kind = match fault::at(call) {
-        None => fault::at("vulkan"),
+    let kind = match fault::injected(call) {
+        None => fault::injected("vulkan"),
         found => found,
     };
     kind.map(|kind| match kind {

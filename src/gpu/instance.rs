@@ -89,8 +89,8 @@ impl Instance {
                 "the Vulkan loader (libvulkan.so.1) cannot be loaded: {cause}; install a Vulkan driver"
             ))
         };
-        if fault::at("loader").is_some() {
-            return Err(missing(&"a fault on purpose"));
+        if fault::injected("loader").is_some() {
+            return Err(missing(&"injected fault"));
         }
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as in every Vulkan program.
         let entry = unsafe { ash::Entry::load() }.map_err(|error| missing(&error))?;

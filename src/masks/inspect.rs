@@ -7,7 +7,7 @@ use super::names;
 use labelgs_files::label_table::FILE_NAME;
 use labelgs_files::names::below;
 use labelgs_files::resize::aspect_problem;
-use labelgs_scene::sampling::every;
+use labelgs_scene::sampling::stride;
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Dataset, Error, Point, Result, View};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ pub fn inspect(dataset: &Dataset, folder: &Path) -> Result<Report> {
     let masks = masks_of_photos(folder, &names(&views))?;
     let paths: Vec<Option<&Path>> = views.iter().map(|view| masks.find(&view.name)).collect();
     // A look stores the id at each scene point.
-    let points = dataset.points.iter().step_by(every(dataset.points.len(), views.len()));
+    let points = dataset.points.iter().step_by(stride(dataset.points.len(), views.len()));
     let points: Vec<Point> = points.copied().collect();
     let stage = Stage::new("checking masks", views.len());
     let looks: Vec<Result<MaskStats, Finding>> =

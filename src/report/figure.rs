@@ -1,6 +1,6 @@
 //! Pictures of one view: side by side, or one over the other with a border that is drawn over them.
 
-use labelgs_scene::colour::{HEAT, HEAT_MAX};
+use labelgs_scene::colour::{HEAT_COLOURS, HEAT_MAX};
 use maud::{Markup, html};
 
 /// A picture: its name, and its address inside or beside the page.
@@ -72,7 +72,7 @@ fn names(panels: &[Panel]) -> String {
 
 /// Returns the scale of a map of errors: mean difference of the channels, which go from 0 to 1.
 fn scale() -> Markup {
-    let colours: Vec<String> = HEAT.iter().map(|[r, g, b]| format!("rgb({r},{g},{b})")).collect();
+    let colours: Vec<String> = HEAT_COLOURS.iter().map(|[r, g, b]| format!("rgb({r},{g},{b})")).collect();
     html! {
         span.scale { "0 " i style=(format!("background:linear-gradient(90deg,{})", colours.join(","))) {} " " (HEAT_MAX) }
     }

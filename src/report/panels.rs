@@ -4,7 +4,7 @@ use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
 use labelgs_files::image::jpeg_rgb8;
 use labelgs_files::resize::bounded_size;
-use labelgs_scene::colour::{HEAT, HEAT_MAX, on_scale};
+use labelgs_scene::colour::{HEAT_COLOURS, HEAT_MAX, colour_on_scale};
 use labelgs_scene::{Error, Photo, Result};
 use std::io::Cursor;
 
@@ -13,12 +13,12 @@ pub const LONGEST: u32 = 800;
 const QUALITY: u8 = 85;
 
 /// Returns the error of a render against its photo, the mean absolute difference of the channels, on the scale
-/// [`HEAT`]; black where the photo has no pixel.
+/// [`HEAT_COLOURS`]; black where the photo has no pixel.
 pub fn heat(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
     let of = |([r, g, b, valid], colour): (&[u8; 4], &[f32; 3])| {
         let difference = |value: f32, truth: u8| (value.clamp(0.0, 1.0) - f32::from(truth) / 255.0).abs();
         let sum = difference(colour[0], *r) + difference(colour[1], *g) + difference(colour[2], *b);
-        if *valid == 0 { [0; 3] } else { on_scale(&HEAT, sum / 3.0 / HEAT_MAX) }
+        if *valid == 0 { [0; 3] } else { colour_on_scale(&HEAT_COLOURS, sum / 3.0 / HEAT_MAX) }
     };
     photo.rgba.iter().zip(rgb).map(of).collect()
 }

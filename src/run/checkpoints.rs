@@ -43,7 +43,7 @@ impl Writer {
         let to = path.clone();
         let write = move || {
             // An injected fault can only cause a delay here.
-            let pause = || fault::at("checkpoint");
+            let pause = || fault::injected("checkpoint");
             pause();
             let whole = pending.whole()?;
             pause();

@@ -72,7 +72,7 @@ pub fn first_view(path: &Path) -> Result<Option<FirstView>> {
         return Ok(own);
     }
     let views = camera_json::views_of_model(path)?;
-    let all = Overview::of(views.iter().map(|view| &view.camera));
+    let all = Overview::from_cameras(views.iter().map(|view| &view.camera));
     Ok(all.zip(views.first()).map(|(all, view)| FirstView { up: all.up, eye: view.camera.centre() }))
 }
 

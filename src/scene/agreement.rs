@@ -1,5 +1,5 @@
-//! Whether points and photos belong to one frame: which share of the points the cameras see, and whether the nearest of
-//! them have the colours of the pixels that show them.
+//! Tests whether points and photos share a frame: the share of the points that the cameras see, and whether the nearest
+//! of them match the colours of their pixels.
 
 use super::{Camera, Photo, Point, View};
 use crate::error::Result;
@@ -7,17 +7,18 @@ use crate::view::ALPHA_CLEAR;
 use glam::DVec2;
 use std::sync::Arc;
 
-/// Most views and points that are compared: enough for shares of a thousandth, in some milliseconds.
+/// Most views that are compared. With [`POINTS_MAX`] points, shares are known to a thousandth within milliseconds.
 const VIEWS_MAX: usize = 24;
+/// Most points that are compared.
 const POINTS_MAX: usize = 20_000;
-/// Cells along a side of a photo. In each of them the nearest point hides the others.
-const CELLS: usize = 48;
+/// Cells per side of a photo. In each cell, the nearest point hides the others.
+const CELLS_PER_SIDE: usize = 48;
 /// Fewest points that are compared with pixels.
 const PAIRS_MIN: usize = 300;
-/// Least standard deviation of colours, of 255, that tells one place from another.
+/// Smallest standard deviation of colours, of 255, that distinguishes places.
 const CONTRAST_MIN: f64 = 6.0;
 
-/// A sample of views and points of a scene, or of a model as points.
+/// A sample of a scene's views and points, or of a model's Gaussians as points.
 pub struct Sample {
     views: Vec<(Camera, Option<Arc<Photo>>)>,
     points: Vec<Point>,
@@ -28,17 +29,17 @@ pub struct Sample {
 pub struct Agreement {
     /// Mean share of the points in front of a camera.
     pub in_front: f64,
-    /// Mean share of the points in the picture of a camera.
+    /// Mean share of the points inside a camera's image.
     pub in_picture: f64,
-    /// The same of the middle one of the views, by their shares.
+    /// The same for the median view.
     pub in_median_picture: f64,
-    /// Correlation of the colours of points and pixels, both relative to their means in a view; `None` without photos, or
-    /// where there is too little to compare.
+    /// Correlation between the colours of points and pixels, both relative to their means in a view. `None` without
+    /// photos, or with too few pairs or too little contrast.
     pub colour: Option<f64>,
 }
 
 impl Sample {
-    /// Takes some of the views and points. Photos that are not in memory are read.
+    /// Samples the views and points. Reads photos that are not in memory.
     pub fn new(views: &[&View], points: impl ExactSizeIterator<Item = Point>) -> Result<Self> {
         let some = views.iter().step_by(views.len().div_ceil(VIEWS_MAX).max(1));
         let view = |view: &&View| {
@@ -49,39 +50,41 @@ impl Sample {
         Ok(Self { views: some.map(view).collect::<Result<_>>()?, points: points.step_by(every).collect() })
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn point_count(&self) -> usize {
         self.points.len()
     }
 
-    /// Returns true if a camera shows none of the points.
+    /// Returns true if a camera sees none of the points.
     pub fn is_unseen(&self, camera: &Camera) -> bool {
         self.points.iter().all(|point| camera.sees(point.position).is_none())
     }
 
-    /// Compares points and views; `change` turns each camera first.
+    /// Compares points and views after applying `change` to each camera.
     pub fn agreement(&self, change: impl Fn(&mut Camera)) -> Agreement {
         let mut pairs: Vec<[f64; 6]> = Vec::new();
         let (mut front, mut shares) = (0, Vec::with_capacity(self.views.len()));
         for (camera, photo) in &self.views {
             let mut camera = camera.clone();
             change(&mut camera);
-            let mut nearest: Vec<Option<(f64, DVec2, [u8; 3])>> = vec![None; CELLS * CELLS];
+            let mut nearest: Vec<Option<(f64, DVec2, [u8; 3])>> = vec![None; CELLS_PER_SIDE * CELLS_PER_SIDE];
             let mut inside = 0;
             for point in &self.points {
                 let at = camera.to_camera(point.position);
                 front += usize::from(at.z > 0.0);
                 let Some(pixel) = camera.sees(point.position) else { continue };
                 inside += 1;
-                let cell = |at: f64, side: u32| ((at / f64::from(side) * CELLS as f64) as usize).min(CELLS - 1);
-                let cell = &mut nearest[cell(pixel.y, camera.height) * CELLS + cell(pixel.x, camera.width)];
+                let cell = |at: f64, side: u32| {
+                    ((at / f64::from(side) * CELLS_PER_SIDE as f64) as usize).min(CELLS_PER_SIDE - 1)
+                };
+                let cell = &mut nearest[cell(pixel.y, camera.height) * CELLS_PER_SIDE + cell(pixel.x, camera.width)];
                 if cell.is_none_or(|(depth, ..)| at.z < depth) {
                     *cell = Some((at.z, pixel, point.colour));
                 }
             }
             shares.push(inside as f64 / self.points.len().max(1) as f64);
             if let Some(photo) = photo {
-                pairs.extend(of_view(photo, nearest.into_iter().flatten()));
+                pairs.extend(view_colours(photo, nearest.into_iter().flatten()));
             }
         }
         shares.sort_unstable_by(f64::total_cmp);
@@ -95,8 +98,8 @@ impl Sample {
     }
 }
 
-/// Returns the colours of points and of their pixels, relative to the means of the view.
-fn of_view(photo: &Photo, nearest: impl Iterator<Item = (f64, DVec2, [u8; 3])>) -> Vec<[f64; 6]> {
+/// Returns the colours of points and of their pixels, relative to the view's means.
+fn view_colours(photo: &Photo, nearest: impl Iterator<Item = (f64, DVec2, [u8; 3])>) -> Vec<[f64; 6]> {
     let pair = |(_, pixel, [r, g, b]): (f64, DVec2, [u8; 3])| {
         let (x, y) = ((pixel.x as u32).min(photo.width - 1), (pixel.y as u32).min(photo.height - 1));
         let [pr, pg, pb, alpha] = photo.rgba[(y * photo.width + x) as usize];

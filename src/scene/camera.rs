@@ -27,7 +27,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Returns a camera at the origin of the world, along its axes. Intrinsics are fx, fy, cx and cy, px; then width and height.
+    /// Returns a camera at the world's origin, along its axes. Intrinsics are fx, fy, cx and cy, px; size is width and
+    /// height, px.
     pub fn at_origin([fx, fy, cx, cy]: [f64; 4], (width, height): (u32, u32)) -> Self {
         Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO, fx, fy, cx, cy, width, height }
     }
@@ -42,8 +43,8 @@ impl Camera {
         self.rotation.row(2)
     }
 
-    /// Returns the camera at another place of the world, looking along `forward` with `up` above. Where these are parallel,
-    /// another direction is up.
+    /// Returns the camera moved to `centre`, looking along `forward` with `up` above. If these are parallel, another
+    /// direction is up.
     pub fn placed(&self, centre: DVec3, forward: DVec3, up: DVec3) -> Self {
         let forward = forward.normalize();
         let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
@@ -67,28 +68,28 @@ impl Camera {
         self.rotation * world + self.translation
     }
 
-    /// Projects a camera-space point, px. The result is meaningful for z > 0 only.
+    /// Projects a camera-space point, px. The result is only meaningful for z > 0.
     pub fn project(&self, camera: DVec3) -> DVec2 {
         DVec2::new(self.fx * camera.x / camera.z + self.cx, self.fy * camera.y / camera.z + self.cy)
     }
 
-    /// Returns the direction of the ray through a place in the image, px: camera space, z is 1.
+    /// Returns the direction of the ray through a point in the image, px: camera space, with z = 1.
     pub fn ray(&self, pixel: DVec2) -> DVec3 {
         DVec3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
     }
 
-    /// Returns the world point at a depth, world units along the optical axis, of a place in the image, px.
+    /// Returns the world point at a depth, world units along the optical axis, behind a point in the image, px.
     pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
         self.rotation.transpose() * (self.ray(pixel) * depth - self.translation)
     }
 
-    /// Returns the centre of a pixel, px, from its index in rows from the top.
+    /// Returns the centre of a pixel, px, from its row-major index.
     pub fn pixel_centre(&self, index: usize) -> DVec2 {
         let width = self.width as usize;
         DVec2::new((index % width) as f64 + 0.5, (index / width) as f64 + 0.5)
     }
 
-    /// Returns the position of a world point in the image, px, if it is in the image.
+    /// Returns the position of a world point in the image, px, or `None` if it is outside.
     pub fn sees(&self, world: DVec3) -> Option<DVec2> {
         let at = self.to_camera(world);
         let pixel = self.project(at);
@@ -98,8 +99,9 @@ impl Camera {
         inside.then_some(pixel)
     }
 
-    /// Returns the camera turned around its centre by a Rodrigues vector in camera space, radians for small turns, and moved
-    /// by `shift`, world units. The tangent of half the angle is half the length of the vector.
+    /// Returns the camera turned around its centre by a Rodrigues vector in camera space, and moved by `shift`, world
+    /// units. The tangent of half the angle is half the vector's length, so for small turns the length is the angle in
+    /// radians.
     pub fn corrected(&self, turn: DVec3, shift: DVec3) -> Self {
         let half = 0.5 * turn;
         let rotation = DMat3::from_quat(DQuat::from_xyzw(half.x, half.y, half.z, 1.0).normalize()) * self.rotation;
@@ -113,18 +115,18 @@ impl Camera {
         Self { fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy, width, height, ..self.clone() }
     }
 
-    /// Returns the camera for the part of the image of a size that begins at a pixel.
+    /// Returns the camera for a crop of the image with a given size, whose upper left pixel is (`left`, `top`).
     pub fn cut(&self, (left, top): (u32, u32), (width, height): (u32, u32)) -> Self {
         Self { cx: self.cx - f64::from(left), cy: self.cy - f64::from(top), width, height, ..self.clone() }
     }
 
-    /// Returns the camera for an image at a share of its size, up to 1.
+    /// Returns the camera for an image scaled by `share`, at most 1.
     pub fn shrunk(&self, share: f64) -> Self {
         self.resized(side_at(self.width, share), side_at(self.height, share))
     }
 }
 
-/// Returns a side of an image at a share of its size, at least 1 px.
+/// Returns the side of an image scaled by `share`, at least 1 px.
 pub fn side_at(full: u32, share: f64) -> u32 {
     ((f64::from(full) * share).round() as u32).clamp(1, full)
 }

@@ -1,17 +1,17 @@
-//! Values of pictures as bytes.
+//! Converts values in images to bytes and colours.
 
-/// Returns the byte of a value from 0 to 1 in a picture.
+/// Converts a value from 0 to 1 to a byte.
 pub fn to_byte(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// Colours of no to much error, on which every map of errors is drawn: five of the scale inferno.
-pub const HEAT: [[u8; 3]; 5] = [[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]];
-/// Mean absolute difference of the channels that has the brightest colour of [`HEAT`]; channels go from 0 to 1.
+/// Colours of error maps, from no error to large errors: five stops of the colour map inferno.
+pub const HEAT_COLOURS: [[u8; 3]; 5] = [[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]];
+/// Mean absolute difference of the channels, 0 to 1, at the last colour of [`HEAT_COLOURS`].
 pub const HEAT_MAX: f32 = 0.25;
 
-/// Returns the colour of a share from 0 to 1 on a scale, between the two nearest of its colours.
-pub fn on_scale(scale: &[[u8; 3]], share: f32) -> [u8; 3] {
+/// Returns the colour of a share from 0 to 1 on a scale, interpolated between its stops.
+pub fn colour_on_scale(scale: &[[u8; 3]], share: f32) -> [u8; 3] {
     let last = scale.len().saturating_sub(1);
     let at = share.clamp(0.0, 1.0) * last as f32;
     let low = (at as usize).min(last.saturating_sub(1));
@@ -22,16 +22,16 @@ pub fn on_scale(scale: &[[u8; 3]], share: f32) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::{HEAT, on_scale};
+    use super::{HEAT_COLOURS, colour_on_scale};
 
     #[test]
     fn a_scale_passes_through_its_colours() {
-        for (index, colour) in HEAT.into_iter().enumerate() {
-            assert_eq!(on_scale(&HEAT, index as f32 / 4.0), colour);
+        for (index, colour) in HEAT_COLOURS.into_iter().enumerate() {
+            assert_eq!(colour_on_scale(&HEAT_COLOURS, index as f32 / 4.0), colour);
         }
-        assert_eq!(on_scale(&HEAT, -1.0), HEAT[0]);
-        assert_eq!(on_scale(&HEAT, 9.0), HEAT[4]);
-        assert_eq!(on_scale(&[[0; 3], [10, 20, 30]], 0.5), [5, 10, 15]);
-        assert_eq!((on_scale(&[], 0.5), on_scale(&[[7; 3]], 0.5)), ([0; 3], [7; 3]));
+        assert_eq!(colour_on_scale(&HEAT_COLOURS, -1.0), HEAT_COLOURS[0]);
+        assert_eq!(colour_on_scale(&HEAT_COLOURS, 9.0), HEAT_COLOURS[4]);
+        assert_eq!(colour_on_scale(&[[0; 3], [10, 20, 30]], 0.5), [5, 10, 15]);
+        assert_eq!((colour_on_scale(&[], 0.5), colour_on_scale(&[[7; 3]], 0.5)), ([0; 3], [7; 3]));
     }
 }

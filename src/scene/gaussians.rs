@@ -8,13 +8,13 @@ use glam::{DMat3, DQuat, DVec3};
 /// Largest opacity of a splat in a pixel (3DGS), as in `glsl/include/constants.glsl`.
 pub const ALPHA_MAX: f64 = 0.99;
 
-/// Returns the matrix of a rotation (w, x, y, z) of any length: its columns are the axes of the Gaussian.
+/// Returns the rotation matrix of a quaternion (w, x, y, z) of any length: its columns are the axes of the Gaussian.
 pub fn axes_of(quat: [f32; 4]) -> DMat3 {
     let [w, x, y, z] = quat.map(f64::from);
     DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
-/// Returns an opacity after the sigmoid.
+/// Returns the opacity of a logit.
 pub fn opacity_of(logit: f32) -> f64 {
     1.0 / (1.0 + (-f64::from(logit)).exp())
 }
@@ -22,7 +22,7 @@ pub fn opacity_of(logit: f32) -> f64 {
 /// The Gaussians of a scene. Parameters are stored before activation, as in the standard 3DGS PLY.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gaussians {
-    /// World position of the origin of `means`: 0 except in scenes far from the origin.
+    /// World position of the origin of `means`: 0 except in faraway scenes.
     pub origin: DVec3,
     /// Positions relative to `origin`, `[N, 3]`, world units.
     pub means: Vec<[f32; 3]>,
@@ -39,8 +39,8 @@ pub struct Gaussians {
     pub sh_rest: Vec<[f32; 3]>,
     /// Degree of the spherical harmonics, 0 to 3.
     pub sh_degree: u32,
-    /// The dilation of a splat takes opacity, so that its light stays the same (2-D filter of Mip-Splatting). A picture
-    /// without that has too much of small and distant Gaussians.
+    /// Whether the dilation of a splat lowers its opacity, so that its total light stays the same (2-D filter of
+    /// Mip-Splatting). Otherwise, small and distant Gaussians are too bright in renders.
     pub antialiased: bool,
     /// Object ids, `[N]`, 0 = unlabelled; `None` in a scene without labels.
     pub labels: Option<Vec<u32>>,
@@ -69,7 +69,7 @@ impl Gaussians {
         self.labels.as_ref().map_or(UNLABELLED, |labels| labels[row])
     }
 
-    /// Returns true without any Gaussian.
+    /// Returns true if there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
@@ -85,13 +85,13 @@ impl Gaussians {
         &self.sh_rest[row * rest..][..rest]
     }
 
-    /// Returns the same to be changed.
+    /// Returns the coefficients above degree 0 of a Gaussian, mutably.
     pub fn rest_mut(&mut self, row: usize) -> &mut [[f32; 3]] {
         let rest = self.rest_per_gaussian();
         &mut self.sh_rest[row * rest..][..rest]
     }
 
-    /// Returns an error unless all columns have the right length.
+    /// Errors unless all columns have the right length.
     pub fn check(&self) -> Result<()> {
         let (count, rest) = (self.len(), self.len() * self.rest_per_gaussian());
         let columns = [
@@ -110,7 +110,7 @@ impl Gaussians {
         Err(Error::usage(format!("Gaussians::{name}"), problem))
     }
 
-    /// Returns true if no value of a row is infinite or NaN.
+    /// Returns true if all values of a row are finite.
     pub fn is_finite(&self, row: usize) -> bool {
         let triples = [self.means[row], self.scales[row], self.sh0[row]];
         triples.iter().chain(self.rest(row)).all(|t| t.iter().all(|v| v.is_finite()))
@@ -118,7 +118,7 @@ impl Gaussians {
             && self.opacities[row].is_finite()
     }
 
-    /// Raises the degree of the spherical harmonics; new coefficients are 0. A lower degree changes nothing.
+    /// Raises the degree of the spherical harmonics; new coefficients are 0. A lower degree has no effect.
     pub fn raise_degree(&mut self, sh_degree: u32) {
         let before = self.rest_per_gaussian();
         self.sh_degree = self.sh_degree.max(sh_degree);
@@ -133,7 +133,7 @@ impl Gaussians {
         self.sh_rest = rest;
     }
 
-    /// Adds the rows of a model with the same columns, about the same origin. Labels that this one has not are left out.
+    /// Appends the rows of a model with the same columns and origin. Drops labels if this model has none.
     pub fn append(&mut self, other: Self) {
         self.means.extend(other.means);
         self.quats.extend(other.quats);
@@ -145,12 +145,12 @@ impl Gaussians {
         self.label_confidence.iter_mut().for_each(|to| to.extend(other.label_confidence.iter().flatten()));
     }
 
-    /// Returns the rows for which `keep` holds, in order.
+    /// Returns the rows for which `keep` is true, in order.
     pub fn filtered(&self, mut keep: impl FnMut(usize) -> bool) -> Self {
         self.picked(&(0..self.len()).filter(|&row| keep(row)).collect::<Vec<_>>())
     }
 
-    /// Returns some rows, in their order.
+    /// Returns the given rows in the given order.
     pub fn picked(&self, rows: &[usize]) -> Self {
         Self {
             origin: self.origin,

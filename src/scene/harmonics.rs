@@ -22,17 +22,17 @@ pub const fn coefficients(degree: u32) -> usize {
     ((degree + 1) * (degree + 1) - 1) as usize
 }
 
-/// Returns the coefficient of degree 0 that shows a value, 0 to 1.
+/// Returns the degree-0 coefficient of a value, 0 to 1.
 pub fn sh0_of(value: f64) -> f32 {
     ((value - 0.5) / SH_C0) as f32
 }
 
-/// Returns the value that a coefficient of degree 0 shows.
+/// Returns the value of a degree-0 coefficient.
 pub fn value_of(sh0: f32) -> f64 {
     0.5 + SH_C0 * f64::from(sh0)
 }
 
-/// Returns the basis functions above degree 0 in a direction, as `glsl/include/sh.glsl` has them.
+/// Returns the basis functions above degree 0 in a direction, as in `glsl/include/sh.glsl`.
 pub fn basis(DVec3 { x, y, z }: DVec3) -> [f64; COEFFICIENTS] {
     let (xx, yy, zz) = (x * x, y * y, z * z);
     [

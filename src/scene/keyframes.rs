@@ -1,38 +1,38 @@
-//! A smooth path of a camera through keyframes.
+//! A smooth camera path through keyframes.
 //!
-//! Positions and lens values are cubic Hermite curves over time, rotations cubic Bézier curves of quaternions (Kim, Kim and
-//! Shin, A general construction scheme for unit quaternion curves, 1995). The rate at a keyframe has the direction of a
-//! centripetal Catmull-Rom curve, which halves the angle between the ways there and on, and a harmonic mean of the speeds
-//! before and after (Fritsch and Butland, 1984). So equal steps give an even speed, a pause stands still, and what turns
-//! back at a keyframe does not go beyond it.
+//! Positions and intrinsics are cubic Hermite curves over time, rotations are cubic Bézier curves of quaternions (Kim,
+//! Kim and Shin, A general construction scheme for unit quaternion curves, 1995). The rate at a keyframe has the
+//! direction of a centripetal Catmull-Rom curve, which bisects the angle between the incoming and the outgoing chord.
+//! Its magnitude is a harmonic mean of the speeds before and after (Fritsch and Butland, 1984). So equal steps give a
+//! constant speed, a pause stands still, and a camera that turns back at a keyframe does not overshoot it.
 
 use super::Camera;
 use super::words::counted;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Most frames of a path: more than a day of 10 per second.
+/// Most frames of a path: more than a day at 10 per second.
 const FRAMES_MAX: f64 = 1e6;
-/// Share of the time between two frames by which the last one may miss the end: times in files are rounded.
-const LATE: f64 = 1e-6;
+/// Share of the frame interval by which the last frame may exceed the end, because times in files are rounded.
+const END_TOLERANCE: f64 = 1e-6;
 
-/// A path through keyframes, of one size of picture.
+/// A path through keyframes of the same image size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
     knots: Vec<Knot>,
 }
 
-/// A keyframe, and how the camera changes there.
+/// A keyframe and the rates of change there.
 #[derive(Clone, Debug, PartialEq)]
 struct Knot {
     time: f64,
     camera: Camera,
     /// Centre, focal lengths, principal point.
     values: [DVec3; 3],
-    /// Their changes per second.
+    /// Rates of change, per second.
     rates: [DVec3; 3],
     /// World from camera.
     turn: DQuat,
-    /// Axis in the camera's frame times radians per second.
+    /// Rotation rate in the camera's frame: axis times radians per second.
     spin: DVec3,
 }
 
@@ -46,23 +46,23 @@ impl Knot {
 }
 
 impl CameraPath {
-    /// Makes a path through cameras at times, s. Fails without any, at times that do not increase, and for pictures of
-    /// several sizes.
+    /// Creates a path through cameras at given times, s. Errors if there are none, if times do not increase, or if
+    /// image sizes differ.
     pub fn new(keyframes: Vec<(f64, Camera)>) -> Result<Self, String> {
         let mut knots: Vec<Knot> = keyframes.into_iter().map(|(time, camera)| Knot::new(time, camera)).collect();
-        let Some(first) = knots.first() else { return Err("there is none; a path has one or more".to_owned()) };
+        let Some(first) = knots.first() else { return Err("there is none; a path needs one or more".to_owned()) };
         let size = first.camera.size();
         for (at, knot) in knots.iter().enumerate() {
             let before = at.checked_sub(1).map(|before| knots[before].time);
             if !knot.time.is_finite() || before.is_some_and(|before| knot.time <= before) {
                 let before = before.map_or(String::new(), |before| format!(", after {before} s"));
-                return Err(format!("number {at} is at {} s{before}; times have to increase", knot.time));
+                return Err(format!("number {at} is at {} s{before}; times must increase", knot.time));
             }
             if knot.camera.size() != size {
                 let ((width, height), (own_width, own_height)) = (size, knot.camera.size());
                 return Err(format!(
-                    "number {at} has {own_width} x {own_height} px, the first one {width} x {height}; pictures of a path \
-                     have one size"
+                    "number {at} has {own_width} x {own_height} px, but the first has {width} x {height}; images of \
+                     a path have one size"
                 ));
             }
         }
@@ -81,8 +81,8 @@ impl CameraPath {
         self.knots.last().map_or(0.0, |last| last.time - self.knots[0].time)
     }
 
-    /// Returns the camera at a time, s; before the first keyframe and after the last one, these. At a keyframe it is exactly
-    /// that camera.
+    /// Returns the camera at a time, s, clamped to the first and last keyframe. At a keyframe it is exactly that
+    /// camera.
     pub fn at(&self, time: f64) -> Camera {
         let after = self.knots.partition_point(|knot| knot.time < time);
         match self.knots.get(after.saturating_sub(1)..=after) {
@@ -91,8 +91,8 @@ impl CameraPath {
         }
     }
 
-    /// Returns the cameras of a video with this many frames per second, from the first keyframe to the last one or shortly
-    /// before. Fails for more than a million.
+    /// Returns the cameras of a video with this many frames per second, from the first keyframe to the last, or shortly
+    /// before it. Errors for more than a million frames.
     pub fn frames(&self, per_second: f64) -> Result<Vec<Camera>, String> {
         let steps = self.duration() * per_second;
         if !(per_second > 0.0 && steps < FRAMES_MAX) {
@@ -104,11 +104,11 @@ impl CameraPath {
         }
         let (start, end) = (self.knots[0].time, self.knots[0].time + self.duration());
         let at = |frame: u32| self.at((start + f64::from(frame) / per_second).min(end));
-        Ok((0..=(steps + LATE) as u32).map(at).collect())
+        Ok((0..=(steps + END_TOLERANCE) as u32).map(at).collect())
     }
 }
 
-/// Returns the rates at a keyframe between two others; 0 at an end.
+/// Returns the rates at an inner keyframe; 0 at an end.
 fn inner_rates(knots: &[Knot], at: usize) -> ([DVec3; 3], DVec3) {
     if at == 0 || at + 1 == knots.len() {
         return ([DVec3::ZERO; 3], DVec3::ZERO);
@@ -118,8 +118,8 @@ fn inner_rates(knots: &[Knot], at: usize) -> ([DVec3; 3], DVec3) {
     ([0, 1, 2].map(|value| rate([before[value], after[value]], times)), rate([turned, turning], times))
 }
 
-/// Returns the rates at an end, where the change is even; `from` is the first keyframe of the part there, `inner` the one
-/// beside the end.
+/// Returns the rates at an end, so that the change there is even. `from` is the first keyframe of the end segment,
+/// `inner` the neighbour of the end.
 fn end_rates(knots: &[Knot], from: usize, inner: usize) -> ([DVec3; 3], DVec3) {
     let (chord, turn) = chords(knots, from);
     if knots.len() == 2 {
@@ -130,7 +130,7 @@ fn end_rates(knots: &[Knot], from: usize, inner: usize) -> ([DVec3; 3], DVec3) {
     ([0, 1, 2].map(|value| free(chord[value], inner.rates[value])), free(turn, inner.spin))
 }
 
-/// Returns the mean rates from a keyframe to the next one: of the values, and of the turn, the shorter way.
+/// Returns the mean rates from a keyframe to the next one: of the values, and of the rotation along the shorter way.
 fn chords(knots: &[Knot], from: usize) -> ([DVec3; 3], DVec3) {
     let (a, b) = (&knots[from], &knots[from + 1]);
     let time = b.time - a.time;
@@ -143,13 +143,13 @@ fn rate([before, after]: [DVec3; 2], [time_before, time_after]: [f64; 2]) -> DVe
     if speeds.contains(&0.0) {
         return DVec3::ZERO;
     }
-    // The speed of the shorter time weighs more.
+    // The speed of the shorter interval has more weight.
     let weights = [2.0 * time_after + time_before, time_after + 2.0 * time_before];
     let speed = (weights[0] + weights[1]) / (weights[0] / speeds[0] + weights[1] / speeds[1]);
     0.5 * (before / speeds[0] + after / speeds[1]) * speed
 }
 
-/// Returns the camera between two keyframes at a share of the time.
+/// Returns the camera between two keyframes at a share of the interval.
 fn segment(from: &Knot, to: &Knot, share: f64) -> Camera {
     let time = to.time - from.time;
     let (left, share2, share3) = (1.0 - share, share * share, share * share * share);
@@ -178,7 +178,7 @@ fn segment(from: &Knot, to: &Knot, share: f64) -> Camera {
     }
 }
 
-/// Returns axis times angle of a rotation, the shorter way.
+/// Returns the axis times the angle of a rotation, along the shorter way.
 fn vector_of(turn: DQuat) -> DVec3 {
     (if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis()
 }
@@ -310,7 +310,7 @@ mod tests {
             assert!(problem.contains(part), "{problem}");
         };
         refused(vec![], "one or more");
-        refused(vec![(0.0, a.clone()), (0.0, a.clone())], "number 1 is at 0 s, after 0 s; times have to increase");
+        refused(vec![(0.0, a.clone()), (0.0, a.clone())], "number 1 is at 0 s, after 0 s; times must increase");
         refused(vec![(0.0, a.clone()), (-1.0, a.clone())], "number 1 is at -1 s");
         refused(vec![(f64::NAN, a.clone())], "number 0 is at NaN s");
         refused(vec![(0.0, a.clone()), (1.0, Camera { width: 65, ..a.clone() })], "number 1 has 65 x 48 px");

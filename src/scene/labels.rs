@@ -3,8 +3,8 @@
 /// Id of the background, in masks and in models.
 pub const UNLABELLED: u32 = 0;
 
-/// Occluders of each object in a view: the objects that hide a part of it, 0 for what has no label. Keys and lists are
-/// sorted.
+/// Occluders of each object in a view: the objects that hide a part of it, with 0 for unlabelled occluders. Keys and
+/// lists are sorted.
 pub type Occluders = std::collections::BTreeMap<u16, Vec<u16>>;
 
 /// Largest id in masks.
@@ -30,7 +30,7 @@ impl LabelMap {
         self.ids[(y * self.width + x) as usize]
     }
 
-    /// Returns the id at column `x` and row `y`; `None` outside.
+    /// Returns the id at column `x` and row `y`, or `None` outside the map.
     pub fn get(&self, x: u32, y: u32) -> Option<u16> {
         (x < self.width && y < self.height).then(|| self.at(x, y))
     }
@@ -40,7 +40,7 @@ impl LabelMap {
         objects_of(&self.ids)
     }
 
-    /// Returns the rectangle of all objects: left, top, and right and bottom beyond it, px; `None` without an object.
+    /// Returns the bounding box of all objects: left, top, and exclusive right and bottom, px. `None` without objects.
     pub fn bounds(&self) -> Option<[u32; 4]> {
         let mut found: Option<[u32; 4]> = None;
         for (y, row) in (0..).zip(self.ids.chunks(self.width.max(1) as usize)) {
@@ -53,7 +53,7 @@ impl LabelMap {
         found
     }
 
-    /// Returns the map at a size of at least 1 x 1 px, by the id at the middle of each pixel.
+    /// Returns the map resized to at least 1 x 1 px, by the id at the centre of each pixel.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let from =
             |to: u32, size: u32, full: u32| ((u64::from(to) * 2 + 1) * u64::from(full) / (2 * u64::from(size))) as u32;
@@ -61,15 +61,15 @@ impl LabelMap {
         Self { width, height, ids: (0..height).flat_map(row).collect() }
     }
 
-    /// Returns the upper left part, of at most the size of the map.
+    /// Returns the upper left part, clamped to the size of the map.
     pub fn upper_left(&self, width: u32, height: u32) -> Self {
         let (width, height) = (width.min(self.width), height.min(self.height));
         let rows = self.ids.chunks(self.width.max(1) as usize).take(height as usize);
         Self { width, height, ids: rows.flat_map(|row| &row[..width as usize]).copied().collect() }
     }
 
-    /// Returns the city-block distance of each pixel with an id to the next one without, 0 there, px. The border of the picture
-    /// counts as without.
+    /// Returns the city-block distance of each pixel with the id to the nearest pixel without it, px; 0 for other
+    /// pixels. Pixels outside the image count as pixels without the id.
     pub fn depths(&self, id: u16) -> Vec<u32> {
         let (width, height) = (self.width as usize, self.height as usize);
         let mut depths: Vec<u32> = self.ids.iter().map(|&other| if other == id { u32::MAX / 2 } else { 0 }).collect();
@@ -95,7 +95,7 @@ impl LabelMap {
     /// Returns true for pixels with another id within `distance` px, in a square window.
     pub fn near_contour(&self, distance: u32) -> Vec<bool> {
         let (width, height, distance) = (self.width as usize, self.height as usize, distance as usize);
-        // Smallest and largest id over rows, then over columns: they differ near a contour.
+        // Smallest and largest id over rows, then over columns: they differ near contours.
         let rows = || self.ids.chunks(width.max(1));
         let (across, down) = (distance.min(width.saturating_sub(1)), distance.min(height.saturating_sub(1)));
         let low: Vec<u16> = rows().flat_map(|row| widened(row, across, 1, u16::min)).collect();
@@ -105,7 +105,7 @@ impl LabelMap {
     }
 }
 
-/// Returns for each value the one that `pick` takes of it and those up to `steps` before and after it, `stride` apart.
+/// Folds each value with `pick` over itself and up to `steps` values before and after it, `stride` apart.
 #[inline]
 fn widened(values: &[u16], steps: usize, stride: usize, pick: impl Fn(u16, u16) -> u16) -> Vec<u16> {
     let mut found = values.to_vec();
@@ -121,7 +121,7 @@ pub fn label_colours<T: Copy + Into<u32>>(ids: &[T]) -> Vec<[u8; 3]> {
     ids.iter().map(|&id| label_colour(id.into())).collect()
 }
 
-/// Returns the display colour of an id: hues a golden ratio apart; 0 is black.
+/// Returns the display colour of an id: hues are a golden ratio apart; 0 is black.
 pub fn label_colour(id: u32) -> [u8; 3] {
     if id == UNLABELLED {
         return [0; 3];

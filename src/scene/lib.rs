@@ -1,14 +1,13 @@
 //! Plain host data of a scene, options and errors; no Vulkan, no files.
 //!
-//! A [`Dataset`] has [`View`]s (a [`Camera`] with [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is the model. A
-//! [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] orders cameras, a [`keyframes::CameraPath`] goes
-//! smoothly through some, an [`Overview`] is what they look at.
-//! A [`Zone`] is a box.
+//! A [`Dataset`] has [`View`]s (a [`Camera`] with the [`Pixels`] of photo and mask) and [`Point`]s; [`Gaussians`] is
+//! the model. A [`LabelMap`] has an object id per pixel, a [`DepthMap`] a depth. [`path`] orders cameras, a
+//! [`keyframes::CameraPath`] passes smoothly through some, an [`Overview`] describes what they look at, and a [`Zone`]
+//! is a box.
 
 pub mod agreement;
 pub mod camera;
 pub mod colour;
-pub mod crew;
 pub mod depth;
 pub mod direction;
 pub mod error;
@@ -21,6 +20,7 @@ pub mod median;
 pub mod options;
 pub mod origin;
 pub mod overview;
+pub mod parallel;
 pub mod path;
 pub mod phases;
 pub mod pixels;
@@ -40,5 +40,5 @@ pub use labels::{LABEL_MAX, LabelMap, MODEL_LABEL_MAX, Occluders, UNLABELLED, la
 pub use overview::Overview;
 pub use pixels::Pixels;
 pub use view::stems;
-pub use view::{ColourMatrix, Dataset, Flaw, Photo, Point, View};
+pub use view::{ColourMatrix, Dataset, Photo, Point, SceneProblem, View};
 pub use zone::Zone;

@@ -1,16 +1,17 @@
-//! Scenes far from the origin, such as in UTM coordinates: f32 positions are relative to a point near their middle.
+//! Origins for faraway scenes, such as in UTM coordinates: f32 positions are relative to a point near the scene's
+//! centre.
 
 use super::median::median;
 use glam::DVec3;
 
-/// Ratio of distance from the origin to size above which a scene counts as far. At this ratio f32 rounds positions to
-/// 1.5e-5 of the scene size, a hundredth of a pixel; farther away the error soon reaches pixels.
+/// A scene is far if its distance from the origin exceeds its size by this factor. At this factor, f32 rounds positions
+/// to 1.5e-5 of the scene size, a hundredth of a pixel; farther away, the error soon reaches pixels.
 const FAR_RATIO: f64 = 256.0;
 /// Size of a scene with a single position, world units.
 const SIZE_OF_A_POINT: f64 = 10.0;
 
-/// Returns the best origin for positions: 0 unless the scene is far away. Its coordinates are multiples of a power of
-/// two above the size of the scene, so that the subtraction loses little.
+/// Returns the best origin for positions: 0 unless the scene is far. Its coordinates are multiples of a power of two
+/// above the size of the scene, so that the subtraction loses little precision.
 pub fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     if positions.is_empty() {
         return DVec3::ZERO;
@@ -19,7 +20,7 @@ pub fn far_origin<P: Copy + Into<DVec3>>(positions: &[P]) -> DVec3 {
     // Medians, because outliers may be anywhere.
     let middle = by_axis(|axis| median(along(axis)).unwrap_or(0.0));
     let size = by_axis(|axis| median(along(axis).map(|value| (value - middle[axis]).abs())).unwrap_or(0.0)).length();
-    // Positions at one place have no size.
+    // Coinciding positions have no size.
     let size = if size > 0.0 { size } else { SIZE_OF_A_POINT };
     if !(middle.length() > FAR_RATIO * size) || !middle.is_finite() {
         return DVec3::ZERO;

@@ -1,41 +1,41 @@
-//! What the cameras of a scene look at together.
+//! The region that a scene's cameras look at.
 
 use super::Camera;
 use super::principal::principal_axes;
 use super::spread::quantiles;
 use glam::{DMat3, DVec3};
 
-/// Share of the positions, along each axis from either end, that says nothing about the way up.
-const OUTSIDE: f64 = 0.05;
-/// Largest height of a flat model, in its smaller width.
-const FLAT: f64 = 0.35;
-/// Least cosine between the normal of a flat model and the upward axis of COLMAP at which this one tells up from down.
-const UPRIGHT: f64 = 0.5;
-/// Least ratio of the heights above and below the middle of a flat model at which things stand on it.
-const STANDING: f64 = 1.5;
+/// Share of the positions at either end of each axis that is ignored when finding the up direction.
+const OUTLIER_SHARE: f64 = 0.05;
+/// A model is flat if its height is at most this multiple of its smaller width.
+const FLAT_HEIGHT_MAX: f64 = 0.35;
+/// Smallest cosine between a flat model's normal and COLMAP's up axis for that axis to decide which side is up.
+const UP_COSINE_MIN: f64 = 0.5;
+/// Smallest ratio of the heights above and below a flat model's centre for objects to be standing on it.
+const STANDING_RATIO_MIN: f64 = 1.5;
 
-/// Where to look at a scene from.
+/// A position and distance from which to look at a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overview {
     /// Direction of up in the world, of length 1.
     pub up: DVec3,
-    /// The point in the middle, world units.
+    /// Centre of the region, world units.
     pub target: DVec3,
-    /// Distance of the cameras from it, world units.
+    /// Mean distance of the cameras from the centre, world units.
     pub distance: f64,
 }
 
 impl Overview {
-    /// Returns the mean up of some cameras, the point that they look at, and their mean distance from it; none without
-    /// cameras.
-    pub fn of<'a>(cameras: impl Iterator<Item = &'a Camera> + Clone) -> Option<Self> {
+    /// Returns the mean up direction of some cameras, the point that they look at, and their mean distance from it;
+    /// `None` without cameras.
+    pub fn from_cameras<'a>(cameras: impl Iterator<Item = &'a Camera> + Clone) -> Option<Self> {
         let count = cameras.clone().count();
         if count == 0 {
             return None;
         }
         let up = -cameras.clone().map(|camera| camera.rotation.row(1)).sum::<DVec3>();
         let middle = cameras.clone().map(Camera::centre).sum::<DVec3>() / count as f64;
-        // Held near the cameras where their axes are parallel.
+        // Regularised towards the cameras, because their axes may be parallel.
         let (matrix, right) = nearest_to_axes(cameras.clone());
         let target = (matrix + DMat3::IDENTITY * 1e-3).inverse() * (right + middle * 1e-3);
         let distance = cameras.map(|camera| camera.centre().distance(target)).sum::<f64>() / count as f64;
@@ -43,11 +43,11 @@ impl Overview {
     }
 }
 
-/// Returns the likely way up of positions without cameras, of length 1. A model that is flat, as land, a room or a table are, lies
-/// on its plane; its upper side is the one near -y, which points up in most captures (COLMAP), or the one to which
-/// things stand out. A model that is not flat has -y.
+/// Returns the likely unit up direction of positions without cameras. A flat model, such as terrain, a room or a table,
+/// lies on its plane. Its upper side is the one near -y, which is up in most captures (COLMAP), or else the one on
+/// which objects stand. A model that is not flat has up -y.
 pub fn likely_up(positions: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
-    let [low, high] = quantiles(positions.clone(), [OUTSIDE, 1.0 - OUTSIDE]);
+    let [low, high] = quantiles(positions.clone(), [OUTLIER_SHARE, 1.0 - OUTLIER_SHARE]);
     let inside = positions.filter(|place| place.cmpge(low).all() && place.cmple(high).all());
     let count = inside.clone().count().max(1) as f64;
     let middle = inside.clone().sum::<DVec3>() / count;
@@ -57,22 +57,23 @@ pub fn likely_up(positions: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
     let normal = axes.col(order[0]);
-    if sizes[order[0]] >= FLAT * sizes[order[1]] {
+    if sizes[order[0]] >= FLAT_HEIGHT_MAX * sizes[order[1]] {
         return DVec3::NEG_Y;
     }
-    if normal.y.abs() >= UPRIGHT {
+    if normal.y.abs() >= UP_COSINE_MIN {
         return normal * -normal.y.signum();
     }
     let heights = inside.map(|place| DVec3::X * (place - middle).dot(normal));
-    let [below, level, above] = quantiles(heights, [OUTSIDE, 0.5, 1.0 - OUTSIDE]).map(|height| height.x);
+    let [below, level, above] = quantiles(heights, [OUTLIER_SHARE, 0.5, 1.0 - OUTLIER_SHARE]).map(|height| height.x);
     match (above - level, level - below) {
-        (above, below) if above > STANDING * below => normal,
-        (above, below) if below > STANDING * above => -normal,
+        (above, below) if above > STANDING_RATIO_MIN * below => normal,
+        (above, below) if below > STANDING_RATIO_MIN * above => -normal,
         _ => DVec3::NEG_Y,
     }
 }
 
-/// Returns matrix and right side of the equations for the point with the least sum of squared distances to the optical axes.
+/// Returns the matrix and right-hand side of the linear system for the point with the smallest sum of squared distances
+/// to the optical axes.
 pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>) -> (DMat3, DVec3) {
     let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
     for camera in cameras {

@@ -1,5 +1,5 @@
-//! Where the time of a training goes: seconds of each phase on the thread that trains. A phase inside of another one does not
-//! count to that one.
+//! Time per phase of a training, in seconds, on the training thread. Time in a nested phase does not count for the
+//! outer one.
 
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
@@ -7,17 +7,17 @@ use std::time::{Duration, Instant};
 /// A phase of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Steps, and whatever follows that has no phase of its own, such as progress.
+    /// Steps, and all work without a phase of its own, such as progress displays.
     Steps,
-    /// Kernels are compiled and lists recorded.
+    /// Compiling kernels and recording command lists.
     Compile,
-    /// Buffers grow.
+    /// Growing buffers.
     Grow,
-    /// Gaussians are added and removed.
+    /// Adding and removing Gaussians.
     Densify,
-    /// Checkpoints are written.
+    /// Writing checkpoints.
     Checkpoint,
-    /// Models and previews are written.
+    /// Writing models and previews.
     Output,
 }
 
@@ -33,7 +33,7 @@ impl Phase {
     ];
 }
 
-/// Sums, and when the present phase went on.
+/// The sums, and when the current phase started.
 #[derive(Debug, Default)]
 struct Clock {
     sums: [Duration; Phase::ALL.len()],
@@ -41,7 +41,7 @@ struct Clock {
 }
 
 impl Clock {
-    /// Goes on with a phase, or with none. Returns the one before.
+    /// Enters a phase, or leaves all of them. Returns the previous phase.
     fn enter(&mut self, phase: Option<Phase>) -> Option<Phase> {
         let before = self.now.take();
         if let Some((phase, since)) = before {
@@ -56,7 +56,7 @@ thread_local! {
     static CLOCK: RefCell<Clock> = RefCell::default();
 }
 
-/// Does work of a phase.
+/// Runs work as part of a phase.
 pub fn timed<T>(phase: Phase, work: impl FnOnce() -> T) -> T {
     let before = CLOCK.with_borrow_mut(|clock| clock.enter(Some(phase)));
     let done = work();
@@ -64,7 +64,7 @@ pub fn timed<T>(phase: Phase, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Takes the seconds of each phase since they were last taken, by name.
+/// Returns the seconds of each phase since the last call, by name.
 pub fn take() -> Vec<(&'static str, f64)> {
     let sums = CLOCK.with_borrow_mut(|clock| std::mem::take(&mut clock.sums));
     Phase::ALL.iter().map(|&(phase, name)| (name, sums[phase as usize].as_secs_f64())).collect()

@@ -1,25 +1,26 @@
-//! Pixels of a view: in memory, or made each time they are asked for.
+//! Pixels of a view: in memory, or made on demand.
 //!
-//! Photos and masks of a large scene do not fit into memory. A view holds [`Pixels`] of each, which are the same bits
-//! wherever they come from; what is often asked of all views, such as the objects of a mask, is known without them.
+//! Photos and masks of a large scene do not fit into memory. A view has [`Pixels`] of each, whose bits do not depend on
+//! where they are stored. Facts that are often needed for all views, such as the objects of a mask, are available
+//! without the pixels.
 
 use super::{LabelMap, Photo};
 use crate::error::Result;
 use std::fmt;
 use std::sync::Arc;
 
-/// Where pixels come from that are not in memory.
-pub trait Source<T>: fmt::Debug + Send + Sync {
-    /// Makes the pixels: the same each time.
+/// Makes pixels that are not in memory.
+pub trait PixelSource<T>: fmt::Debug + Send + Sync {
+    /// Makes the pixels; the result is the same each time.
     fn make(&self) -> Result<Arc<T>>;
 
-    /// Number of pictures that may be made at the same time, so that all of them have the memory for it.
+    /// Returns how many images may be made at the same time within the available memory.
     fn at_once(&self) -> usize;
 }
 
-/// What is known of pixels without having them.
+/// What is known about pixels without loading them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Facts {
+pub struct PixelFacts {
     /// CRC-32 of the pixels.
     pub crc: u32,
     /// Ids of a mask, sorted, without 0.
@@ -27,11 +28,11 @@ pub struct Facts {
 }
 
 /// A photo or a mask.
-pub trait Picture {
+pub trait PixelBuffer {
     /// Returns the pixels as bytes.
     fn bytes(&self) -> &[u8];
 
-    /// Returns the ids of a mask, sorted, without 0; none of a photo.
+    /// Returns the ids of a mask, sorted, without 0; empty for a photo.
     fn ids(&self) -> Vec<u16>;
 
     /// Returns the CRC-32 of the pixels.
@@ -39,13 +40,13 @@ pub trait Picture {
         crc32fast::hash(self.bytes())
     }
 
-    /// Returns what is known of the pixels.
-    fn facts(&self) -> Facts {
-        Facts { crc: self.crc(), objects: self.ids() }
+    /// Returns the facts about the pixels.
+    fn facts(&self) -> PixelFacts {
+        PixelFacts { crc: self.crc(), objects: self.ids() }
     }
 }
 
-impl Picture for Photo {
+impl PixelBuffer for Photo {
     fn bytes(&self) -> &[u8] {
         self.rgba.as_flattened()
     }
@@ -55,7 +56,7 @@ impl Picture for Photo {
     }
 }
 
-impl Picture for LabelMap {
+impl PixelBuffer for LabelMap {
     fn bytes(&self) -> &[u8] {
         bytemuck::cast_slice(&self.ids)
     }
@@ -65,53 +66,53 @@ impl Picture for LabelMap {
     }
 }
 
-/// A photo, a mask, or other pixels of a view. Copies are cheap.
-pub struct Pixels<T>(Place<T>);
+/// A photo, a mask, or other pixels of a view. Clones are cheap.
+pub struct Pixels<T>(Storage<T>);
 
-enum Place<T> {
+enum Storage<T> {
     Held(Arc<T>),
-    Made(Arc<dyn Source<T>>, Arc<Facts>),
+    Made(Arc<dyn PixelSource<T>>, Arc<PixelFacts>),
 }
 
 impl<T> Pixels<T> {
-    /// Takes pixels that `source` makes.
-    pub fn made(source: Arc<dyn Source<T>>, facts: Facts) -> Self {
-        Self(Place::Made(source, Arc::new(facts)))
+    /// Creates pixels that `source` makes on demand.
+    pub fn from_source(source: Arc<dyn PixelSource<T>>, facts: PixelFacts) -> Self {
+        Self(Storage::Made(source, Arc::new(facts)))
     }
 
-    /// Returns the pixels. Those that are not in memory are read, and stay in memory as long as the result lives.
+    /// Returns the pixels. If they are not in memory, loads them and keeps them for as long as the result lives.
     ///
     /// # Errors
     ///
-    /// Files that cannot be read any more, or have changed since the scene was opened.
+    /// Files that can no longer be read, or have changed since the scene was opened.
     pub fn get(&self) -> Result<Arc<T>> {
         match &self.0 {
-            Place::Held(pixels) => Ok(Arc::clone(pixels)),
-            Place::Made(source, _) => source.make(),
+            Storage::Held(pixels) => Ok(Arc::clone(pixels)),
+            Storage::Made(source, _) => source.make(),
         }
     }
 
     /// Returns true if the pixels are in memory.
     pub fn is_held(&self) -> bool {
-        matches!(self.0, Place::Held(_))
+        matches!(self.0, Storage::Held(_))
     }
 
-    /// Number of such pictures that may be asked for at the same time.
+    /// Returns how many such images may be loaded at the same time.
     pub fn at_once(&self) -> usize {
         match &self.0 {
-            Place::Held(_) => usize::MAX,
-            Place::Made(source, _) => source.at_once().max(1),
+            Storage::Held(_) => usize::MAX,
+            Storage::Made(source, _) => source.at_once().max(1),
         }
     }
 }
 
 impl<T: Clone> Pixels<T> {
-    /// Changes the pixels of this copy, which are in memory from then on.
+    /// Changes the pixels of this copy, which then stay in memory.
     pub fn edit(&mut self, change: impl FnOnce(&mut T)) -> Result<()> {
         if !self.is_held() {
             *self = self.get()?.into();
         }
-        if let Place::Held(pixels) = &mut self.0 {
+        if let Storage::Held(pixels) = &mut self.0 {
             change(Arc::make_mut(pixels));
         }
         Ok(())
@@ -122,25 +123,25 @@ impl Pixels<LabelMap> {
     /// Returns the ids of the mask, sorted, without 0.
     pub fn objects(&self) -> Vec<u16> {
         match &self.0 {
-            Place::Held(pixels) => pixels.objects(),
-            Place::Made(_, facts) => facts.objects.clone(),
+            Storage::Held(pixels) => pixels.objects(),
+            Storage::Made(_, facts) => facts.objects.clone(),
         }
     }
 }
 
-impl<T: Picture> Pixels<T> {
+impl<T: PixelBuffer> Pixels<T> {
     /// Returns the CRC-32 of the pixels.
     pub fn crc(&self) -> u32 {
         match &self.0 {
-            Place::Held(pixels) => pixels.crc(),
-            Place::Made(_, facts) => facts.crc,
+            Storage::Held(pixels) => pixels.crc(),
+            Storage::Made(_, facts) => facts.crc,
         }
     }
 }
 
 impl<T> From<Arc<T>> for Pixels<T> {
     fn from(pixels: Arc<T>) -> Self {
-        Self(Place::Held(pixels))
+        Self(Storage::Held(pixels))
     }
 }
 
@@ -153,8 +154,8 @@ impl<T> From<T> for Pixels<T> {
 impl<T> Clone for Pixels<T> {
     fn clone(&self) -> Self {
         Self(match &self.0 {
-            Place::Held(pixels) => Place::Held(Arc::clone(pixels)),
-            Place::Made(source, facts) => Place::Made(Arc::clone(source), Arc::clone(facts)),
+            Storage::Held(pixels) => Storage::Held(Arc::clone(pixels)),
+            Storage::Made(source, facts) => Storage::Made(Arc::clone(source), Arc::clone(facts)),
         })
     }
 }

@@ -1,14 +1,15 @@
-//! Axes of a cloud of points.
+//! Principal axes of a point cloud.
 
 use glam::{DMat3, DVec3};
 
-/// Sweeps of the eigenvalue iteration; five reach double precision for 3 x 3.
-const SWEEPS: usize = 8;
+/// Sweeps of the eigenvalue iteration; five reach double precision for a 3 x 3 matrix.
+const JACOBI_SWEEPS: usize = 8;
 
-/// Returns a rotation, whose columns are the axes, and the deviations along them, of a covariance. Jacobi's method.
+/// Returns the rotation whose columns are the principal axes of a covariance, and the standard deviations along them.
+/// Uses Jacobi's method.
 pub fn principal_axes(covariance: &DMat3) -> (DMat3, [f64; 3]) {
     let (mut matrix, mut turn) = (*covariance, DMat3::IDENTITY);
-    for _ in 0..SWEEPS {
+    for _ in 0..JACOBI_SWEEPS {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let off = matrix.col(q)[p];
             if off == 0.0 {

@@ -1,15 +1,16 @@
-//! Samples of points that are very many.
+//! Samples of very many points.
 
-/// Most tests of points against views, for one purpose: about a second.
+/// Most tests of points against views for a single purpose: about a second.
 pub const TESTS_MAX: usize = 50_000_000;
 
-/// Returns n: each n-th of `points`, tested against each of `views`, makes up to [`TESTS_MAX`] tests.
-pub fn every(points: usize, views: usize) -> usize {
+/// Returns the sampling stride: testing each n-th of `points` against each of `views` makes at most [`TESTS_MAX`]
+/// tests.
+pub fn stride(points: usize, views: usize) -> usize {
     points.saturating_mul(views) / TESTS_MAX + 1
 }
 
-/// Returns the numbers below `count` by rank, in an order for samples: each once. Those of the first ranks, however many, are spread evenly; the same
-/// count has the same order.
+/// Returns a permutation of the numbers below `count`, by rank, for taking samples. The numbers at the first ranks,
+/// however many, are spread evenly. The order depends only on `count`.
 pub fn spread_order(count: usize) -> impl Fn(usize) -> usize + Sync {
     let divisor = |mut a: usize, mut b: usize| {
         while b > 0 {
@@ -17,7 +18,7 @@ pub fn spread_order(count: usize) -> impl Fn(usize) -> usize + Sync {
         }
         a
     };
-    // Multiples of the golden ratio fall into the largest gaps; a step without a common divisor reaches every number.
+    // Multiples of the golden ratio fall into the largest gaps; a step coprime to `count` reaches every number.
     let step = (count as f64 * 0.618_033_988_75) as usize;
     let step = (step.max(1)..).find(|&step| divisor(step, count) <= 1).unwrap_or(1);
     move |rank| (rank as u128 * step as u128 % count.max(1) as u128) as usize

@@ -9,14 +9,14 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Red, green and blue of a photo, each from red, green and blue of the scene: its exposure and white balance.
+/// A matrix from the scene's colours (r, g, b) to a photo's: its exposure and white balance.
 pub type ColourMatrix = [[f32; 3]; 3];
 
-/// A decoded photo, row-major RGBA8. Alpha is 255 for valid pixels, and 0 for pixels outside of the original image
-/// after undistortion. Pixels with alpha 0 do not count in any loss or score.
+/// A decoded photo, row-major RGBA8. Alpha is 255 for valid pixels, and 0 for pixels outside the original image after
+/// undistortion. Pixels with alpha 0 count in no loss or score.
 ///
-/// A transparent photo that came without a colour behind it has its colours over black, and in alpha also its opacity o:
-/// 128 + 127 o in valid pixels.
+/// A transparent photo without a given background has its colours over black. Its alpha then also encodes the opacity
+/// o: 128 + 127 o in valid pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Photo {
     /// Width, px.
@@ -27,16 +27,16 @@ pub struct Photo {
     pub rgba: Vec<[u8; 4]>,
 }
 
-/// Alpha of a valid pixel that shows nothing but what is behind it.
+/// Alpha of a valid, fully transparent pixel.
 pub const ALPHA_CLEAR: u8 = 128;
 
-/// Returns the alpha of a valid pixel of an opacity from 0 to 1.
+/// Returns the alpha of a valid pixel with an opacity from 0 to 1.
 pub fn alpha_of(opacity: f64) -> u8 {
     ALPHA_CLEAR + (f64::from(u8::MAX - ALPHA_CLEAR) * opacity).round() as u8
 }
 
 impl Photo {
-    /// Returns the colours over a colour of r, g, b from 0 to 1; none if the photo is opaque.
+    /// Blends the photo over a colour (r, g, b, 0 to 1); `None` if the photo is opaque.
     pub fn over(&self, behind: [f32; 3]) -> Option<Vec<[u8; 4]>> {
         let shows = |alpha: u8| (ALPHA_CLEAR..u8::MAX).contains(&alpha);
         let over = |&[r, g, b, alpha]: &[u8; 4]| {
@@ -50,7 +50,7 @@ impl Photo {
         self.rgba.iter().any(|texel| shows(texel[3])).then(|| self.rgba.iter().map(over).collect())
     }
 
-    /// Returns true if any pixel counts.
+    /// Returns true if any pixel is valid.
     pub fn has_valid(&self) -> bool {
         self.rgba.iter().any(|texel| texel[3] > 0)
     }
@@ -61,7 +61,7 @@ impl Photo {
     }
 }
 
-/// A posed photo. Copies share photo and mask.
+/// A posed photo. Clones share the photo and the mask.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Name in the data set, such as `00.jpg` or `left/00.jpg`.
@@ -108,19 +108,19 @@ pub struct Point {
     pub colour: [u8; 3],
 }
 
-/// What is wrong with a scene as it was read.
+/// A problem found while reading a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Flaw {
-    /// Photos were left out: missing, damaged, or with a stray pose.
+pub enum SceneProblem {
+    /// Photos were omitted: missing, damaged, or with an outlier pose.
     LeftOut(String),
-    /// Many photos beside those of the scene have no pose.
+    /// Many photos in the scene's folder have no pose.
     Unposed(String),
-    /// Poses and points are not in one frame.
+    /// Poses and points do not share a frame.
     Frame(String),
 }
 
-impl Flaw {
-    /// Returns it in words.
+impl SceneProblem {
+    /// Returns the description.
     pub fn text(&self) -> &str {
         let (Self::LeftOut(text) | Self::Unposed(text) | Self::Frame(text)) = self;
         text
@@ -138,19 +138,19 @@ pub struct Dataset {
     pub train: Vec<View>,
     /// Held-out views, sorted by name.
     pub test: Vec<View>,
-    /// The photos show the objects of the masks alone, and those to train on are cut to them.
+    /// Whether the photos show only the objects of the masks, with the training photos cropped to them.
     pub objects_only: bool,
     /// Initial points; may be empty.
     pub points: Vec<Point>,
-    /// Notes for the user about reading, a line each.
+    /// Notes for the user about reading, one per line.
     pub notes: Vec<String>,
-    /// What of the scene was left out or does not fit. Notes say it too.
-    pub flaws: Vec<Flaw>,
+    /// What was omitted from the scene or does not fit. The notes say so too.
+    pub flaws: Vec<SceneProblem>,
 }
 
-/// Radii of the spread of the cameras within which they count for the extent: a few wrong poses would change learning
-/// rates and limits of size for the whole scene.
-const EXTENT_RADII: f64 = 5.0;
+/// Cameras farther than this many radii of their spread do not count for the extent: a few wrong poses would change
+/// learning rates and size limits for the whole scene.
+const EXTENT_RADII_MAX: f64 = 5.0;
 
 impl Dataset {
     /// Returns all views, sorted by name.
@@ -160,12 +160,12 @@ impl Dataset {
         views
     }
 
-    /// Returns the radius of the training cameras around their mean, times 1.1 (as in 3DGS), world units; 1 if it is
-    /// only rounding errors. Cameras beyond `EXTENT_RADII` do not count.
+    /// Returns the radius of the training cameras around their mean, times 1.1 (as in 3DGS), world units; 1 if the
+    /// radius is only rounding error. Ignores cameras beyond `EXTENT_RADII_MAX`.
     pub fn extent(&self) -> f64 {
         let all = self.train.iter().map(|view| view.camera.centre());
-        let spread = Spread::of(all.clone());
-        let is_usual = |centre: &DVec3| spread.is_none_or(|spread| spread.distance(*centre) <= EXTENT_RADII);
+        let spread = Spread::measure(all.clone());
+        let is_usual = |centre: &DVec3| spread.is_none_or(|spread| spread.distance(*centre) <= EXTENT_RADII_MAX);
         let centres: Vec<DVec3> = all.filter(is_usual).collect();
         if centres.is_empty() {
             return 1.0;

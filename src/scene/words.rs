@@ -1,11 +1,11 @@
-//! Words of messages: counts, and names for a misspelt one.
+//! Wording of messages: counts, and suggestions for misspelt names.
 
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Most names that a message offers for a misspelt one.
+/// Most suggestions for a misspelt name.
 const OFFERED_MAX: usize = 3;
-/// Least similarity of a name that is offered, 0 to 1.
+/// Smallest similarity of a suggestion, 0 to 1.
 const SIMILARITY_MIN: f64 = 0.75;
 
 /// Returns a count with its noun: `1 object`, `8 objects`.
@@ -15,7 +15,7 @@ pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
     format!("{count} {noun}{ending}")
 }
 
-/// Returns a count in at most five letters: `9120`, `16.8k`, `1.69M`.
+/// Formats a count in at most five characters: `9120`, `16.8k`, `1.69M`.
 pub fn brief(count: u64) -> String {
     let scaled = |unit: f64, letter: &str| {
         let value = count as f64 / unit;
@@ -31,7 +31,8 @@ pub fn brief(count: u64) -> String {
     }
 }
 
-/// Returns `name`, with the first number appended after `gap` that makes it unlike those in `taken`, where it is put.
+/// Returns `name`, with `gap` and the first number appended that make it differ from the names in `taken`, and adds it
+/// there.
 pub fn unique(name: String, gap: &str, taken: &mut BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{name}{gap}{number}"));
     let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(name);
@@ -39,12 +40,12 @@ pub fn unique(name: String, gap: &str, taken: &mut BTreeSet<String>) -> String {
     free
 }
 
-/// Returns the name of a variant without content, as files have it.
+/// Returns the serialised name of a variant without content.
 pub fn name_of(variant: &impl Serialize) -> String {
     toml::Value::try_from(variant).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// Returns `did you mean barrel?` with the names that are spelt most like `name`; none if no name is like it.
+/// Returns `did you mean barrel?` with the known names most similar to `name`; `None` if none is similar.
 pub fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let typed = name.to_lowercase();
     let similarity = |known: &str| strsim::jaro_winkler(&typed, &known.to_lowercase());

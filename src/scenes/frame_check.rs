@@ -6,7 +6,7 @@
 use super::pose_convention::{Native, PoseConvention};
 use labelgs_files::names::shortened;
 use labelgs_scene::agreement::{Agreement, Sample};
-use labelgs_scene::{Dataset, Flaw, Result, Setting, View};
+use labelgs_scene::{Dataset, Result, SceneProblem, Setting, View};
 
 /// Fewest points that can judge a scene.
 const POINTS_MIN: usize = 50;
@@ -34,7 +34,7 @@ struct Found {
 pub(super) fn check(dataset: &mut Dataset, native: Option<Native>, given: PoseConvention) -> Result<()> {
     let found = find(dataset, native, given)?;
     dataset.notes.extend(found.flaws.iter().cloned().chain(found.notes));
-    dataset.flaws.extend(found.flaws.into_iter().map(Flaw::Frame));
+    dataset.flaws.extend(found.flaws.into_iter().map(SceneProblem::Frame));
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use super::{colmap, llff, metashape, transforms};
 use labelgs_files::content::{self, Content};
 use labelgs_files::names::shortened;
 use labelgs_scene::words::counted;
-use labelgs_scene::{Error, Flaw, Result, Setting};
+use labelgs_scene::{Error, Result, SceneProblem, Setting};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ fn list_folder(place: &Place, scene: &Path) -> Result<Listing> {
             Ok(Some(mut listing)) => {
                 name_others(scene, at, &mut listing);
                 if at == 0 {
-                    let unposed = without_pose(&listing).map(Flaw::Unposed);
+                    let unposed = without_pose(&listing).map(SceneProblem::Unposed);
                     listing.flaws.extend(unposed);
                 }
                 return Ok(listing);

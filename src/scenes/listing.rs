@@ -5,7 +5,7 @@ use super::photo_finder::EXTENSIONS;
 use super::pose_convention::Native;
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::words::counted;
-use labelgs_scene::{Camera, Error, Flaw, Point, Result};
+use labelgs_scene::{Camera, Error, Point, Result, SceneProblem};
 use std::path::{Path, PathBuf};
 
 /// Largest side of a camera, px.
@@ -47,7 +47,7 @@ pub struct Listing {
     pub points: Vec<Point>,
     pub notes: Vec<String>,
     /// What is wrong with the list. Notes do not say it.
-    pub flaws: Vec<Flaw>,
+    pub flaws: Vec<SceneProblem>,
     /// Where photos were looked for, if some were not found.
     pub hint: String,
 }

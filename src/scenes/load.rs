@@ -10,7 +10,7 @@ use labelgs_files::photo_files::PhotoFiles;
 use labelgs_masks::mask_folder::masks_of_photos;
 use labelgs_masks::tools::nothing_found;
 use labelgs_scene::words::counted;
-use labelgs_scene::{Dataset, Flaw, Photo, View, crew};
+use labelgs_scene::{Dataset, Photo, SceneProblem, View, parallel};
 use labelgs_scene::{Error, Result, Setting};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -67,7 +67,8 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
     let is_wide = note_wide(&loaded, &mut notes);
-    let flaws: Vec<Flaw> = listing.flaws.into_iter().chain(faults.into_iter().map(Flaw::LeftOut)).collect();
+    let flaws: Vec<SceneProblem> =
+        listing.flaws.into_iter().chain(faults.into_iter().map(SceneProblem::LeftOut)).collect();
     notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
     let (train, test) = divided(loaded, options.only.as_deref());
     let Listing { source, native, points, .. } = listing;
@@ -176,7 +177,7 @@ fn read_views(recipes: &[Arc<Recipe>], options: &LoadOptions) -> Read {
         };
         Some(made.map(|made| made.map(kept)))
     };
-    let read = crew::map("reading photos", recipes.len(), store.at_once(), read);
+    let read = parallel::map_bounded("reading photos", recipes.len(), store.at_once(), read);
     let (mut resampled, mut blank) = (0, Vec::new());
     let mut count = |(masks, views): (usize, Vec<(View, bool)>)| {
         resampled += masks;

@@ -7,7 +7,7 @@
 use super::LoadOptions;
 use super::recipe::{MadeView, Recipe};
 use labelgs_files::scratch::{Scratch, ScratchOffset};
-use labelgs_scene::pixels::{Picture, Source};
+use labelgs_scene::pixels::{PixelBuffer, PixelSource};
 use labelgs_scene::{Error, LabelMap, Photo, Pixels, Result, Setting, View};
 use std::marker::PhantomData;
 use std::path::PathBuf;
@@ -100,7 +100,10 @@ impl PhotoStore {
         let (facts, size) = (picture.facts(), picture.size());
         let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), WITHOUT_FILE));
         let files = Arc::clone(&self.files);
-        Pixels::made(Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }), facts)
+        Pixels::from_source(
+            Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }),
+            facts,
+        )
     }
 }
 
@@ -124,7 +127,7 @@ fn held(costs: &[u64], test: &[bool], budget: u64) -> Vec<bool> {
 }
 
 /// What a store keeps: a photo or a mask.
-trait Kept: Picture + std::fmt::Debug + Send + Sync + Sized + 'static {
+trait Kept: PixelBuffer + std::fmt::Debug + Send + Sync + Sized + 'static {
     /// Returns width and height, px.
     fn size(&self) -> (u32, u32);
     /// Makes one without content, and lets `fill` write its bytes.
@@ -197,7 +200,7 @@ struct Waiting<T> {
     kind: PhantomData<T>,
 }
 
-impl<T: Kept> Source<T> for Waiting<T> {
+impl<T: Kept> PixelSource<T> for Waiting<T> {
     fn make(&self) -> Result<Arc<T>> {
         match self.place.and_then(|place| self.read(place)) {
             Some(picture) => Ok(Arc::new(picture)),

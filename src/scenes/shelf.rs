@@ -2,7 +2,7 @@
 
 use super::PHOTO_MEMORY;
 use labelgs_files::scratch::{Scratch, ScratchOffset, system_folder};
-use labelgs_scene::pixels::Source;
+use labelgs_scene::pixels::PixelSource;
 use labelgs_scene::{Error, Pixels, Result};
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ impl Shelf {
         match place {
             Some(place) => {
                 let waiting = Waiting { scratch: Arc::clone(&self.scratch), place, count: values.len() };
-                Pixels::made(Arc::new(waiting), Default::default())
+                Pixels::from_source(Arc::new(waiting), Default::default())
             }
             None => values.into(),
         }
@@ -53,7 +53,7 @@ struct Waiting {
     count: usize,
 }
 
-impl Source<Vec<f32>> for Waiting {
+impl PixelSource<Vec<f32>> for Waiting {
     fn make(&self) -> Result<Arc<Vec<f32>>> {
         let mut values = vec![0.0; self.count];
         let read = self.scratch.read(self.place, bytemuck::cast_slice_mut(&mut values));

@@ -17,9 +17,9 @@ const POINTS_MAX: usize = 10_000;
 
 /// Removes stray photos, if they are few. Notes them in `faults`.
 pub(super) fn remove(views: &mut Vec<Listed>, points: &[Point], max_share: f32, faults: &mut Vec<String>) {
-    let Some(cameras) = Spread::of(views.iter().map(|view| view.camera.centre())) else { return };
+    let Some(cameras) = Spread::measure(views.iter().map(|view| view.camera.centre())) else { return };
     let some = points.iter().step_by(points.len().div_ceil(POINTS_MAX).max(1)).map(|point| point.position);
-    let seen = Spread::of(some).filter(|_| points.len() >= POINTS_MIN);
+    let seen = Spread::measure(some).filter(|_| points.len() >= POINTS_MIN);
     let limit = match seen {
         // Points may lie anywhere around the cameras.
         Some(seen) => STRAY_RADII * cameras.radius.max(seen.radius + seen.middle.distance(cameras.middle)),

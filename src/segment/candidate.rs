@@ -3,7 +3,7 @@
 use super::network::{Answer, Network, Prepared};
 use super::prompt::Prompt;
 use labelgs_masks::nested::quality;
-use labelgs_scene::{Result, crew};
+use labelgs_scene::{Result, parallel};
 
 /// Steps of a stored logit per unit.
 const LOGIT_STEPS: f32 = 16.0;
@@ -101,7 +101,7 @@ pub(crate) fn candidates(network: &Network, prepared: &Prepared, search: &Search
         Ok(masks.filter(|mask| mask.area > 0 && sure(mask)).collect())
     };
     let found: Vec<Vec<Candidate>> =
-        crew::map("", points, network.threads(), ask).into_iter().collect::<Result<_>>()?;
+        parallel::map_bounded("", points, network.threads(), ask).into_iter().collect::<Result<_>>()?;
     Ok(without_doubles(found.into_iter().flatten().collect()))
 }
 

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::files::image::{jpeg_rgb8, png_grey16, png_rgb8};
 use crate::render::pictures::{depth_preview, to_word};
 use crate::render::{Parts, Render};
-use crate::scene::colour::{HEAT, HEAT_MAX, on_scale, to_byte};
+use crate::scene::colour::{HEAT_COLOURS, HEAT_MAX, colour_on_scale, to_byte};
 use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
 
@@ -73,7 +73,7 @@ fn tinted((colour, &id): (&[f32; 3], &u32)) -> [u8; 3] {
 
 fn confidence(row: i32, known: Option<&[f32]>) -> [u8; 3] {
     let row = usize::try_from(row).ok();
-    row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| on_scale(&CONFIDENCE, share))
+    row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| colour_on_scale(&CONFIDENCE, share))
 }
 
 /// Mean difference of the channels; black where the photo has no pixel. A smaller render takes the pixel of the photo
@@ -90,7 +90,7 @@ fn errors(rendered: &Render, photo: Option<&Photo>) -> Vec<[u8; 3]> {
             return [0; 3];
         }
         let of = |value: f32, truth: u8| (value.clamp(0.0, 1.0) - f32::from(truth) / 255.0).abs();
-        on_scale(&HEAT, (of(colour[0], r) + of(colour[1], g) + of(colour[2], b)) / 3.0 / HEAT_MAX)
+        colour_on_scale(&HEAT_COLOURS, (of(colour[0], r) + of(colour[1], g) + of(colour[2], b)) / 3.0 / HEAT_MAX)
     };
     rendered.rgb.iter().enumerate().map(pixel).collect()
 }

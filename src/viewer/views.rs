@@ -66,7 +66,7 @@ impl Views {
 
     /// Returns what the cameras look at; none without views.
     pub(super) fn frame(&self) -> Option<Overview> {
-        Overview::of(self.list.iter().map(|posed| &posed.view.camera))
+        Overview::from_cameras(self.list.iter().map(|posed| &posed.view.camera))
     }
 
     /// Returns the photo of a view, or its thumbnail, with the type of the file.

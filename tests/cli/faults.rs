@@ -29,7 +29,7 @@ fn cases(kinds: &'static [&str]) -> impl Iterator<Item = (&'static str, u32)> {
 
 /// Whether the command reached the event that fails.
 fn met(output: &Output) -> bool {
-    stderr(output).contains("a fault on purpose")
+    stderr(output).contains("injected fault")
 }
 
 #[track_caller]
@@ -217,7 +217,7 @@ fn any_read_may_fail() {
                 failed += 1;
                 assert_eq!(kind, "IO", "{verb}, {fault}: {}", stderr(&output));
                 assert!(
-                    stderr(&output).contains(": cannot be read: a fault on purpose"),
+                    stderr(&output).contains(": cannot be read: injected fault"),
                     "{verb}, {fault}: {}",
                     stderr(&output)
                 );

@@ -4,7 +4,7 @@ use assert_cmd::Command;
 use glam::{DMat3, DQuat, DVec3};
 use labelgs::masks::read_mask;
 use labelgs::scene::Camera;
-use labelgs::scene::path::{Between, between, short_order, video};
+use labelgs::scene::path::{Interpolation, interpolate, short_order, video};
 use labelgs::scenes::{Frame, Frames, LoadOptions};
 use labelgs::synth::SynthOptions;
 use labelgs::synth::ring_of_cameras;
@@ -43,7 +43,7 @@ fn a_video_has_its_frames_and_photos_are_every_tenth() {
     let cameras = ring_of_cameras(&SynthOptions { views: 6, ..SynthOptions::default() });
     let all: Vec<&Camera> = cameras.iter().collect();
     for (count, between) in [(6, 9), (6, 0), (2, 3), (1, 9)] {
-        let frames = video(&all[..count], between, Between::Centres);
+        let frames = video(&all[..count], between, Interpolation::Centres);
         assert_eq!(frames.len(), (between as usize + 1) * (count - 1) + 1);
         for (index, frame) in frames.iter().enumerate() {
             let step = between as usize + 1;
@@ -54,7 +54,7 @@ fn a_video_has_its_frames_and_photos_are_every_tenth() {
             }
         }
     }
-    assert!(video(&[], 9, Between::Centres).is_empty());
+    assert!(video(&[], 9, Interpolation::Centres).is_empty());
 }
 
 #[test]
@@ -73,8 +73,8 @@ fn cameras_between_are_rotations_on_the_way() {
         let end = Camera { fx: 100.0, cx: 30.0, ..camera(end, [-4.0, 0.5, 8.0]) };
         for step in 0..=10 {
             let t = f64::from(step) / 10.0;
-            for how in [Between::Centres, Between::Translations] {
-                let at = between(&start, &end, t, how);
+            for how in [Interpolation::Centres, Interpolation::Translations] {
+                let at = interpolate(&start, &end, t, how);
                 assert!(at.rotation.is_finite() && at.translation.is_finite(), "{angle} {t}");
                 let gram = at.rotation.transpose() * at.rotation - DMat3::IDENTITY;
                 assert!(gram.to_cols_array().iter().all(|value| value.abs() < 1e-12), "{angle} {t}: no rotation");
@@ -84,8 +84,10 @@ fn cameras_between_are_rotations_on_the_way() {
                 let found = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos();
                 assert!((found - t * angle).abs() < 1e-6, "{found} at {t} of {angle}");
             }
-            let (line, code) =
-                (between(&start, &end, t, Between::Centres), between(&start, &end, t, Between::Translations));
+            let (line, code) = (
+                interpolate(&start, &end, t, Interpolation::Centres),
+                interpolate(&start, &end, t, Interpolation::Translations),
+            );
             let expected = start.centre().lerp(end.centre(), t);
             assert!(line.centre().distance(expected) < 1e-12, "the centre leaves the segment");
             assert!((line.fx - (90.0 + 10.0 * t)).abs() < 1e-12 && (line.cx - (32.0 - 2.0 * t)).abs() < 1e-12);
@@ -94,7 +96,7 @@ fn cameras_between_are_rotations_on_the_way() {
         }
     }
     let far = camera(turn(1.9), [-4.0, 0.5, 8.0]);
-    let off = between(&start, &far, 0.5, Between::Translations).centre();
+    let off = interpolate(&start, &far, 0.5, Interpolation::Translations).centre();
     assert!(off.distance(start.centre().lerp(far.centre(), 0.5)) > 0.1, "the paper's way swings off the line");
 }
 

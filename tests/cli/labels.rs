@@ -60,7 +60,7 @@ fn strokes_make_objects(folder: &Path) {
         assert!(2 * of(true) > of(false), "object {id}: {} of {}", of(true), of(false));
     }
     let table = LabelTable::read(&folder.join("cut.labels.json")).expect("names");
-    assert_eq!((table.by_name("second"), table.name(1)), (Some(2), None));
+    assert_eq!((table.id_of("second"), table.name(1)), (Some(2), None));
 
     // A stroke that leaves its photo, or is of no view, is told by its number.
     let wrong = |change: &dyn Fn(&mut Stroke), expected: &str| {

@@ -3,7 +3,7 @@
 use labelgs::files::image::write_png_grey16;
 use labelgs::label::masks::{Overlap, track};
 use labelgs::masks::read_mask;
-use labelgs::scene::path::{Between, short_order, video};
+use labelgs::scene::path::{Interpolation, short_order, video};
 use labelgs::scene::{Camera, LabelMap};
 use labelgs::synth::{Fault, Preset, SynthOptions, spoil};
 use labelgs::synth::{World, picture, ring_of_cameras};
@@ -110,7 +110,7 @@ fn frames_between_sparse_photos_keep_ids() {
     };
     let mut table = Vec::new();
     for between in [0, 9] {
-        let stops = video(&cameras, between, Between::Centres);
+        let stops = video(&cameras, between, Interpolation::Centres);
         let truth: Vec<LabelMap> = stops.iter().zip(0..).map(|(stop, at)| ids_at(&stop.camera, at)).collect();
         let segmented: Vec<LabelMap> = spoil(&truth, Fault::PerView, 1.0, 5).into_iter().flatten().collect();
         let found = track(&segmented, HOW).expect("few objects");

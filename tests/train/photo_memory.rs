@@ -141,7 +141,7 @@ fn a_disk_that_fails_costs_no_bit() {
         [("write:1:NO_SPACE", true), ("write:2:NO_SPACE", true), ("write:5:IO", true), ("write:3:SHORT", false)]
     {
         let text = succeeded(&place.trained_with(Some(fault), fault, &few));
-        assert!(text.contains("a fault on purpose"), "{fault}: {text}");
+        assert!(text.contains("injected fault"), "{fault}: {text}");
         assert_eq!(text.contains("no space for data that does not fit into memory"), is_told, "{fault}: {text}");
         assert!(place.model(fault, 8) == place.model("whole", 8), "{fault}: the models differ");
     }
@@ -149,7 +149,7 @@ fn a_disk_that_fails_costs_no_bit() {
     let is_told = |nth: u32| {
         let fault = format!("read:{nth}:IO");
         let text = succeeded(&place.trained_with(Some(&fault), &fault, &few));
-        assert!(text.contains("a fault on purpose"), "{fault}: {text}");
+        assert!(text.contains("injected fault"), "{fault}: {text}");
         assert!(place.model(&fault, 8) == place.model("whole", 8), "{fault}: the models differ");
         text.contains("the temporary file of photos cannot be read")
     };

@@ -5,7 +5,7 @@ use crate::cli::support::{Context, Progress, SceneArgs, largest, near_plane, ope
 use crate::engine::Engine;
 use crate::render::pictures::{Format, write_rgb};
 use crate::render::{Parts, RenderOptions, render};
-use crate::scene::path::{Between, short_order, video};
+use crate::scene::path::{Interpolation, short_order, video};
 use crate::scene::{Camera, Dataset, View};
 use crate::scenes::frames::{self, Frame, Frames};
 use crate::scenes::window::windows;
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let wide: Vec<Camera> =
         views.iter().map(|view| Camera { width: size.0, height: size.1, ..view.camera.clone() }).collect();
     let cameras: Vec<&Camera> = wide.iter().collect();
-    let how = if args.compat { Between::Translations } else { Between::Centres };
+    let how = if args.compat { Interpolation::Translations } else { Interpolation::Centres };
     let stops = video(&cameras, args.between, how);
     let gpu = open_gpu(context)?;
     let mut engine = Engine::for_model(gpu, &model, std::iter::once(size))?;

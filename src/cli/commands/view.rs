@@ -133,7 +133,7 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let viewer = args.server.start(1.0)?;
     let address = viewer.address();
     context.show(&json!({ "schema_version": 1, "address": address }), &format!("{address}\n"))?;
-    let words = Typed { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
+    let words = TypedOptions { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
     let (path, table, dataset) = (&args.model, known.table, &dataset);
     let first_view = first_view(path)?;
     let finished = Finished { path, model, table, dataset, options, words: &words, photos, first_view };
@@ -162,13 +162,13 @@ fn open_browser(address: &str) {
 }
 
 /// The commands as a user would type them.
-pub(crate) struct Typed {
+pub(crate) struct TypedOptions {
     pub(crate) scene: Option<PathBuf>,
     pub(crate) masks: Option<PathBuf>,
     pub(crate) network: Option<PathBuf>,
 }
 
-impl Words for Typed {
+impl Words for TypedOptions {
     fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
         let scene = self.scene.as_ref().map_or(String::new(), |scene| format!(" --scene {}", path(scene)));
         format!("labelgs edit {} --replay {}{scene} -o {}", path(model), path(edits), path(output))

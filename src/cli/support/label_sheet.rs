@@ -44,7 +44,7 @@ impl SheetArgs {
         let cameras = self.cameras(path)?;
         let cameras: Vec<&Camera> = cameras.iter().collect();
         let of_file = || Ok(first_view(path)?.map(|view| view.up));
-        let up = Overview::of(cameras.iter().copied()).map_or_else(of_file, |all| Ok(Some(all.up)))?;
+        let up = Overview::from_cameras(cameras.iter().copied()).map_or_else(of_file, |all| Ok(Some(all.up)))?;
         let up = up.unwrap_or_else(|| likely_up((0..model.len()).map(|row| model.world(row))));
         let near = near_plane(path, None)?;
         let mut engine = Engine::for_model(open_gpu(to)?, &model, std::iter::once((SIDE, SIDE)))?;

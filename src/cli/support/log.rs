@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::cli::support::args::GlobalArgs;
 use crate::cli::support::stage_progress::{self, Stages};
-use crate::stage::TARGET;
+use crate::stage::STAGE_TARGET;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::{LazyLock, Mutex};
@@ -87,7 +87,7 @@ pub(crate) fn start(args: &GlobalArgs) {
     let started = tracing_subscriber::registry()
         .with(shown.without_time().with_filter(filter))
         .with(Keep.with_filter(own))
-        .with((!args.quiet).then(|| Stages.with_filter(Targets::new().with_target(TARGET, Level::INFO))))
+        .with((!args.quiet).then(|| Stages.with_filter(Targets::new().with_target(STAGE_TARGET, Level::INFO))))
         .try_init();
     // A second start in one process, as in tests, keeps the first logger.
     if started.is_ok() && !args.quiet {

@@ -1,7 +1,7 @@
 //! Progress of stages that take longer than two seconds: a bar on a terminal, otherwise lines.
 
 use crate::cli::support::log::{PLAIN_AFTER, PLAIN_EVERY, bar};
-use crate::stage::TARGET;
+use crate::stage::STAGE_TARGET;
 use indicatif::ProgressBar;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -89,7 +89,7 @@ impl Stages {
 
 impl<S: tracing::Subscriber> Layer<S> for Stages {
     fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, _: Context<'_, S>) {
-        if attributes.metadata().target() == TARGET {
+        if attributes.metadata().target() == STAGE_TARGET {
             let (what, start) = (String::new(), Instant::now());
             let mut stage = Running { what, total: 0, done: 0, start, told: None, bar: None };
             attributes.record(&mut stage);

@@ -2,7 +2,7 @@
 
 use super::{distances, occluders_by_mean};
 use crate::error::{Error, Result};
-use crate::scene::{DepthKind, Occluders, View, crew};
+use crate::scene::{DepthKind, Occluders, View, parallel};
 use crate::scenes::Lookup;
 use crate::scenes::depth::DepthFolder;
 use std::collections::BTreeMap;
@@ -22,6 +22,6 @@ pub fn from_depths(
         let mask = view.mask()?.ok_or_else(|| Error::Bug(format!("{} came without its mask", view.name)))?;
         Ok((view.name.clone(), occluders_by_mean(&mask, &distances(&map, kind))))
     };
-    let found: Vec<Result<(String, Occluders)>> = crew::over_views("reading depth maps", views, of_view);
+    let found: Vec<Result<(String, Occluders)>> = parallel::map_views("reading depth maps", views, of_view);
     found.into_iter().collect()
 }

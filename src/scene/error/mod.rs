@@ -3,14 +3,14 @@
 mod setting;
 
 pub use setting::Setting;
-pub use setting::speak_of;
+pub use setting::name_settings;
 
 use std::path::{Path, PathBuf};
 
-/// The result of every fallible function of the crate.
+/// The result of a fallible function.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// An error of the engine. Its message names the thing, the number and the cure in one line.
+/// An error. Its one-line message names the subject, the number and the cure.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// An argument, setting or environment variable has an invalid value.
@@ -92,9 +92,7 @@ pub enum Error {
         view: String,
     },
     /// Densification pruned every Gaussian.
-    #[error(
-        "every Gaussian was pruned after step {step}: the poses do not fit the photos; look for faults of the capture first"
-    )]
+    #[error("every Gaussian was pruned after step {step}: the poses do not fit the photos; check the capture first")]
     Pruned {
         /// The step.
         step: u32,
@@ -111,7 +109,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// True if memory of the device or of the host ran out.
+    /// Returns true if memory of the device or the host ran out.
     pub fn is_out_of_memory(&self) -> bool {
         use ash::vk::Result as Vk;
         match self {
@@ -128,12 +126,12 @@ impl Error {
         }
     }
 
-    /// True if the device was lost.
+    /// Returns true if the device was lost.
     pub fn is_device_lost(&self) -> bool {
         matches!(self, Self::DeviceLost { .. } | Self::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. })
     }
 
-    /// True if no device is usable, or its driver fails to start.
+    /// Returns true if no device is usable, or its driver fails to start.
     pub fn is_without_device(&self) -> bool {
         use ash::vk::Result as Vk;
         match self {
@@ -161,13 +159,13 @@ impl Error {
         Self::Usage { argument: argument.into(), problem: problem.into() }
     }
 
-    /// Returns a closure for `map_err` that makes an [`Error::Read`].
+    /// Returns a closure for `map_err` that creates an [`Error::Read`].
     pub fn read(path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.as_ref().to_owned();
         move |source| Self::Read { path, source }
     }
 
-    /// Returns a closure for `map_err` that makes an [`Error::Write`].
+    /// Returns a closure for `map_err` that creates an [`Error::Write`].
     pub fn write(path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.as_ref().to_owned();
         move |source| Self::Write { path, source }

@@ -1,29 +1,31 @@
-//! Settings in messages, and what the running program calls them.
+//! Settings in messages, under the name that the running program uses for them.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::sync::OnceLock;
 
-/// What the running command calls a setting, by its field: a flag, or `--set KEY`; unset in a program of another.
-static FLAGS: OnceLock<BTreeMap<String, String>> = OnceLock::new();
+/// The running command's name for each setting, by field: a flag, or `--set KEY`. Unset in programs that use the
+/// library.
+static SETTING_NAMES: OnceLock<BTreeMap<String, String>> = OnceLock::new();
 
-/// Gives settings these names in all later messages. The first call counts.
-pub fn speak_of(flags: BTreeMap<String, String>) {
-    // A second start in one process, as in tests, keeps the first flags.
-    let _ = FLAGS.set(flags);
+/// Defines the names of settings in all later messages. Only the first call has an effect.
+pub fn name_settings(flags: BTreeMap<String, String>) {
+    // A second start in the same process, as in tests, keeps the first flags.
+    let _ = SETTING_NAMES.set(flags);
 }
 
-/// A setting in a message, by the name of its field: `` `max_gaussians` ``. The command line prints what can be typed, such
-/// as `--max-gaussians` or `--set label_from`, if the running command has that setting, and `max gaussians` if not.
+/// A setting in a message, by the name of its field: `` `max_gaussians` ``. The command line prints what users can
+/// type, such as `--max-gaussians` or `--set label_from`, if the running command has the setting, and `max gaussians`
+/// otherwise.
 ///
-/// Only a value of this type becomes a flag, so that keys of files, which are text, never do.
+/// Only a value of this type becomes a flag. Keys of files are plain text and never do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Setting(pub &'static str);
 
 impl Setting {
-    /// Returns the setting with a value: `` `overlap = later` `` or `--overlap later`.
+    /// Formats the setting with a value: `` `overlap = later` `` or `--overlap later`.
     pub fn to(self, value: impl Display) -> String {
-        self.named(FLAGS.get(), &format!(" = {value}"))
+        self.named(SETTING_NAMES.get(), &format!(" = {value}"))
     }
 
     fn named(self, flags: Option<&BTreeMap<String, String>>, value: &str) -> String {
@@ -42,11 +44,11 @@ impl Setting {
 
 impl Display for Setting {
     fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
-        to.write_str(&self.named(FLAGS.get(), ""))
+        to.write_str(&self.named(SETTING_NAMES.get(), ""))
     }
 }
 
-/// The name at the head of a message, where it needs no quotes.
+/// Formats the name without quotes, for the start of a message.
 impl From<Setting> for String {
     fn from(setting: Setting) -> Self {
         setting.to_string().trim_matches('`').to_owned()

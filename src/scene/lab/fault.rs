@@ -1,19 +1,19 @@
-//! Injected faults, so that every failure can be tested. In a build with the feature `lab`, the environment variable
+//! Injected faults, so that tests can cover every failure. In a build with the feature `lab`, the environment variable
 //! `LABELGS_FAULT=SITE:N:KIND` makes the N-th event of a site fail; `SITE:N:KIND:COUNT` makes COUNT events fail from
-//! there on. Commas separate several faults.
+//! there on. Separate several faults with commas.
 //!
 //! | site | events | kinds |
 //! | --- | --- | --- |
 //! | a Vulkan call, such as `vkQueueSubmit` | its calls | `DEVICE_LOST`, `HOST_MEMORY`, `DEVICE_MEMORY`, `INITIALIZATION` |
 //! | `vulkan` | all Vulkan calls that can fail | the same |
-//! | `write` | operations on a file to write: create, write, sync, rename | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
-//! | `read` | operations on a file to read: open, read, list a folder | `IO`, `SHORT`, `INTERRUPTED` |
+//! | `write` | operations on an output file: create, write, sync, rename | `NO_SPACE`, `IO`, `SHORT`, `INTERRUPTED` |
+//! | `read` | operations on an input file: open, read, list a folder | `IO`, `SHORT`, `INTERRUPTED` |
 //! | `loader` | loading Vulkan | any |
-//! | `checkpoint` | three of each checkpoint of a run: before it is read from the device, before and after it is written | `SLOW` |
-//! | `nan` | steps of a training | `NUMBER`: a Gaussian gets a NaN position |
+//! | `checkpoint` | three per checkpoint of a run: before its device read, before its write and after it | `SLOW` |
+//! | `nan` | training steps | `NUMBER`: a Gaussian gets a NaN position |
 //! | any | | `SLOW`: the event takes a minute |
 //!
-//! Every system may cause `SHORT` and `INTERRUPTED` at any time: it transfers only a part or nothing, and the call must
+//! Any system may cause `SHORT` and `INTERRUPTED` at any time: it transfers only a part or nothing, and the call must
 //! be repeated. They must not change any result.
 
 use serde::Deserialize;
@@ -60,13 +60,13 @@ struct Fault {
     kind: Kind,
 }
 
-/// The fault that is set for this event of a site, if any.
+/// Returns the fault to inject into this event of a site, if any.
 #[inline(always)]
-pub fn at(site: &str) -> Option<Kind> {
-    if super::ON { asked(site) } else { None }
+pub fn injected(site: &str) -> Option<Kind> {
+    if super::ON { requested(site) } else { None }
 }
 
-fn asked(site: &str) -> Option<Kind> {
+fn requested(site: &str) -> Option<Kind> {
     static FAULTS: OnceLock<Vec<Fault>> = OnceLock::new();
     let faults = FAULTS.get_or_init(|| {
         let text = super::var("LABELGS_FAULT").unwrap_or_default();
@@ -79,11 +79,11 @@ fn asked(site: &str) -> Option<Kind> {
         };
         text.split(',').filter(|text| !text.is_empty()).filter_map(read).collect()
     });
-    // Every fault of the site counts this event, also those after the first match.
+    // Every fault of the site counts this event, including faults after the first match.
     let met =
         |fault: &&Fault| fault.site == site && fault.events.contains(&(fault.seen.fetch_add(1, Ordering::Relaxed) + 1));
     let kind = faults.iter().filter(met).last()?.kind;
-    tracing::warn!("a fault on purpose: {kind:?} at {site}");
+    tracing::warn!("injected fault: {kind:?} at {site}");
     if kind == Kind::Slow {
         std::thread::sleep(Duration::from_secs(60));
         return None;
@@ -91,20 +91,20 @@ fn asked(site: &str) -> Option<Kind> {
     Some(kind)
 }
 
-/// Applies a fault to a transfer of bytes from or to a file. Returns true if only a part may be transferred.
-pub fn of_transfer(site: &str) -> io::Result<bool> {
-    match at(site) {
+/// Injects a fault into a byte transfer from or to a file. Returns true if the caller may transfer only a part.
+pub fn inject_transfer(site: &str) -> io::Result<bool> {
+    match injected(site) {
         Some(Kind::NoSpace) => Err(io::ErrorKind::StorageFull.into()),
         Some(Kind::Interrupted) => Err(io::ErrorKind::Interrupted.into()),
         Some(Kind::Short) => Ok(true),
-        Some(_) => Err(io::Error::other("a fault on purpose")),
+        Some(_) => Err(io::Error::other("injected fault")),
         None => Ok(false),
     }
 }
 
-/// Applies a fault to any other file operation, which succeeds or fails as a whole.
-pub fn of_file(site: &str) -> io::Result<()> {
-    match of_transfer(site) {
+/// Injects a fault into any other file operation, which succeeds or fails as a whole.
+pub fn inject_file(site: &str) -> io::Result<()> {
+    match inject_transfer(site) {
         Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
         other => other.map(|_| ()),
     }

@@ -1,9 +1,9 @@
-//! Support for tests and benchmarks only: injected faults, and variables that make a device appear poorer. Both exist
-//! in builds with the feature `lab`. Elsewhere [`ON`] is false, and the compiler removes them.
+//! Support for tests and benchmarks: injected faults, and variables that make a device appear less capable. Both exist
+//! only in builds with the feature `lab`. Elsewhere [`ON`] is false, and the compiler removes them.
 
 pub mod fault;
 
-/// True in a build with the feature `lab`.
+/// Whether this build has the feature `lab`.
 pub const ON: bool = cfg!(feature = "lab");
 
 /// Reads an environment variable in builds with the feature `lab`; `None` if it is empty or in other builds.

@@ -1,9 +1,9 @@
-//! Parsers for the values of flags.
+//! Parsers for flag values.
 
 use std::str::FromStr;
 
-/// Colours by name, as on web pages.
-const COLOURS: [(&str, u32); 18] = [
+/// Named colours, as on web pages.
+const NAMED_COLOURS: [(&str, u32); 18] = [
     ("black", 0x000000),
     ("white", 0xffffff),
     ("red", 0xff0000),
@@ -24,10 +24,10 @@ const COLOURS: [(&str, u32); 18] = [
     ("navy", 0x000080),
 ];
 
-/// Parses a colour: a name, a web page's number such as `#ff0000`, or three numbers from 0 to 1.
+/// Parses a colour: a name, a hexadecimal number such as `#ff0000`, or three numbers from 0 to 1.
 pub fn colour(text: &str) -> Result<[f32; 3], String> {
     let name = text.trim().to_lowercase();
-    let named = COLOURS.iter().find(|(known, _)| *known == name).map(|&(_, bytes)| bytes);
+    let named = NAMED_COLOURS.iter().find(|(known, _)| *known == name).map(|&(_, bytes)| bytes);
     if let Some(bytes) = named.or_else(|| hexadecimal(&name)) {
         return Ok([16, 8, 0].map(|shift| f32::from((bytes >> shift) as u8) / 255.0));
     }
@@ -39,13 +39,13 @@ pub fn colour(text: &str) -> Result<[f32; 3], String> {
     numbers::<f32, 3>(text).filter(|parts| parts.iter().all(|part| (0.0..=1.0).contains(part))).ok_or_else(wrong)
 }
 
-/// Returns the numbers in a text with commas between.
+/// Parses numbers separated by commas.
 fn numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
     let numbers: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     numbers?.try_into().ok()
 }
 
-/// Returns the bytes of `#rrggbb` or `#rgb`; the sign may lack.
+/// Parses `#rrggbb` or `#rgb`; the number sign is optional.
 fn hexadecimal(text: &str) -> Option<u32> {
     let digits = text.strip_prefix('#').unwrap_or(text);
     let twice = |digits: &str| digits.chars().flat_map(|digit| [digit, digit]).collect::<String>();
@@ -67,32 +67,32 @@ pub fn count(text: &str) -> Result<u64, String> {
         _ => return text.parse().map_err(|_| wrong()),
     };
     let value = digits.parse::<f64>().map_err(|_| wrong())? * unit;
-    // Below 2^53, f64 holds every whole number.
+    // Below 2^53, f64 represents every integer.
     if !(0.0..9e15).contains(&value) { Err(wrong()) } else { Ok(value.round() as u64) }
 }
 
 /// Units of memory, as powers of 2.
-const UNITS: [(&str, u32); 3] = [("G", 30), ("M", 20), ("K", 10)];
+const MEMORY_UNITS: [(&str, u32); 3] = [("G", 30), ("M", 20), ("K", 10)];
 
 /// Parses a number of bytes such as `1500M` or `2G`, in powers of 1024.
 pub fn bytes(text: &str) -> Result<u64, String> {
     let wrong =
         || format!("`{text}` is not an amount of memory; expected a number followed by K, M or G, such as 1500M");
     let (number, unit) = text.trim().split_at_checked(text.trim().len().saturating_sub(1)).ok_or_else(wrong)?;
-    let (_, shift) = UNITS.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).ok_or_else(wrong)?;
+    let (_, shift) = MEMORY_UNITS.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).ok_or_else(wrong)?;
     let value = number.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0).ok_or_else(wrong)?;
     Ok((value * f64::from(1_u32 << shift)) as u64)
 }
 
 /// A number of bytes in a file, in the syntax of [`bytes`].
 pub mod as_bytes {
-    use super::{UNITS, bytes};
+    use super::{MEMORY_UNITS, bytes};
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
     /// Writes bytes with the largest unit that divides them.
     pub fn serialize<S: Serializer>(value: &u64, to: S) -> Result<S::Ok, S::Error> {
-        let even = UNITS.into_iter().find(|(_, shift)| value.trailing_zeros() >= *shift);
-        let (unit, shift) = even.unwrap_or(UNITS[UNITS.len() - 1]);
+        let even = MEMORY_UNITS.into_iter().find(|(_, shift)| value.trailing_zeros() >= *shift);
+        let (unit, shift) = even.unwrap_or(MEMORY_UNITS[MEMORY_UNITS.len() - 1]);
         to.serialize_str(&format!("{}{unit}", *value as f64 / f64::from(1_u32 << shift)))
     }
 
@@ -102,7 +102,7 @@ pub mod as_bytes {
     }
 }
 
-/// Parses the value of a switch that has no flag: `on` or `off`.
+/// Parses the value of a switch without a flag: `on` or `off`.
 #[cfg(feature = "cli")]
 pub(super) fn switch(text: &str) -> Result<bool, String> {
     match text {

@@ -1,4 +1,4 @@
-//! Options as they are typed: by their flags, or as `--set KEY=VALUE`.
+//! Options from the command line: flags, or `--set KEY=VALUE`.
 
 use super::Options;
 use super::parse::switch;
@@ -7,15 +7,15 @@ use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
-/// The typed options of `T`, all optional.
+/// The options of `T` that the user typed.
 #[derive(Clone, Debug)]
-pub struct Typed<T> {
+pub struct TypedOptions<T> {
     values: BTreeMap<&'static str, String>,
     options: PhantomData<T>,
 }
 
-impl<T: Args + Options> Typed<T> {
-    /// Applies typed values to `options`. Values that `sets` has for keys of `T` belong to them.
+impl<T: Args + Options> TypedOptions<T> {
+    /// Applies typed values to `options`. Values in `sets` with keys of `T` are treated alike.
     pub fn apply(&self, options: &mut T, sets: &BTreeMap<String, String>) -> Result<(), clap::Error> {
         let sets = sets.iter().filter(|(key, _)| T::KEYS.iter().any(|known| known.name == key.as_str()));
         let sets = sets.map(|(key, value)| (key.as_str(), value.as_str()));
@@ -37,13 +37,13 @@ fn parse<'a, T: Args + Options>(
     options.update_from_arg_matches(&all::<T>().try_get_matches_from(typed)?)
 }
 
-/// Refuses a value that its option does not accept; none for a key that is not of `T`.
+/// Returns the error of a value that its option does not accept; `None` if it is accepted or `T` does not have the key.
 pub fn refusal<T: Args + Options>(key: &str, value: &str) -> Option<clap::Error> {
     T::KEYS.iter().find(|known| known.name == key)?;
     parse(&mut T::default(), std::iter::once((key, value))).err()
 }
 
-/// Returns every option of `T` as an argument with a value.
+/// Returns a command with each option of `T` as an argument.
 pub fn all<T: Args + Options>() -> Command {
     let command = T::augment_args_for_update(Command::new("options").no_binary_name(true).disable_help_flag(true));
     let with_value = |command: Command, key: &'static str| {
@@ -52,15 +52,15 @@ pub fn all<T: Args + Options>() -> Command {
     switches::<T>().iter().fold(command, |command, key| with_value(command, key))
 }
 
-/// Returns the keys that are on or off.
+/// Returns the keys of options that are on or off.
 fn switches<T: Options>() -> Vec<&'static str> {
     let defaults = T::default().texts();
     let is_switch = |key: &str| defaults.get(key).is_some_and(|text| text == "on" || text == "off");
     T::KEYS.iter().map(|key| key.name).filter(|key| is_switch(key)).collect()
 }
 
-impl<T: Args + Options> Args for Typed<T> {
-    /// A switch stands alone as a flag, and turns on what is off by default.
+impl<T: Args + Options> Args for TypedOptions<T> {
+    /// A switch is a flag without a value, and turns on what is off by default.
     fn augment_args(command: Command) -> Command {
         let switches = switches::<T>();
         let flags = T::KEYS.iter().filter(|key| key.is_flag).map(|key| key.name);
@@ -77,7 +77,7 @@ impl<T: Args + Options> Args for Typed<T> {
     }
 }
 
-impl<T: Args + Options> FromArgMatches for Typed<T> {
+impl<T: Args + Options> FromArgMatches for TypedOptions<T> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let typed = T::KEYS.iter().map(|key| (key.name, key.is_flag)).filter(|&(_, is_flag)| is_flag);
         let typed = typed.filter(|(key, _)| matches.value_source(key) == Some(ValueSource::CommandLine));

@@ -1,6 +1,6 @@
 //! What a scan finds: kinds, texts, cures.
 
-use labelgs_scene::Flaw;
+use labelgs_scene::SceneProblem;
 use labelgs_scene::words::name_of;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -93,11 +93,11 @@ impl Finding {
 }
 
 /// Returns a flaw of the scene as a finding.
-pub(super) fn of_flaw(flaw: &Flaw) -> Finding {
+pub(super) fn of_flaw(flaw: &SceneProblem) -> Finding {
     let fault = match flaw {
-        Flaw::LeftOut(_) => Fault::LeftOut,
-        Flaw::Unposed(_) => Fault::Unposed,
-        Flaw::Frame(_) => Fault::Frame,
+        SceneProblem::LeftOut(_) => Fault::LeftOut,
+        SceneProblem::Unposed(_) => Fault::Unposed,
+        SceneProblem::Frame(_) => Fault::Frame,
     };
     Finding::new(fault, None, flaw.text().to_owned())
 }

@@ -6,7 +6,7 @@
 
 use super::shown::{Mark, Shown};
 use labelgs_scene::stage::Stage;
-use labelgs_scene::{Result, View, crew};
+use labelgs_scene::{Result, View, parallel};
 use rayon::prelude::*;
 
 /// Fewest shared points for a gain.
@@ -51,8 +51,12 @@ fn samples(view: &View, marks: &[Mark]) -> Result<Vec<Sample>> {
 pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>> {
     let (points, marks) = shown.sample();
     let of_photo = |index: usize| samples(views[index], &marks[index]);
-    let samples =
-        crew::map("comparing the brightness of photos", views.len(), crew::at_once(views.iter().copied()), of_photo);
+    let samples = parallel::map_bounded(
+        "comparing the brightness of photos",
+        views.len(),
+        parallel::views_at_once(views.iter().copied()),
+        of_photo,
+    );
     let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
     let _stage = Stage::new("finding the exposures of photos", 0);
     let channels: Vec<Vec<Option<f64>>> =

@@ -3,7 +3,7 @@
 use super::{Fault, Finding, ViewReport};
 use labelgs_files::resize::{bounded_size, shrink_photo};
 use labelgs_scene::median::median;
-use labelgs_scene::{Photo, Pixels, Result, View, crew};
+use labelgs_scene::{Photo, Pixels, Result, View, parallel};
 
 /// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
 const SIDE_MAX: u32 = 800;
@@ -45,7 +45,7 @@ pub(super) fn sharpness(views: &[&View]) -> Result<Vec<Option<f64>>> {
         Ok(photo.map(|photo| detail(&photo)).filter(|value| value.is_finite()))
     };
     let details: Vec<Option<f64>> =
-        crew::over_views("measuring the sharpness of photos", views, of_view).into_iter().collect::<Result<_>>()?;
+        parallel::map_views("measuring the sharpness of photos", views, of_view).into_iter().collect::<Result<_>>()?;
     let relative = |(index, view): (usize, &&View)| {
         let mut near: Vec<(f64, f64)> = views
             .iter()

@@ -2,7 +2,7 @@
 
 use super::Observed;
 use glam::{DVec2, DVec3};
-use labelgs_scene::sampling::{TESTS_MAX, every, spread_order};
+use labelgs_scene::sampling::{TESTS_MAX, spread_order, stride};
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Point, View};
 use rayon::prelude::*;
@@ -62,23 +62,25 @@ impl<'a> Shown<'a> {
     pub(super) fn counts(&self) -> Vec<(usize, usize)> {
         let _stage = Stage::new("counting the points of photos", 0);
         let unlisted = self.unlisted();
-        let every = every(self.points.len(), unlisted.len());
+        let stride = stride(self.points.len(), unlisted.len());
         let mut times = vec![0_usize; self.points.len()];
         self.listed.iter().flatten().flatten().for_each(|&(point, _)| times[point] += 1);
-        times.par_iter_mut().enumerate().filter(|(point, _)| point.is_multiple_of(every)).for_each(|(point, times)| {
-            *times += unlisted.iter().filter(|&&view| self.pixel(view, point).is_some()).count();
-        });
+        times.par_iter_mut().enumerate().filter(|(point, _)| point.is_multiple_of(stride)).for_each(
+            |(point, times)| {
+                *times += unlisted.iter().filter(|&&view| self.pixel(view, point).is_some()).count();
+            },
+        );
         let of_view = |view: usize| {
             let mut found = (0, 0);
             let mut count = |point: usize| {
-                found.0 += every;
-                found.1 += if times[point] >= 3 { every } else { 0 };
+                found.0 += stride;
+                found.1 += if times[point] >= 3 { stride } else { 0 };
             };
-            let counted = |point: &usize| point.is_multiple_of(every);
+            let counted = |point: &usize| point.is_multiple_of(stride);
             match &self.listed[view] {
                 Some(marks) => marks.iter().map(|&(point, _)| point).filter(counted).for_each(&mut count),
                 None => {
-                    let points = (0..self.points.len()).step_by(every);
+                    let points = (0..self.points.len()).step_by(stride);
                     points.filter(|&point| self.pixel(view, point).is_some()).for_each(&mut count);
                 }
             }

@@ -5,7 +5,7 @@
 
 use super::{Fault, Finding};
 use labelgs_files::resize::{bounded_size, shrink_photo};
-use labelgs_scene::{Camera, Dataset, LabelMap, Photo, Pixels, Result, View, crew};
+use labelgs_scene::{Camera, Dataset, LabelMap, Photo, Pixels, Result, View, parallel};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -108,7 +108,7 @@ pub fn still_share(dataset: &Dataset) -> Result<Option<f64>> {
 /// directions.
 fn measured(views: &[&View]) -> Result<Option<f64>> {
     let chosen: Vec<&View> = views.iter().copied().step_by(views.len().div_ceil(PHOTOS_MAX).max(1)).collect();
-    let found = crew::over_views("comparing the borders of photos", &chosen, Border::of);
+    let found = parallel::map_views("comparing the borders of photos", &chosen, Border::of);
     let found: Vec<Border> = found.into_iter().collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();
     let mut shapes: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     found.iter().for_each(|border| *shapes.entry(border.shape()).or_default() += 1);

@@ -15,7 +15,7 @@ use crate::points;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use labelgs_files::read;
 use labelgs_scene::words::counted;
-use labelgs_scene::{Camera, Error, Flaw, Point, Result};
+use labelgs_scene::{Camera, Error, Point, Result, SceneProblem};
 use model::{CameraRecord, ImageRecord};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -106,7 +106,7 @@ pub fn list(scene: &Place) -> Result<Option<Listing>> {
     let points = finite(points, &mut notes);
     let mut flaws = Vec::new();
     match neighbours(&files.folder, views.len() + bad.len()) {
-        Some((is_larger, text)) if is_larger => flaws.push(Flaw::Unposed(text)),
+        Some((is_larger, text)) if is_larger => flaws.push(SceneProblem::Unposed(text)),
         other => notes.extend(other.map(|(_, text)| text)),
     }
     let views = views.into_iter().map(|(listed, _)| listed).collect();

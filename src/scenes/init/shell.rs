@@ -5,7 +5,7 @@
 use super::texel::texel;
 use glam::{DVec2, DVec3};
 use labelgs_scene::direction::even_direction;
-use labelgs_scene::sampling::every;
+use labelgs_scene::sampling::stride;
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Camera, Dataset, Point, Result, View};
 use rayon::prelude::*;
@@ -34,7 +34,8 @@ impl Covered {
         let (columns, rows) = (count(camera.width), count(camera.height));
         let mut covered = Self { columns, rows, cells: vec![false; (columns * rows) as usize] };
         // Every n-th point tells as much where points and photos are very many.
-        for pixel in points.iter().step_by(every(points.len(), views)).filter_map(|point| camera.sees(point.position)) {
+        for pixel in points.iter().step_by(stride(points.len(), views)).filter_map(|point| camera.sees(point.position))
+        {
             let (x, y) = covered.cell(camera, pixel);
             covered.cells[(y * columns + x) as usize] = true;
         }

@@ -4,7 +4,7 @@ use super::fixtures::Scene;
 use super::{all, noted};
 use glam::{DMat3, DQuat, DVec3};
 use image::{Rgb, RgbImage};
-use labelgs_scene::{Camera, Dataset, Flaw};
+use labelgs_scene::{Camera, Dataset, SceneProblem};
 use labelgs_scenes::{self as scenes, LoadOptions, Lookup};
 
 const SIZE: u32 = 64;
@@ -101,7 +101,7 @@ fn poses_of_another_convention_are_named_and_read_as_they_are_said_to_be() {
     for (words, stored) in cases {
         let scene = ball(stored);
         let dataset = open(&scene, "");
-        let [Flaw::Frame(text)] = &dataset.flaws[..] else { panic!("{words}: {:?}", dataset.flaws) };
+        let [SceneProblem::Frame(text)] = &dataset.flaws[..] else { panic!("{words}: {:?}", dataset.flaws) };
         assert!(text.contains(&format!("`poses = {words}`")), "{words}: {text}");
         let right = open(&scene, words);
         assert_eq!(right.flaws, [], "{words}");
@@ -122,7 +122,7 @@ fn points_of_something_else_are_noticed() {
     scene.write("sparse/0/points3D.txt", moved);
     let dataset = open(&scene, "");
     assert!(
-        matches!(&dataset.flaws[..], [Flaw::Frame(text)] if text.contains("different frames")),
+        matches!(&dataset.flaws[..], [SceneProblem::Frame(text)] if text.contains("different frames")),
         "{:?}",
         dataset.flaws
     );
@@ -161,7 +161,8 @@ fn one_camera_far_away_moves_nothing() {
     for (distance, count) in [(38_000.0, VIEWS - 1), (60.0, VIEWS)] {
         let dataset = open(&ball(stray(distance)), "");
         assert_eq!(dataset.train.len(), count, "{distance}");
-        let left_out = dataset.flaws.iter().any(|flaw| matches!(flaw, Flaw::LeftOut(text) if text.contains("07.png")));
+        let left_out =
+            dataset.flaws.iter().any(|flaw| matches!(flaw, SceneProblem::LeftOut(text) if text.contains("07.png")));
         assert_eq!(left_out, count < VIEWS, "{:?}", dataset.flaws);
         assert!((dataset.extent() / usual - 1.0).abs() < 0.2, "{distance}: {} {usual}", dataset.extent());
     }

@@ -9,8 +9,8 @@ use crate::error::{Error, Result, Setting};
 use crate::gpu::Gpu;
 use crate::label::vote::ballot::columns_for;
 use crate::pass::KernelShape;
-use crate::scene::pixels::Source;
-use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, crew};
+use crate::scene::pixels::PixelSource;
+use crate::scene::{Dataset, Gaussians, LabelMap, Pixels, View, parallel};
 use crate::scheduler::SchedulerOptions;
 use crate::train::input::known_depths::KnownDepths;
 use crate::train::input::part::PhotoPart;
@@ -119,7 +119,7 @@ pub(in crate::train) fn train_views(
     let views = &dataset.train;
     let of = |index: usize| train_view((index, &views[index]), border, most);
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
-    for found in crew::map("preparing photos", views.len(), crew::at_once(views.iter()), of) {
+    for found in parallel::map_bounded("preparing photos", views.len(), parallel::views_at_once(views.iter()), of) {
         let (view, of_view) = found?;
         whole.push(view);
         parts.extend(of_view);
@@ -136,7 +136,7 @@ fn train_view((index, view): (usize, &View), border: u32, most: Option<u32>) -> 
     let parts = PhotoPart::split((index, &view.camera), &pixels, mask.as_deref(), &labels, most);
     let view_labels = match &view.mask {
         Some(mask) if !mask.is_held() => {
-            Pixels::made(Arc::new(LazyViewLabels { mask: mask.clone(), border }), Default::default())
+            Pixels::from_source(Arc::new(LazyViewLabels { mask: mask.clone(), border }), Default::default())
         }
         _ => labels.into(),
     };
@@ -161,7 +161,7 @@ struct LazyViewLabels {
     border: u32,
 }
 
-impl Source<Vec<u32>> for LazyViewLabels {
+impl PixelSource<Vec<u32>> for LazyViewLabels {
     fn make(&self) -> Result<Arc<Vec<u32>>> {
         Ok(Arc::new(step_input::view_labels(&*self.mask.get()?, self.border)))
     }

@@ -164,7 +164,7 @@ impl Trainer {
         let step = self.step + 1;
         let mut done = self.work(JobTime::Before, step)?;
         let input = self.input(step)?;
-        if fault::at("nan").is_some() {
+        if fault::injected("nan").is_some() {
             self.context.engine.spoil()?;
         }
         done.extend(self.submit_next(input)?);

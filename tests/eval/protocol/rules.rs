@@ -6,7 +6,7 @@ use labelgs::eval::page::Page;
 use labelgs::eval::protocol::{Protocol, SelectBy};
 use labelgs::eval::{PictureObserver, ScoredPicture};
 use labelgs::files::image::{read_grey, write_png_grey8};
-use labelgs::scene::colour::{HEAT, HEAT_MAX, on_scale};
+use labelgs::scene::colour::{HEAT_COLOURS, HEAT_MAX, colour_on_scale};
 use labelgs::scenes::truth::read_truth;
 use std::collections::BTreeMap;
 use tempfile::tempdir;
@@ -135,6 +135,10 @@ fn the_page_shows_each_picture_and_needs_no_network() {
     assert_eq!(colours.len(), 4, "found and true, only found, only true, neither");
     let plain = image::open(place.join("00002-difference.png")).expect("PNG").into_rgb8();
     let mean = (0.2 + 0.3 + 0.8) / 3.0;
-    assert_eq!(plain.get_pixel(0, 0).0, on_scale(&HEAT, mean / HEAT_MAX), "the mean difference of the channels");
+    assert_eq!(
+        plain.get_pixel(0, 0).0,
+        colour_on_scale(&HEAT_COLOURS, mean / HEAT_MAX),
+        "the mean difference of the channels"
+    );
     assert!(Page::new(&place).is_err_and(|error| exit_status(&error) == 2), "another page's pictures would stay");
 }

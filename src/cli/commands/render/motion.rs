@@ -93,7 +93,7 @@ impl MotionArgs {
         let cameras = || views.iter().map(|view| &view.camera);
         // The cosine makes a ball of the radius touch the edge of the picture.
         let distance = MARGIN * radius * (2.0 * FOCAL).hypot(1.0);
-        let (target, distance, raised) = match Overview::of(cameras()) {
+        let (target, distance, raised) = match Overview::from_cameras(cameras()) {
             Some(all) => {
                 let heights = cameras().map(|camera| (camera.centre() - all.target).dot(up)).sum::<f64>();
                 let share = (heights / views.len() as f64 / all.distance).clamp(-0.9, 0.9);

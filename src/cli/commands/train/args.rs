@@ -5,7 +5,7 @@ use crate::cli::commands::view::WatchArgs;
 use crate::cli::support::FileArgs;
 use crate::cli::support::parsers::bytes;
 use crate::cli::support::settings::{Assignment, assignment, by_key};
-use crate::options::typed::Typed;
+use crate::options::typed::TypedOptions;
 use crate::run::{Inputs, Request, ResumeSettings, RunOptions, Settings, Start};
 use crate::scenes::ReadOptions;
 use crate::train::{Occlusion, Preset, TrainConfig};
@@ -88,13 +88,13 @@ pub struct TrainFlags {
     #[arg(long, value_name = "NAME", conflicts_with = "config", hide_possible_values = true)]
     pub preset: Option<Preset>,
     #[command(flatten)]
-    pub read: Typed<ReadOptions>,
+    pub read: TypedOptions<ReadOptions>,
     /// The training.
     #[command(flatten)]
-    pub train: Typed<TrainConfig>,
+    pub train: TypedOptions<TrainConfig>,
     /// Files of the run.
     #[command(flatten)]
-    pub run: Typed<RunOptions>,
+    pub run: TypedOptions<RunOptions>,
 }
 
 impl TrainFlags {

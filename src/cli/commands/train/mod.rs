@@ -5,7 +5,7 @@ mod network;
 
 use crate::Result;
 use crate::cli::commands::train::args::TrainArgs;
-use crate::cli::commands::view::Typed;
+use crate::cli::commands::view::TypedOptions;
 use crate::cli::support::shell_words::typed;
 use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted, signals};
 use crate::report::text::duration;
@@ -42,7 +42,7 @@ pub(crate) fn train(request: Request, context: &Context) -> Result<Summary> {
 fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
     let viewer = args.watch.server.start(args.watch.view_share)?;
     tracing::info!("the training is shown at {}", viewer.address());
-    let words = Typed { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
+    let words = TypedOptions { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
     let mut terminal = Terminal { context, progress: None };
     let title = args.output.display().to_string();
     observed(request, context, &mut Watched::new(&viewer, &mut terminal, title, &words))

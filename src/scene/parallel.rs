@@ -1,6 +1,6 @@
-//! Work on many pictures, each of which takes much memory: on as many threads as memory allows.
+//! Ordered parallel maps with a bounded number of workers, for items that need much memory.
 //!
-//! A pool that steals work, such as that of rayon, may begin a second picture while it waits for a part of the first.
+//! A work-stealing pool such as rayon's may start a second item while it waits for a part of the first.
 
 use super::View;
 use crate::stage::Stage;
@@ -8,14 +8,14 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
-/// Returns `of` of the numbers below `count`, in order, from at most `workers` threads; `what` names the work for who shows its
-/// progress.
-pub fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+/// Applies `make` to the numbers below `count` on at most `workers` threads. Returns the results in order. `what` names
+/// the work in progress displays.
+pub fn map_bounded<T: Send>(what: &str, count: usize, workers: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let stage = Stage::new(what, count);
-    let of = |index| stage.counted(|| of(index));
+    let make = |index| stage.counted(|| make(index));
     let workers = workers.min(count).min(rayon::current_num_threads());
     if workers < 2 {
-        return (0..count).map(of).collect();
+        return (0..count).map(make).collect();
     }
     let next = AtomicUsize::new(0);
     let work = || {
@@ -25,7 +25,7 @@ pub fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize)
             if index >= count {
                 return done;
             }
-            done.push((index, of(index)));
+            done.push((index, make(index)));
         }
     };
     let mut all = thread::scope(|scope| {
@@ -37,13 +37,14 @@ pub fn map<T: Send>(what: &str, count: usize, workers: usize, of: impl Fn(usize)
     all.into_iter().map(|(_, done)| done).collect()
 }
 
-/// Returns `of` of each view, in order, as [`map`] does. As many views at a time have their pixels in memory as there is memory for.
-pub fn over_views<T: Send>(what: &str, views: &[&View], of: impl Fn(&View) -> T + Sync) -> Vec<T> {
-    map(what, views.len(), at_once(views.iter().copied()), |index| of(views[index]))
+/// Applies `make` to each view. Returns the results in order, like [`map_bounded`]. Limits the number of views in
+/// progress by the memory for their pixels.
+pub fn map_views<T: Send>(what: &str, views: &[&View], make: impl Fn(&View) -> T + Sync) -> Vec<T> {
+    map_bounded(what, views.len(), views_at_once(views.iter().copied()), |index| make(views[index]))
 }
 
-/// Number of views whose pixels may be asked for at the same time.
-pub fn at_once<'a>(views: impl Iterator<Item = &'a View>) -> usize {
+/// Returns the number of views whose pixels fit into memory at the same time.
+pub fn views_at_once<'a>(views: impl Iterator<Item = &'a View>) -> usize {
     let of_view = |view: &View| {
         let photo = view.photo.as_ref().map_or(usize::MAX, |photo| photo.at_once());
         view.mask.as_ref().map_or(usize::MAX, |mask| mask.at_once()).min(photo)
@@ -53,13 +54,13 @@ pub fn at_once<'a>(views: impl Iterator<Item = &'a View>) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::map;
+    use super::map_bounded;
 
     #[test]
     fn results_are_in_order_for_any_number_of_threads() {
         for workers in [0, 1, 2, 7, usize::MAX] {
-            assert_eq!(map("", 5, workers, |index| index * index), [0, 1, 4, 9, 16]);
+            assert_eq!(map_bounded("", 5, workers, |index| index * index), [0, 1, 4, 9, 16]);
         }
-        assert_eq!(map("", 0, 4, |index| index), [0_usize; 0]);
+        assert_eq!(map_bounded("", 0, 4, |index| index), [0_usize; 0]);
     }
 }
