@@ -1,4 +1,4 @@
-//! What an encoder has seen of a photo, in memory and on the disk.
+//! The features of a photo from the encoder, in memory and on disk.
 
 use super::network::Network;
 use half::f16;
@@ -9,12 +9,12 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Most bytes of features on the disk, of all networks: two thousand photos of MobileSAM.
+/// Most bytes of features on disk, over all networks: two thousand photos of MobileSAM.
 const BYTES_MAX: u64 = 4 << 30;
-/// Beginning of the names of the networks' folders.
-const FOLDER: &str = "features-";
+/// Prefix of the folders, one for each network.
+const FOLDER_PREFIX: &str = "features-";
 
-/// The features of a photo, in 16 bits: so they are the same, fresh or from the disk.
+/// The features of a photo in 16 bits, so that they are the same whether fresh or read from disk.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     /// Width and height of the photo, px.
@@ -32,14 +32,14 @@ impl Features {
         self.tensors.iter().all(|(_, values)| values.iter().all(|value| value.is_finite()))
     }
 
-    /// Returns shapes and values.
+    /// Returns the shapes and values.
     pub(crate) fn tensors(&self) -> impl Iterator<Item = (&[usize], Vec<f32>)> {
         self.tensors
             .iter()
             .map(|(shape, values)| (shape.as_slice(), values.iter().map(|value| value.to_f32()).collect()))
     }
 
-    /// Reads features that [`Features::write`] wrote; `None` if there are none that can be read.
+    /// Reads features that [`Features::write`] wrote; `None` if they are missing or unreadable.
     pub fn read(path: &Path, photo: (u32, u32)) -> Option<Self> {
         let bytes = read::bytes(path).ok()?;
         let file = SafeTensors::deserialize(&bytes).ok()?;
@@ -69,14 +69,14 @@ impl Features {
     }
 }
 
-/// Returns a number that tells contents of files apart.
+/// Returns a hash of file content.
 pub fn digest(bytes: &[u8]) -> u64 {
     let half = bytes.len() / 2;
     let (first, second) = (crc32fast::hash(bytes), crc32fast::hash(&bytes[half..]));
     (u64::from(first) << 32 | u64::from(second)) ^ bytes.len() as u64
 }
 
-/// Features of photos on the disk, for one network.
+/// Features on disk, for one network.
 #[derive(Clone, Debug)]
 pub struct FeatureCache {
     folder: Option<PathBuf>,
@@ -84,34 +84,34 @@ pub struct FeatureCache {
 }
 
 impl FeatureCache {
-    /// Uses a folder, which writing creates; without one, nothing is kept. Where the features of all networks there take more than
-    /// 4 GiB, those that were not used for longest are deleted.
+    /// Uses a folder, which is created on the first write; `None` disables the cache. If the features of all networks
+    /// in the folder exceed 4 GiB, the least recently used ones are deleted.
     pub fn new(folder: Option<&Path>, network: &Network) -> Self {
-        let folder = folder.map(|folder| folder.join(format!("{FOLDER}{}", network.digest)));
+        let folder = folder.map(|folder| folder.join(format!("{FOLDER_PREFIX}{}", network.digest)));
         Self { folder, bytes_max: BYTES_MAX }
     }
 
-    /// Sets the most bytes that features may take.
+    /// Sets the size limit of the cache, bytes.
     pub fn bounded(self, bytes_max: u64) -> Self {
         Self { bytes_max, ..self }
     }
 
-    /// Returns the file of a photo's features, if they are kept.
+    /// Returns the file for a photo's features if the cache has a folder.
     fn file(&self, photo: &Photo) -> Option<PathBuf> {
         let digest = digest(photo.rgba.as_flattened());
         Some(self.folder.as_ref()?.join(format!("{digest:016x}-{}x{}.safetensors", photo.width, photo.height)))
     }
 
-    /// Returns true if the features of a photo are on the disk.
+    /// Returns true if the features of a photo are on disk.
     pub fn holds(&self, photo: &Photo) -> bool {
         self.file(photo).is_some_and(|path| path.is_file())
     }
 
-    /// Returns the features of a photo: those on the disk, or fresh ones, which are written there.
-    pub fn of(&self, network: &Network, photo: &Photo) -> Result<Features> {
+    /// Returns the features of a photo from disk, or computes and stores them.
+    pub fn features(&self, network: &Network, photo: &Photo) -> Result<Features> {
         let Some(path) = self.file(photo) else { return network.encode(photo) };
         if let Some(found) = Features::read(&path, (photo.width, photo.height)) {
-            // A file that cannot be marked as used is deleted sooner.
+            // If a file cannot be marked as used, it is deleted sooner.
             let _ = File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
             return Ok(found);
         }
@@ -124,10 +124,11 @@ impl FeatureCache {
     }
 }
 
-/// Deletes the features that were not used for longest, but for `newest`, until those that are left take `bytes_max` at most.
-/// What cannot be listed or deleted stays: other processes use the folder too.
+/// Deletes the least recently used features, except `newest`, until the rest takes at most `bytes_max`. Ignores files
+/// that cannot be listed or deleted, because other processes share the folder.
 fn bound(folder: &Path, bytes_max: u64, newest: &Path) {
-    let of_network = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(FOLDER));
+    let of_network =
+        |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(FOLDER_PREFIX));
     let networks = read::folder(folder).unwrap_or_default().into_iter().filter(of_network);
     let files = networks.flat_map(|network| read::folder(&network).unwrap_or_default());
     let mut used: Vec<(SystemTime, u64, PathBuf)> = files

@@ -1,27 +1,28 @@
-//! Inputs and outputs of exported networks, by the names that their exporters give.
+//! Inputs and outputs of exported networks, by the names that exporters use.
 //!
-//! Known: `export_onnx_model.py` of Segment Anything and MobileSAM, samexporter's SAM, MobileSAM and SAM 2, EdgeSAM's exporter.
+//! Supported: `export_onnx_model.py` of Segment Anything and MobileSAM; samexporter for SAM, MobileSAM and SAM 2;
+//! EdgeSAM's exporter.
 
 use labelgs_files::read;
 use labelgs_scene::{Error, Result};
 use rten::{Dimension, Model, NodeId};
 use std::path::{Path, PathBuf};
 
-/// Longest side of a photo in a network that does not say it, px.
-const SIDE: usize = 1024;
-/// Names of features, in the order in which the decoder takes them.
-const EMBEDDINGS: [&str; 4] = ["image_embeddings", "image_embed", "high_res_feats_0", "high_res_feats_1"];
-const MASKS: [&str; 2] = ["low_res_masks", "masks"];
-const SCORES: [&str; 2] = ["iou_predictions", "scores"];
-/// Inner values of decoders that were exported to return one mask: all four masks and their scores.
+/// Default longest side of a photo if the network does not specify one, px.
+const DEFAULT_SIDE: usize = 1024;
+/// Names of features, in the decoder's order.
+const EMBEDDING_NAMES: [&str; 4] = ["image_embeddings", "image_embed", "high_res_feats_0", "high_res_feats_1"];
+const MASK_NAMES: [&str; 2] = ["low_res_masks", "masks"];
+const SCORE_NAMES: [&str; 2] = ["iou_predictions", "scores"];
+/// Intermediate values of decoders exported with a single mask output: all four masks and their scores.
 const ALL_MASKS: [(&str, &str); 1] = [("/Reshape_9_output_0", "/iou_prediction_head/layers.2/Gemm_output_0")];
 
-/// How a photo lies in the square of the network.
+/// How a photo is placed in the network's square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fit {
-    /// At the upper left, in its own shape.
+    /// At the upper left, with its aspect ratio.
     Padded,
-    /// Over all of it (SAM 2).
+    /// Stretched over the whole square (SAM 2).
     Stretched,
 }
 
@@ -31,7 +32,7 @@ pub struct EncoderPorts {
     pub outputs: Vec<NodeId>,
     /// Names of the outputs.
     names: Vec<String>,
-    /// The photo is `[height][width][channel]` from 0 to 255, and the network normalises it.
+    /// Whether the photo is `[height][width][channel]` from 0 to 255 and the network normalises it.
     pub raw: bool,
     /// Side of the square, px.
     pub side: usize,
@@ -40,7 +41,7 @@ pub struct EncoderPorts {
 
 /// The ports of a decoder.
 pub struct DecoderPorts {
-    /// The inputs for the outputs of the encoder, in their order.
+    /// The inputs for the encoder's outputs, in the same order.
     pub embeddings: Vec<NodeId>,
     pub point_coords: NodeId,
     pub point_labels: NodeId,
@@ -69,8 +70,8 @@ pub fn pair_in(folder: &Path) -> Result<(PathBuf, PathBuf)> {
             folder,
             "",
             format!(
-                "has {} files *encoder.onnx and {} files *decoder.onnx or sam.onnx; expected one of each, the encoder and \
-                 the decoder of one network",
+                "has {} files *encoder.onnx and {} files *decoder.onnx or sam.onnx; expected one of each, from \
+                 the same network",
                 encoders.len(),
                 decoders.len()
             ),
@@ -95,7 +96,7 @@ fn sides(model: &Model, id: NodeId) -> Vec<Option<usize>> {
 }
 
 impl EncoderPorts {
-    pub fn of(model: &Model, path: &Path) -> Result<Self> {
+    pub fn find(model: &Model, path: &Path) -> Result<Self> {
         let refuse = |problem: String| Error::data(path, "", problem);
         let &[input] = model.input_ids() else {
             let found = list(&names(model, model.input_ids()));
@@ -103,14 +104,14 @@ impl EncoderPorts {
         };
         let outputs = names(model, model.output_ids());
         let found: Vec<&(String, NodeId)> =
-            EMBEDDINGS.iter().filter_map(|known| outputs.iter().find(|(name, _)| name == known)).collect();
-        // An encoder with one output leaves no choice, whatever the name is.
+            EMBEDDING_NAMES.iter().filter_map(|known| outputs.iter().find(|(name, _)| name == known)).collect();
+        // A single output is the feature, whatever its name.
         let chosen = if found.is_empty() && outputs.len() == 1 { vec![&outputs[0]] } else { found };
         if chosen.is_empty() {
             return Err(refuse(format!(
                 "has the outputs {}; expected one of {}",
                 list(&outputs),
-                EMBEDDINGS.join(", ")
+                EMBEDDING_NAMES.join(", ")
             )));
         }
         let shape = sides(model, input);
@@ -125,14 +126,14 @@ impl EncoderPorts {
             outputs: chosen.iter().map(|(_, id)| *id).collect(),
             names: chosen.iter().map(|(name, _)| name.clone()).collect(),
             raw,
-            side: side.unwrap_or(SIDE),
+            side: side.unwrap_or(DEFAULT_SIDE),
             fit,
         })
     }
 }
 
 impl DecoderPorts {
-    pub fn of(model: &Model, path: &Path, encoder: &EncoderPorts) -> Result<Self> {
+    pub fn find(model: &Model, path: &Path, encoder: &EncoderPorts) -> Result<Self> {
         let (inputs, outputs) = (names(model, model.input_ids()), names(model, model.output_ids()));
         let port = |ports: &[(String, NodeId)], wanted: &[&str]| {
             wanted.iter().find_map(|wanted| ports.iter().find(|(name, _)| name == wanted)).map(|(_, id)| *id)
@@ -142,15 +143,15 @@ impl DecoderPorts {
             port(ports, wanted).ok_or_else(|| Error::data(path, "", problem()))
         };
         let embeddings = match encoder.names.as_slice() {
-            [one] => vec![need("inputs", &inputs, &[one, EMBEDDINGS[0], EMBEDDINGS[1]])?],
+            [one] => vec![need("inputs", &inputs, &[one, EMBEDDING_NAMES[0], EMBEDDING_NAMES[1]])?],
             several => several.iter().map(|name| need("inputs", &inputs, &[name])).collect::<Result<_>>()?,
         };
         let inner = ALL_MASKS.iter().find_map(|(masks, scores)| {
             let (masks, scores) = (model.find_node(masks)?, model.find_node(scores)?);
             Some((masks, scores))
         });
-        let masks = need("outputs", &outputs, &MASKS)?;
-        let scores = need("outputs", &outputs, &SCORES)?;
+        let masks = need("outputs", &outputs, &MASK_NAMES)?;
+        let scores = need("outputs", &outputs, &SCORE_NAMES)?;
         let single = sides(model, masks).get(1) == Some(&Some(1));
         let (masks, scores) = inner.filter(|_| single).unwrap_or((masks, scores));
         let ports = Self {
@@ -168,8 +169,7 @@ impl DecoderPorts {
             known.chain([ports.mask_input, ports.has_mask_input, ports.orig_im_size].into_iter().flatten()).collect();
         let unknown: Vec<(String, NodeId)> = inputs.iter().filter(|(_, id)| !known.contains(id)).cloned().collect();
         if !unknown.is_empty() {
-            let problem =
-                format!("has inputs that are unknown: {}; all its inputs are {}", list(&unknown), list(&inputs));
+            let problem = format!("has unknown inputs: {}; all its inputs are {}", list(&unknown), list(&inputs));
             return Err(Error::data(path, "", problem));
         }
         Ok(ports)

@@ -1,4 +1,4 @@
-//! Nested masks of a photo as levels: ids for parts, for objects and for wholes.
+//! Nested masks of a photo as levels: ids for parts, objects and wholes.
 
 use super::candidate::{Candidate, Search, candidates};
 use super::features::Features;
@@ -8,30 +8,30 @@ use labelgs_masks::nested::FoundMask;
 use labelgs_scene::{LabelMap, Result};
 use std::collections::BTreeSet;
 
-/// Largest share of a photo that a whole has; larger masks are the surroundings.
+/// Largest share of a photo that a whole may cover; larger masks are surroundings.
 const WHOLE_SHARE_MAX: f64 = 0.4;
 
-/// Which of nested masks has a pixel.
+/// Which of the nested masks a pixel belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// The smallest.
+    /// The smallest mask.
     Parts,
-    /// The mask that explains more than the masks inside of it do together.
+    /// The mask that explains more than its parts do together.
     Objects,
-    /// The largest that is no part of the surroundings.
+    /// The largest mask that is not part of the surroundings.
     Wholes,
 }
 
 /// The masks of a photo.
 #[derive(Clone, Debug)]
 pub struct PhotoMasks {
-    /// All of them, the best first.
+    /// All masks, best first.
     pub masks: Vec<FoundMask>,
-    /// A picture of ids from 1 for each level that was asked for.
+    /// An id map from 1 for each requested level.
     pub levels: Vec<LabelMap>,
 }
 
-/// Finds the masks of a photo, and paints those of each level, at a size in px.
+/// Finds the masks of a photo, and paints those of each level at a size, px.
 pub fn masks_of_photo(
     network: &Network,
     features: &Features,
@@ -54,11 +54,11 @@ pub fn masks_of_photo(
         score: mask.score,
         stability: mask.stability,
     });
-    // A mask without a pixel at this size is nothing.
+    // Ignore masks without a pixel at this size.
     Ok(PhotoMasks { masks: found.filter(|mask| mask.inside.contains(&true)).collect(), levels })
 }
 
-/// Returns the numbers of the masks of a level, those that lie on top of others last.
+/// Returns the indices of a level's masks, with those on top last.
 fn of_level(masks: &[Candidate], level: Level) -> Vec<usize> {
     let mut by_area: Vec<usize> = (0..masks.len()).collect();
     by_area.sort_by_key(|&mask| (std::cmp::Reverse(masks[mask].area), mask));
@@ -85,7 +85,7 @@ fn objects(masks: &[Candidate]) -> BTreeSet<usize> {
     explain::objects(&areas, &qualities, &parts, |chosen| explained(masks, chosen))
 }
 
-/// Returns the sum over cells of the best quality of the masks there.
+/// Returns the sum over cells of the best mask quality there.
 fn explained(masks: &[Candidate], chosen: &BTreeSet<usize>) -> f64 {
     let mut best = vec![0.0_f64; masks.first().map_or(0, Candidate::cells)];
     for &mask in chosen {
@@ -95,7 +95,7 @@ fn explained(masks: &[Candidate], chosen: &BTreeSet<usize>) -> f64 {
     best.iter().sum()
 }
 
-/// Paints masks as ids from 1, later ones on top. Masks that others cover have no id.
+/// Paints masks as ids from 1, later ones on top. Fully covered masks get no id.
 fn painted(masks: &[&[bool]], (width, height): (u32, u32)) -> LabelMap {
     let mut top = vec![0_usize; (width * height) as usize];
     for (mask, number) in masks.iter().zip(1..) {
@@ -103,7 +103,7 @@ fn painted(masks: &[&[bool]], (width, height): (u32, u32)) -> LabelMap {
     }
     let seen: BTreeSet<usize> = top.iter().copied().filter(|&number| number != 0).collect();
     let mut ids = vec![0_u16; masks.len() + 1];
-    // Beyond the last id of a picture lie the smallest masks, which nobody misses.
+    // Masks beyond the largest id are dropped; they are the smallest.
     seen.iter().zip(1..=u16::MAX).for_each(|(&number, id)| ids[number] = id);
     LabelMap { width, height, ids: top.into_iter().map(|number| ids[number]).collect() }
 }

@@ -1,6 +1,6 @@
-//! Masks of single photos by a promptable segmentation network ([`Network`]), whose weights the user names.
+//! Masks of single photos from a promptable segmentation network ([`Network`]), whose weights the user supplies.
 //!
-//! An encoder sees a photo once ([`Features`]); a decoder answers prompts ([`Prompt`]) with masks.
+//! An encoder processes a photo once ([`Features`]); a decoder answers prompts ([`Prompt`]) with masks.
 
 mod candidate;
 mod features;
@@ -12,5 +12,5 @@ mod prompt;
 pub use candidate::Search;
 pub use features::{FeatureCache, Features};
 pub use levels::{Level, PhotoMasks, masks_of_photo};
-pub use network::{Answer, Network, Prepared, threads_for};
-pub use prompt::{Frame, Place, Prompt};
+pub use network::{Answer, Network, PreparedPhoto, threads_for};
+pub use prompt::{Frame, PhotoPoint, Prompt};

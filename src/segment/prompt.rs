@@ -1,4 +1,4 @@
-//! Prompts, and where a photo lies in a network.
+//! Prompts, and the layout of a photo in a network.
 
 use super::interface::Fit;
 use super::network::Answer;
@@ -6,33 +6,33 @@ use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use labelgs_scene::Photo;
 
-/// Cells of a mask per side of the square of these networks.
-pub(crate) const GRID: usize = 256;
+/// Mask cells per side of these networks' square.
+pub(crate) const MASK_GRID_SIDE: usize = 256;
 
-/// A place in a photo, px.
-pub type Place = [f32; 2];
+/// A position in a photo, px.
+pub type PhotoPoint = [f32; 2];
 
-/// What is asked for.
+/// What to segment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prompt {
-    /// Places on the object.
-    pub on: Vec<Place>,
-    /// Places that are not on it.
-    pub off: Vec<Place>,
-    /// A box around it: its least and its largest corner.
-    pub area: Option<[Place; 2]>,
+    /// Points on the object.
+    pub on: Vec<PhotoPoint>,
+    /// Points off the object.
+    pub off: Vec<PhotoPoint>,
+    /// A box around the object: its smallest and its largest corner.
+    pub area: Option<[PhotoPoint; 2]>,
 }
 
 impl Prompt {
-    /// Asks for what lies at a place.
-    pub fn at(place: Place) -> Self {
+    /// Prompts with a single point on the object.
+    pub fn from_point(place: PhotoPoint) -> Self {
         Self { on: vec![place], ..Self::default() }
     }
 
-    /// Returns the prompt for a photo of another size, whose pixels are the places times `scale`.
+    /// Returns the prompt for a photo of another size, with all positions multiplied by `scale`.
     pub fn scaled(&self, scale: [f32; 2]) -> Self {
-        let place = |place: &Place| [place[0] * scale[0], place[1] * scale[1]];
-        let places = |places: &[Place]| places.iter().map(place).collect();
+        let place = |place: &PhotoPoint| [place[0] * scale[0], place[1] * scale[1]];
+        let places = |places: &[PhotoPoint]| places.iter().map(place).collect();
         Self {
             on: places(&self.on),
             off: places(&self.off),
@@ -40,7 +40,7 @@ impl Prompt {
         }
     }
 
-    /// Returns the points for the decoder, in its pixels, and what each is: 1 on, 0 off, 2 and 3 corners, -1 padding.
+    /// Returns the points for the decoder, in its pixels, with their types: 1 on, 0 off, 2 and 3 corners, -1 padding.
     pub(crate) fn tensors(&self, frame: &Frame) -> (Vec<f32>, Vec<f32>) {
         let on = self.on.iter().map(|place| (place, 1.0)).chain(self.off.iter().map(|place| (place, 0.0)));
         let corners = self.area.iter().flat_map(|[least, largest]| [(least, 2.0), (largest, 3.0)]);
@@ -49,7 +49,7 @@ impl Prompt {
             coordinates.extend([place[0] * frame.scale[0], place[1] * frame.scale[1]]);
             labels.push(label);
         }
-        // Without a box, these networks were trained with a point of padding.
+        // Without a box, these networks were trained with a padding point.
         if self.area.is_none() {
             coordinates.extend([0.0, 0.0]);
             labels.push(-1.0);
@@ -57,8 +57,8 @@ impl Prompt {
         (coordinates, labels)
     }
 
-    /// Returns the masks that answer this kind of prompt. Of four, the first is meant for several points or a box, the
-    /// others are a part, an object and a whole for one point.
+    /// Selects the masks that answer this kind of prompt. Of four masks, the first is for several points or a box; the
+    /// others are a part, an object and a whole for a single point.
     pub(crate) fn choose(&self, frame: &Frame, logits: &[f32], scores: &[f32]) -> Answer {
         let single = self.area.is_none() && self.on.len() + self.off.len() == 1;
         let chosen = match (scores.len(), single) {
@@ -68,28 +68,30 @@ impl Prompt {
         };
         let (width, height) = frame.grid();
         let cropped = |mask: usize| {
-            let rows = logits[mask * GRID * GRID..][..GRID * GRID].chunks(GRID).take(height);
+            let rows = logits[mask * MASK_GRID_SIDE * MASK_GRID_SIDE..][..MASK_GRID_SIDE * MASK_GRID_SIDE]
+                .chunks(MASK_GRID_SIDE)
+                .take(height);
             rows.flat_map(|row| &row[..width]).copied().collect()
         };
         Answer { masks: chosen.clone().map(cropped).collect(), scores: chosen.map(|mask| scores[mask]).collect() }
     }
 }
 
-/// Where a photo lies in the square of a network and on the grid of its masks.
+/// The layout of a photo in a network's square and on its mask grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Width and height of the photo, px.
     pub size: (u32, u32),
     /// Side of the square, px.
     pub side: usize,
-    /// Pixels of the network per pixel of the photo, along x and y.
+    /// Network pixels per photo pixel, along x and y.
     pub scale: [f32; 2],
     /// The part of the square that the photo covers, px.
     covered: (u32, u32),
 }
 
 impl Frame {
-    /// Lays out a photo of a size.
+    /// Computes the layout of a photo with the given size.
     pub(crate) fn new(size: (u32, u32), side: usize, fit: Fit) -> Self {
         let square = side as u32;
         let covered = match fit {
@@ -104,13 +106,13 @@ impl Frame {
         Self { size, side, scale, covered }
     }
 
-    /// Returns width and height of the photo on the grid of masks, cells.
+    /// Returns the width and height of the photo on the mask grid, cells.
     pub fn grid(&self) -> (usize, usize) {
-        let cells = |px: u32| (px as usize * GRID).div_ceil(self.side).clamp(1, GRID);
+        let cells = |px: u32| (px as usize * MASK_GRID_SIDE).div_ceil(self.side).clamp(1, MASK_GRID_SIDE);
         (cells(self.covered.0), cells(self.covered.1))
     }
 
-    /// Returns the photo at its size in the network.
+    /// Resizes the photo for the network.
     pub(crate) fn resized(&self, photo: &Photo) -> RgbImage {
         let at = |x: u32, y: u32| {
             let [r, g, b, _] = photo.rgba[(y * photo.width + x) as usize];
@@ -120,7 +122,8 @@ impl Frame {
         resize(&picture, self.covered.0, self.covered.1, FilterType::Triangle)
     }
 
-    /// Returns the pixels of a picture of the photo, of any size, in which the logits of cells are positive.
+    /// Returns a flag for each pixel of an image of the photo, of any size: true where the interpolated logit is
+    /// positive.
     pub fn drawn(&self, logits: &dyn Fn(usize) -> f32, (width, height): (u32, u32)) -> Vec<bool> {
         let step = [self.size.0 as f32 / width as f32, self.size.1 as f32 / height as f32];
         let grid = self.grid();
@@ -131,10 +134,10 @@ impl Frame {
         (0..width * height).map(inside).collect()
     }
 
-    /// Returns the logit of a mask at a place of the photo, px, between the centres of cells.
-    fn logit(&self, grid: (usize, usize), logits: &dyn Fn(usize) -> f32, place: Place) -> f32 {
+    /// Returns the logit of a mask at a position in the photo, px, interpolated between cell centres.
+    fn logit(&self, grid: (usize, usize), logits: &dyn Fn(usize) -> f32, place: PhotoPoint) -> f32 {
         let along = |axis: usize, cells: usize| {
-            let at = place[axis] * self.scale[axis] * GRID as f32 / self.side as f32 - 0.5;
+            let at = place[axis] * self.scale[axis] * MASK_GRID_SIDE as f32 / self.side as f32 - 0.5;
             let at = at.clamp(0.0, (cells - 1) as f32);
             let first = (at as usize).min(cells.saturating_sub(2));
             (first, (first + 1).min(cells - 1), at - first as f32)

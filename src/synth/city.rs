@@ -1,39 +1,40 @@
-//! A city: houses, trees, vehicles and lamps on plots of 4 x 4 units between streets, too large for one photo.
+//! A city: houses, trees, vehicles and lamps on plots of 4 x 4 units between streets, too large for a single photo.
 
-use super::land::{COLUMNS, PLOT, ROWS, STREET};
+use super::land::{PLOT_COLUMNS, PLOT_PITCH, PLOT_ROWS, STREET_HALF_WIDTH};
 use super::material::Pattern;
 use super::object::Row;
 use super::shape::Shape;
 use glam::DVec3;
 
-/// A house stands on each plot.
-const HOUSES: [&str; (COLUMNS * ROWS) as usize] = [
+/// One house per plot.
+const HOUSE_NAMES: [&str; (PLOT_COLUMNS * PLOT_ROWS) as usize] = [
     "townhall", "library", "bakery", "school", "theatre", "bank", "cinema", "museum", "hotel", "market", "chapel",
     "clinic", "brewery", "mill", "station", "court", "depot", "foundry", "gallery", "inn", "laundry", "studio",
     "villa", "workshop",
 ];
-const TREES: [&str; 14] = [
+const TREE_NAMES: [&str; 14] = [
     "oak", "birch", "beech", "elm", "linden", "maple", "willow", "poplar", "cedar", "pine", "larch", "yew", "alder",
     "rowan",
 ];
-const VEHICLES: [&str; 10] = ["taxi", "van", "coupe", "bus", "jeep", "wagon", "lorry", "roadster", "minibus", "tanker"];
-const LAMPS: [&str; 6] = ["lamp-1", "lamp-2", "lamp-3", "lamp-4", "lamp-5", "lamp-6"];
+const VEHICLE_NAMES: [&str; 10] =
+    ["taxi", "van", "coupe", "bus", "jeep", "wagon", "lorry", "roadster", "minibus", "tanker"];
+const LAMP_NAMES: [&str; 6] = ["lamp-1", "lamp-2", "lamp-3", "lamp-4", "lamp-5", "lamp-6"];
 
 /// Returns the objects, with ids 1, 2, ... in order.
 pub(super) fn rows() -> Vec<Row> {
-    let houses = HOUSES.iter().zip(0..).map(|(name, plot)| house(name, plot));
-    let vehicles = VEHICLES.iter().zip(0..).map(|(name, index)| vehicle(name, index));
-    let lamps = LAMPS.iter().zip(0..).map(|(name, index)| lamp(name, index));
+    let houses = HOUSE_NAMES.iter().zip(0..).map(|(name, plot)| house(name, plot));
+    let vehicles = VEHICLE_NAMES.iter().zip(0..).map(|(name, index)| vehicle(name, index));
+    let lamps = LAMP_NAMES.iter().zip(0..).map(|(name, index)| lamp(name, index));
     houses.chain(yards()).chain(vehicles).chain(lamps).collect()
 }
 
-/// A position in a plot, as shares of the mirrored axes, so that neighbours do not stand alike.
+/// Returns a position in a plot from shares along its mirrored axes, so that neighbouring plots differ.
 fn in_plot(plot: u32, across: f64, along: f64, height: f64) -> [f64; 3] {
-    let (column, row) = (plot % COLUMNS, plot / COLUMNS);
-    let middle = |index: u32, count: u32| (f64::from(index) + 0.5 - f64::from(count) / 2.0) * PLOT;
+    let (column, row) = (plot % PLOT_COLUMNS, plot / PLOT_COLUMNS);
+    let middle = |index: u32, count: u32| (f64::from(index) + 0.5 - f64::from(count) / 2.0) * PLOT_PITCH;
     let mirror = |odd: u32| if odd.is_multiple_of(2) { 1.0 } else { -1.0 };
     let (x, y) = (mirror(column + row) * across, mirror(row / 2 + column) * along);
-    [middle(column, COLUMNS) + x, middle(row, ROWS) + y, height]
+    [middle(column, PLOT_COLUMNS) + x, middle(row, PLOT_ROWS) + y, height]
 }
 
 fn house(name: &'static str, plot: u32) -> Row {
@@ -49,7 +50,7 @@ fn house(name: &'static str, plot: u32) -> Row {
     (name, shape, in_plot(plot, 0.3, 0.3, height), f64::from(plot * 11 % 17) - 8.0, pattern)
 }
 
-/// Trees and, on the plots without one, what else stands in front of houses.
+/// Returns the trees and, on plots without one, what else stands in front of houses.
 fn yards() -> impl Iterator<Item = Row> {
     let others = [
         ("fountain", Shape::Ring(0.26, 0.1), 0.1, Pattern::Wedges(6)),
@@ -70,8 +71,8 @@ fn yards() -> impl Iterator<Item = Row> {
         }
     };
     let is_wooded = |plot: &u32| plot * 7 % 12 < 7;
-    let (wooded, free): (Vec<u32>, Vec<u32>) = (0..COLUMNS * ROWS).partition(is_wooded);
-    let trees = TREES.iter().zip(0..).zip(wooded).map(move |((name, index), plot)| {
+    let (wooded, free): (Vec<u32>, Vec<u32>) = (0..PLOT_COLUMNS * PLOT_ROWS).partition(is_wooded);
+    let trees = TREE_NAMES.iter().zip(0..).zip(wooded).map(move |((name, index), plot)| {
         let (shape, height, pattern) = tree(index);
         (*name, shape, in_plot(plot, -0.85, -0.85, height), 0.0, pattern)
     });
@@ -81,24 +82,24 @@ fn yards() -> impl Iterator<Item = Row> {
     }))
 }
 
-/// Vehicles stand at the sides of the streets, so that a camera can pass between them.
+/// Vehicles are parked at the sides of streets, so that a camera can pass between them.
 fn vehicle(name: &'static str, index: u32) -> Row {
     let is_long = index.is_multiple_of(3);
     let half = if is_long { DVec3::new(0.42, 0.08, 0.14) } else { DVec3::new(0.24, 0.08, 0.07) };
     let height = half.z + 0.08;
     let side = if index.is_multiple_of(2) { 0.43 } else { -0.43 };
-    // Streets along x and y in turn; positions away from crossings.
-    let along = PLOT * (f64::from(index * 3 % 5) - 2.0) + 0.35 * f64::from(index % 4) - 0.6;
+    // Alternate streets along x and y; positions away from crossings.
+    let along = PLOT_PITCH * (f64::from(index * 3 % 5) - 2.0) + 0.35 * f64::from(index % 4) - 0.6;
     let (position, turn) = match index % 4 {
-        0 | 3 => ([along + PLOT / 2.0, PLOT * (f64::from(index / 4) - 1.0) + side, height], 0.0),
-        _ => ([PLOT * (f64::from(index % 5) - 2.0) + side, 0.7 * along + PLOT / 2.0 - 0.3, height], 90.0),
+        0 | 3 => ([along + PLOT_PITCH / 2.0, PLOT_PITCH * (f64::from(index / 4) - 1.0) + side, height], 0.0),
+        _ => ([PLOT_PITCH * (f64::from(index % 5) - 2.0) + side, 0.7 * along + PLOT_PITCH / 2.0 - 0.3, height], 90.0),
     };
     (name, Shape::RoundBlock(half, 0.08), position, turn, Pattern::Checks(0.14))
 }
 
-/// Lamps stand at the corners of crossings.
+/// Lamps are at the corners of crossings.
 fn lamp(name: &'static str, index: u32) -> Row {
-    let at = |crossing: u32, middle: f64| PLOT * (f64::from(crossing) - middle) + STREET + 0.1;
+    let at = |crossing: u32, middle: f64| PLOT_PITCH * (f64::from(crossing) - middle) + STREET_HALF_WIDTH + 0.1;
     let position = [at(index * 2 % 5, 2.0), at(index % 3, 1.0), 0.6];
     (name, Shape::RoundBlock(DVec3::new(0.0, 0.0, 0.55), 0.05), position, 0.0, Pattern::Stripes(0.2, 2))
 }

@@ -1,18 +1,20 @@
-//! Cameras over a city and in its streets.
+//! Cameras above a city and in its streets.
 
-use super::land::{COLUMNS, PLOT, ROWS};
+use super::land::{PLOT_COLUMNS, PLOT_PITCH, PLOT_ROWS};
 use super::{SynthOptions, hash01};
 use glam::DVec3;
 
 /// Every third photo is taken from a street.
 const STREETS_EVERY: u32 = 3;
-/// Distance of the other cameras from their targets, world units: with few photos they are farther, so that the photos
-/// overlap.
-const DISTANCE: (f64, f64) = (8.5, 16.0);
-/// Number of such photos that overlap enough from the least distance.
+/// Smallest distance of the other cameras from their targets, world units. The distance is larger if there are few photos,
+/// so that they overlap.
+const DISTANCE_MIN: f64 = 8.5;
+/// Largest distance of these cameras.
+const DISTANCE_MAX: f64 = 16.0;
+/// Number of photos that overlap enough at the smallest distance.
 const OVERLAP_COUNT: f64 = 120.0;
 /// Half the size of the city, world units.
-const HALF_SIZE: DVec3 = DVec3::new(COLUMNS as f64 * PLOT / 2.0, ROWS as f64 * PLOT / 2.0, 0.0);
+const HALF_SIZE: DVec3 = DVec3::new(PLOT_COLUMNS as f64 * PLOT_PITCH / 2.0, PLOT_ROWS as f64 * PLOT_PITCH / 2.0, 0.0);
 
 /// Returns the position of a view and the unit vector along its optical axis.
 pub(super) fn pose(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
@@ -22,7 +24,7 @@ pub(super) fn pose(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
     }
     let jitter = |what: u64| hash01(options.seed, 3, u64::from(view), what) - 0.5;
     let count = f64::from(options.views - streets);
-    // Targets and azimuths of sequences that cover the city evenly for any number of photos.
+    // Targets and azimuths come from sequences that cover the city evenly for any number of photos.
     let index = f64::from(view - before) + 0.5;
     let spread = |step: f64| 2.0 * (index * step).fract() - 1.0;
     let target =
@@ -31,15 +33,15 @@ pub(super) fn pose(options: &SynthOptions, view: u32) -> (DVec3, DVec3) {
     let elevation = (46.0 + 18.0 * jitter(1)).to_radians();
     let outward = DVec3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
     let distance =
-        (DISTANCE.0 * (OVERLAP_COUNT / count).sqrt()).clamp(DISTANCE.0, DISTANCE.1) * (1.0 + 0.1 * jitter(2));
+        (DISTANCE_MIN * (OVERLAP_COUNT / count).sqrt()).clamp(DISTANCE_MIN, DISTANCE_MAX) * (1.0 + 0.1 * jitter(2));
     (target + outward * distance, -outward)
 }
 
-/// Returns a pose in one of the streets between plots; `share` is its place in the way through all of them, 0 to 1.
+/// Returns a pose in a street between plots; `share`, 0 to 1, is the position along a path through all streets.
 fn in_street(options: &SynthOptions, view: u32, share: f64) -> (DVec3, DVec3) {
     let jitter = |what: u64| hash01(options.seed, 3, u64::from(view), what) - 0.5;
     // Streets along x, then streets along y.
-    let (rows, columns) = (ROWS - 1, COLUMNS - 1);
+    let (rows, columns) = (PLOT_ROWS - 1, PLOT_COLUMNS - 1);
     let way = f64::from(rows) * 2.0 * HALF_SIZE.x + f64::from(columns) * 2.0 * HALF_SIZE.y;
     let (mut at, mut street, mut length) = (share * way, 0, 2.0 * HALF_SIZE.x);
     while at >= length && street + 1 < rows + columns {
@@ -49,7 +51,7 @@ fn in_street(options: &SynthOptions, view: u32, share: f64) -> (DVec3, DVec3) {
     }
     let (along, aside) = if street < rows { (DVec3::X, DVec3::Y) } else { (DVec3::Y, DVec3::X) };
     let (index, count) = if street < rows { (street, rows) } else { (street - rows, columns) };
-    let middle = (f64::from(index) - f64::from(count - 1) / 2.0) * PLOT;
+    let middle = (f64::from(index) - f64::from(count - 1) / 2.0) * PLOT_PITCH;
     let position =
         along * (at - length / 2.0) + aside * (middle + 0.15 * jitter(0)) + DVec3::Z * (1.1 + 0.3 * jitter(1));
     // Near the end of a street the camera looks back into it.

@@ -1,4 +1,4 @@
-//! Lenses of the cameras of a made scene.
+//! Lenses of a synthetic scene's cameras.
 
 use super::SynthOptions;
 use labelgs_scene::{Camera, Error, Result, Setting};
@@ -6,8 +6,8 @@ use labelgs_scenes::lens::{self, CameraModel, Lens, MODELS, Optics};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
-/// Coefficients of a lens of each of COLMAP's camera models, in its order, of the size that calibrations find.
-const COEFFICIENTS: [&[f64]; MODELS.len()] = [
+/// Typical lens coefficients for each of COLMAP's camera models, in COLMAP's order.
+const LENS_COEFFICIENTS: [&[f64]; MODELS.len()] = [
     &[],
     &[],
     &[-0.08],
@@ -28,7 +28,7 @@ const COEFFICIENTS: [&[f64]; MODELS.len()] = [
     &[],
 ];
 
-/// The lens of all cameras: one of COLMAP's camera models, by its number, with coefficients of a usual lens.
+/// The lens of all cameras: one of COLMAP's camera models, by number, with typical coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SynthLens(usize);
 
@@ -42,7 +42,7 @@ impl FromStr for SynthLens {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let known = || format!("is no camera model; expected one of {}", MODELS.map(|model| model.name).join(", "));
+        let known = || format!("is not a camera model; expected one of {}", MODELS.map(|model| model.name).join(", "));
         MODELS.iter().position(|model| model.name == name).map(Self).ok_or_else(known)
     }
 }
@@ -54,7 +54,7 @@ impl Display for SynthLens {
 }
 
 impl SynthLens {
-    /// No lens.
+    /// Without distortion.
     pub const PINHOLE: Self = Self(1);
 
     /// Returns all lenses.
@@ -72,10 +72,10 @@ impl SynthLens {
     }
 
     fn lens(self) -> Lens {
-        (self.model().of_list)(COEFFICIENTS[self.0])
+        (self.model().of_list)(LENS_COEFFICIENTS[self.0])
     }
 
-    /// Returns COLMAP's parameters of a camera with this lens.
+    /// Returns COLMAP's parameters for a camera with this lens.
     pub(super) fn parameters(self, camera: &Camera) -> Vec<f64> {
         let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
         let first = match self.model().focals {
@@ -83,11 +83,11 @@ impl SynthLens {
             1 => vec![fx, cx, cy],
             _ => vec![fx, fy, cx, cy],
         };
-        [&first, COEFFICIENTS[self.0]].concat()
+        [&first, LENS_COEFFICIENTS[self.0]].concat()
     }
 }
 
-/// Puts the lens on a pinhole camera. The picture is as wide as that of the camera, or as the field of view asked for; a
+/// Mounts the lens on a pinhole camera. The image is as wide as the camera's, or as the requested field of view; a
 /// panorama shows everything.
 pub(super) fn mounted(options: &SynthOptions, camera: &Camera) -> Optics {
     let lens = options.lens.lens();
@@ -109,7 +109,7 @@ pub(super) fn mounted(options: &SynthOptions, camera: &Camera) -> Optics {
     Optics::new(camera, lens)
 }
 
-/// Refuses a field of view that the lens has not.
+/// Refuses a field of view that the lens does not support.
 pub(super) fn check(options: &SynthOptions) -> Result<()> {
     let lens = options.lens.lens();
     let Some(degrees) = options.fov.filter(|_| lens != Lens::Equirectangular) else { return Ok(()) };

@@ -1,8 +1,8 @@
-//! Makes posed test scenes with complete ground truth, ray-traced from analytic shapes.
+//! Synthesises posed test scenes with complete ground truth, ray-traced from analytic shapes.
 //!
-//! [`write()`] writes photos, masks of visible and of whole objects, objects alone, depth and points to files.
-//! [`dataset`] keeps photos and masks in memory, and [`spoil()`] puts faults into masks. The scenes are not made of
-//! Gaussians, so a score on them does not compare the engine with itself.
+//! [`write()`] writes photos, masks of visible and of whole objects, isolated objects, depth and points to files.
+//! [`dataset`] keeps photos and masks in memory, and [`spoil()`] adds tracker faults to masks. The scenes do not
+//! consist of Gaussians, so scoring on them does not compare the engine with itself.
 
 pub mod cameras;
 mod city;
@@ -25,7 +25,7 @@ mod write;
 pub use cameras::{cameras, ring_of_cameras};
 pub use lens::SynthLens;
 pub use spoil::{Fault, spoil};
-pub use trace::{Picture, alone, photograph, picture};
+pub use trace::{TracedView, trace_isolated, trace_photo, trace_view};
 pub use world::World;
 pub use write::{Summary, write};
 
@@ -33,7 +33,7 @@ use labelgs_scene::{Dataset, LabelMap, Photo, View};
 use labelgs_scenes::lens::{Lens, Optics};
 use serde::{Deserialize, Serialize};
 
-/// The objects in the scene.
+/// A set of objects.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -43,28 +43,28 @@ pub enum Preset {
     Default,
     /// Three objects; for quick tests.
     Simple,
-    /// Objects that are hard to label: thin parts, the ground's colours, black, inside another, cut by the border,
-    /// touching.
+    /// Objects that are hard to label: thin, black, inside another, cut by the image border, touching, or with the
+    /// ground's colours.
     Hard,
-    /// A city of sixty houses, trees, vehicles and lamps over 24 x 16 world units, seen from above and from its streets:
-    /// a scene to train in blocks.
+    /// A city of sixty houses, trees, vehicles and lamps over 24 x 16 world units, seen from above and from its
+    /// streets: a scene for training in blocks.
     City,
-    /// A bright object on a stand before a white wall, which is turned before a camera that stands still: the surroundings do
-    /// not follow the poses.
+    /// A bright object on a stand before a white wall, turned in front of a fixed camera: the surroundings do not
+    /// follow the poses.
     Turntable,
-    /// The same object, which is turned over between two series of photos.
+    /// The same object, turned over between two series of photos.
     #[serde(rename = "turned-over")]
     TurnedOver,
 }
 
-/// The options of a made scene.
+/// Options of a synthetic scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SynthOptions {
-    /// Objects in the scene.
+    /// The objects in the scene.
     pub preset: Preset,
-    /// Width of a picture, px.
+    /// Image width, px.
     pub width: u32,
-    /// Height of a picture, px.
+    /// Image height, px.
     pub height: u32,
     /// Number of views.
     pub views: u32,
@@ -74,21 +74,21 @@ pub struct SynthOptions {
     pub seed: u64,
     /// Lens of all cameras.
     pub lens: SynthLens,
-    /// Field of view across the picture, degrees; `None` is 50 degrees in a picture of 4 : 3. A panorama ignores it.
+    /// Horizontal field of view, degrees; by default 50 degrees for a 4 : 3 image. A panorama ignores it.
     pub fov: Option<u32>,
-    /// Photos have exposures and white balances of their own, as of a camera that chooses them.
+    /// Whether exposure and white balance vary between photos, as with a camera in automatic mode.
     pub vary_exposure: bool,
 }
 
 impl Default for SynthOptions {
     fn default() -> Self {
-        Self::of(Preset::Default)
+        Self::for_preset(Preset::Default)
     }
 }
 
 impl SynthOptions {
-    /// Returns the options of a preset, with as many views and points as it needs.
-    pub fn of(preset: Preset) -> Self {
+    /// Returns the options of a preset, with its default numbers of views and points.
+    pub fn for_preset(preset: Preset) -> Self {
         let (views, points) = if preset == Preset::City { (200, 20_000) } else { (40, 4000) };
         Self {
             preset,
@@ -104,8 +104,8 @@ impl SynthOptions {
     }
 }
 
-/// Makes the scene in memory, with photos and masks of pinhole cameras. Every `test_every`-th view is held out; 0 holds out
-/// none.
+/// Creates the scene in memory, with photos and masks of pinhole cameras. Holds out every `test_every`-th view; 0 holds
+/// out none.
 pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     let world = World::new(options.preset, options.seed);
     let cameras = cameras(options);
@@ -116,7 +116,7 @@ pub fn dataset(options: &SynthOptions, test_every: u32) -> Dataset {
     };
     for (index, camera) in cameras.iter().enumerate() {
         let (world, camera) = turntable::staged(options, &world, camera, index as u32);
-        let made = picture(&world, &camera, index as u32);
+        let made = trace_view(&world, &camera, index as u32);
         let camera = &cameras[index];
         let (width, height) = (camera.width, camera.height);
         let rgb = exposure::exposed(options, index as u32, made.rgb);
@@ -139,7 +139,8 @@ fn view_name(index: usize) -> String {
     format!("{index:03}.png")
 }
 
-/// Returns a number in 0 to 1 that depends on every bit of the four words, the same on every machine.
+/// Returns a pseudo-random number in 0 to 1 that depends on every bit of the four words and is the same on every
+/// machine.
 fn hash01(a: u64, b: u64, c: u64, d: u64) -> f64 {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     for word in [a, b, c, d] {

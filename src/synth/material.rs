@@ -1,5 +1,5 @@
-//! Solid textures: colour as a function of the position in the object's frame. The finest patterns have a few pixels in
-//! the usual view.
+//! Solid textures: colour as a function of the position in the object's frame. The finest patterns are a few pixels
+//! wide in a typical view.
 
 use super::hash01;
 use glam::DVec3;

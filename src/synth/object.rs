@@ -1,4 +1,4 @@
-//! A labelled object of a made scene.
+//! A labelled object of a synthetic scene.
 
 use super::material::{Material, Pattern};
 use super::shape::Shape;
@@ -25,27 +25,27 @@ pub struct Object {
 }
 
 impl Object {
-    /// Converts position and direction of a ray to the object's frame.
+    /// Converts the position and direction of a ray to the object's frame.
     pub(super) fn to_own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let back = self.rotation.conjugate();
         (back * (origin - self.position), back * direction)
     }
 
-    /// Returns false for most rays that miss the object, from a sphere around it.
+    /// Returns false for most rays that miss the object, by a bounding sphere.
     pub(super) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
         let to = self.position - origin;
         let along = to.dot(direction);
-        // Wider than the sphere of the shape itself, which then decides.
+        // Slightly larger than the shape's own bounding sphere, which then decides.
         let bound = self.shape.bound() * 1.001;
         to.length_squared() - along * along <= bound * bound && along > -bound
     }
 
-    /// Returns the distance of a place in the world to the surface, negative inside.
+    /// Returns the distance of a world position to the surface, negative inside.
     pub fn distance_to(&self, place: DVec3) -> f64 {
         self.shape.distance_to(self.to_own(place, DVec3::ZERO).0)
     }
 
-    /// Returns the distance at which a ray hits the object alone.
+    /// Returns the distance at which a ray hits the object, ignoring all others.
     pub fn distance(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         if !self.may_meet(origin, direction) {
             return None;

@@ -1,4 +1,4 @@
-//! A sparse point cloud as from structure from motion, with the views of each point.
+//! A sparse point cloud like one from structure from motion, with the views of each point.
 
 use super::trace::ray;
 use super::world::{Surface, World};
@@ -10,22 +10,22 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Standard deviation of the position error, as a share of the distance.
-const NOISE: f64 = 0.0015;
+const POSITION_NOISE: f64 = 0.0015;
 
 /// A point and its observations.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct ObservedPoint {
     /// Position and colour.
     pub point: Point,
     /// Indices of views and image positions, px.
     pub track: Vec<(u32, DVec2)>,
 }
 
-/// Samples points on visible surfaces, with the density of pixels. At least two views see each point.
-pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) -> Vec<Seen> {
+/// Samples points on visible surfaces with the density of pixels. At least two views see each point.
+pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) -> Vec<ObservedPoint> {
     let mut random = Pcg64::seed_from_u64(options.seed);
     let mut found = Vec::new();
-    // A scene with few views may have fewer points than requested, so the number of tries is limited.
+    // A scene with few views may have fewer points than requested, so bound the number of attempts.
     let tries = if turntable::is_turned(options.preset) { 40 } else { 4 };
     for _ in 0..u64::from(options.points) * tries {
         if found.len() >= options.points as usize || cameras.is_empty() {
@@ -41,10 +41,10 @@ pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) 
             continue;
         }
         let mut normal = || {
-            // A sum of uniform numbers is close to normal and the same on every machine.
+            // A sum of uniform numbers is approximately normal and the same on every machine.
             (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
         };
-        let error = DVec3::new(normal(), normal(), normal()) * (NOISE * hit.distance);
+        let error = DVec3::new(normal(), normal(), normal()) * (POSITION_NOISE * hit.distance);
         let colour = world.colour(&hit, [0.0; 2]).to_array().map(|value| (value * 255.0).round() as u8);
         let point = Point { position: hit.place + error, colour };
         let track: Vec<_> = cameras
@@ -53,7 +53,7 @@ pub(super) fn sample(world: &World, cameras: &[Optics], options: &SynthOptions) 
             .filter_map(|(view, optics)| sees(world, optics, hit.place).map(|place| (view as u32, place)))
             .collect();
         if track.len() >= 2 {
-            found.push(Seen { point, track });
+            found.push(ObservedPoint { point, track });
         }
     }
     found

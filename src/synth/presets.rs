@@ -18,10 +18,10 @@ pub(super) fn objects(preset: Preset, seed: u64) -> Vec<Object> {
     rows.into_iter().enumerate().map(|(index, row)| object(index, row, seed)).collect()
 }
 
-/// A crate in the middle, and others against its faces, on top of it and in each other.
+/// A crate at the centre, with others against its faces, on top of it and inside each other.
 fn default_rows() -> Vec<Row> {
     let turn = 25.0_f64;
-    // Position at a distance from the crate's centre, across one of its four faces.
+    // A position at a distance from the crate's centre, across one of its four faces.
     let across = |quarter: f64, distance: f64, height: f64| {
         let angle = (turn + 90.0 * quarter).to_radians();
         [angle.cos() * distance, angle.sin() * distance, height]
@@ -71,8 +71,8 @@ fn object(index: usize, (name, shape, position, turn, pattern): Row, seed: u64) 
         offset: DVec3::new(random(1), random(2), random(3)) * 0.05 + 0.013,
         seed: seed.wrapping_mul(1009).wrapping_add(id * 16),
     };
-    if name == turntable::NAME {
-        [material.first, material.second] = turntable::COLOURS;
+    if name == turntable::OBJECT_NAME {
+        [material.first, material.second] = turntable::OBJECT_COLOURS;
     }
     match pattern {
         Pattern::Plain => material.first = DVec3::splat(hard::BLACK_ALBEDO),

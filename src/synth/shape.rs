@@ -1,4 +1,4 @@
-//! Solid shapes around their own origin, and ray intersection. Lengths are world units.
+//! Solid shapes centred at the origin, and ray intersection. Lengths are world units.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ pub enum Shape {
     Ball(DVec3),
     /// Box: half sizes.
     Block(DVec3),
-    /// Rounded box: half sizes and added radius. With one half size other than 0 it is a capsule.
+    /// Rounded box: half sizes and added radius. With a single non-zero half size it is a capsule.
     RoundBlock(DVec3, f64),
     /// Upright cylinder: radius, half height.
     Cylinder(f64, f64),
@@ -44,8 +44,8 @@ impl Shape {
         }
     }
 
-    /// Returns the distance of a place to the surface, negative inside. That to an ellipsoid is right to first order near it;
-    /// inside of a fence or bin it is that to the nearest part.
+    /// Returns the distance of a position to the surface, negative inside. For an ellipsoid it is exact to first order
+    /// near the surface; inside a fence or bin it is the distance to the nearest part.
     pub fn distance_to(&self, place: DVec3) -> f64 {
         let nearest = |parts: &[Part]| {
             let all = parts.iter().map(|(shape, at)| shape.distance_to(place - at));
@@ -92,18 +92,18 @@ impl Shape {
     }
 }
 
-/// The distance of a place to a box of these half sizes.
+/// Returns the distance of a position to a box of these half sizes.
 fn outside_block(place: DVec3, half: DVec3) -> f64 {
     let over = place.abs() - half;
     over.max(DVec3::ZERO).length() + over.max_element().min(0.0)
 }
 
-/// The distance of a place to a torus.
+/// Returns the distance of a position to a torus.
 fn outside_ring(place: DVec3, ring: f64, tube: f64) -> f64 {
     (place.truncate().length() - ring).hypot(place.z) - tube
 }
 
-/// A simple shape and its centre in the frame of the whole.
+/// A simple shape and its centre in the frame of the compound shape.
 type Part = (Shape, DVec3);
 
 fn fence_parts(bars: u32, pitch: f64, half: f64, radius: f64) -> Vec<Part> {
@@ -140,7 +140,7 @@ fn sphere_span(origin: DVec3, direction: DVec3, radius: f64) -> Option<(f64, f64
 }
 
 fn enter_ball(origin: DVec3, direction: DVec3, radii: DVec3) -> Option<Entry> {
-    // In the frame where the ellipsoid is a unit sphere, the direction is not of unit length.
+    // In the frame where the ellipsoid is a unit sphere, the direction is not a unit vector.
     let (o, d) = (origin / radii, direction / radii);
     let length = d.length();
     let (near, _) = sphere_span(o, d / length, 1.0)?;

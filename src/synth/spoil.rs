@@ -1,11 +1,11 @@
-//! Puts the faults of trackers into masks, to measure their effect.
+//! Adds tracker faults to masks, to measure their effect.
 
 use super::hash01;
 use labelgs_scene::LabelMap;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Factor by which trackers shrink photos: 1080 to 480 lines.
-const SHRINK: f64 = 2.25;
+const TRACKER_SHRINK: f64 = 2.25;
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,19 +15,19 @@ pub enum Fault {
     Swap,
     /// Masks have 1 / 2.25 of the resolution and are enlarged again.
     Coarse,
-    /// Every view except the first has ids of its own, as from a segmenter of single images.
+    /// Ids differ in every view except the first, as from a segmenter of single images.
     PerView,
     /// A share of the views has no mask.
     Missing,
-    /// An object has the id of another one in a share of the views.
+    /// An object has another object's id in a share of the views.
     Merge,
 }
 
-/// Returns the masks with a fault; `None` is a missing mask. A `share` of the views has it, drawn by `seed`.
+/// Returns the masks with a fault; `None` is a missing mask. The fault affects a `share` of the views, drawn by `seed`.
 pub fn spoil(masks: &[LabelMap], fault: Fault, share: f64, seed: u64) -> Vec<Option<LabelMap>> {
     let objects: Vec<u16> = masks.iter().flat_map(LabelMap::objects).collect::<BTreeSet<u16>>().into_iter().collect();
     let random = |view: usize, number: u64| hash01(seed, view as u64, number, 0x5b011);
-    // The number of views is exact up to rounding, for any random numbers.
+    // The number of views is exact up to rounding, whatever the random numbers.
     let mut order: Vec<usize> = (0..masks.len()).collect();
     order.sort_by(|&a, &b| random(a, 0).total_cmp(&random(b, 0)).then(a.cmp(&b)));
     let drawn: BTreeSet<usize> = order.into_iter().take((share * masks.len() as f64).round() as usize).collect();
@@ -63,14 +63,15 @@ pub fn spoil(masks: &[LabelMap], fault: Fault, share: f64, seed: u64) -> Vec<Opt
 }
 
 fn with_ids(mask: &LabelMap, new: &BTreeMap<u16, u16>) -> LabelMap {
-    // 0 stays 0, also if a view has too few objects to choose from.
+    // 0 stays 0, even if a view has too few objects to choose from.
     let id = |&id: &u16| if id == 0 { 0 } else { new.get(&id).copied().filter(|&id| id != 0).unwrap_or(id) };
     LabelMap { ids: mask.ids.iter().map(id).collect(), ..mask.clone() }
 }
 
 fn coarse(mask: &LabelMap) -> LabelMap {
     let (width, height) = (f64::from(mask.width), f64::from(mask.height));
-    let middle = |at: u32, size: f64| (((f64::from(at) / SHRINK).floor() + 0.5) * SHRINK).min(size - 1.0) as u32;
+    let middle =
+        |at: u32, size: f64| (((f64::from(at) / TRACKER_SHRINK).floor() + 0.5) * TRACKER_SHRINK).min(size - 1.0) as u32;
     let pixels = (0..mask.height).flat_map(|y| (0..mask.width).map(move |x| (x, y)));
     LabelMap { ids: pixels.map(|(x, y)| mask.at(middle(x, width), middle(y, height))).collect(), ..mask.clone() }
 }

@@ -1,4 +1,4 @@
-//! Renders one view: colours as pixel means; ids, depth and whole objects at pixel centres; and objects alone.
+//! Renders a view: colours as pixel means; ids, depth and whole objects at pixel centres; and isolated objects.
 
 use super::hash01;
 use super::object::Object;
@@ -9,12 +9,12 @@ use labelgs_scenes::lens::{Lens, Optics};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// Number of samples along each side of a pixel.
-const SIDE: u32 = 3;
+/// Samples along each side of a pixel.
+const SAMPLES_PER_SIDE: u32 = 3;
 
 /// A rendered view with its ground truth, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct TracedView {
     /// Width, px.
     pub width: u32,
     /// Height, px.
@@ -25,7 +25,7 @@ pub struct Picture {
     pub ids: Vec<u8>,
     /// Camera-space z at the pixel centre, world units.
     pub depth: Vec<f32>,
-    /// For each object of the world in order: true where it covers the pixel centre if it stands alone.
+    /// For each object of the world in order: true where the object, without occluders, covers the pixel centre.
     pub whole: Vec<Vec<bool>>,
 }
 
@@ -36,7 +36,7 @@ struct Pixel {
 }
 
 /// Renders view number `view`. The number only decides the sample positions within pixels.
-pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
+pub fn trace_view(world: &World, camera: &Camera, view: u32) -> TracedView {
     let (width, height) = (camera.width, camera.height);
     let optics = pinhole(camera);
     let pixels = pixels(world, &optics, view);
@@ -50,7 +50,7 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
         .iter()
         .map(|object| (0..width * height).into_par_iter().map(|index| covers(object, index)).collect())
         .collect();
-    Picture {
+    TracedView {
         width,
         height,
         rgb: pixels.iter().map(|p| p.rgb).collect(),
@@ -60,8 +60,8 @@ pub fn picture(world: &World, camera: &Camera, view: u32) -> Picture {
     }
 }
 
-/// Renders the photo of view number `view` and its ids through a lens. What the lens does not show is black, with id 0.
-pub fn photograph(world: &World, optics: &Optics, view: u32) -> (Vec<[u8; 3]>, Vec<u8>) {
+/// Renders the photo and ids of view number `view` through a lens. Pixels outside the lens are black, with id 0.
+pub fn trace_photo(world: &World, optics: &Optics, view: u32) -> (Vec<[u8; 3]>, Vec<u8>) {
     pixels(world, optics, view).into_iter().map(|pixel| (pixel.rgb, pixel.id)).unzip()
 }
 
@@ -74,8 +74,8 @@ fn pinhole(camera: &Camera) -> Optics {
     Optics::new(camera.clone(), Lens::Pinhole)
 }
 
-/// Returns, for each object of the world in order, the pixels of view number `view` whose colour may be another without
-/// it: those that show it or its shadow.
+/// Returns, for each object of the world in order, the pixels of view number `view` whose colour may depend on it:
+/// those that show it or its shadow.
 pub(super) fn involved(world: &World, camera: &Camera, view: u32) -> Vec<Vec<u32>> {
     let (width, optics) = (camera.width, pinhole(camera));
     let parts = |index: u32| {
@@ -89,7 +89,7 @@ pub(super) fn involved(world: &World, camera: &Camera, view: u32) -> Vec<Vec<u32
     pixels
 }
 
-/// Renders some pixels of the photo of view number `view` anew.
+/// Renders some pixels of the photo of view number `view` again.
 pub(super) fn repaint(world: &World, camera: &Camera, view: u32, photo: &mut [[u8; 3]], pixels: &[u32]) {
     let (width, optics) = (camera.width, pinhole(camera));
     let of = |&index: &u32| colour(world, &optics, view, (index % width, index / width), &mut |_| ());
@@ -97,7 +97,7 @@ pub(super) fn repaint(world: &World, camera: &Camera, view: u32, photo: &mut [[u
     pixels.iter().zip(colours).for_each(|(&index, colour)| photo[index as usize] = colour);
 }
 
-/// Returns the unit direction, world, of the ray through an image position; `None` if the lens shows nothing there.
+/// Returns the unit direction in the world of the ray through an image position; `None` outside the lens.
 pub(super) fn ray(optics: &Optics, x: f64, y: f64) -> Option<DVec3> {
     let camera = &optics.camera;
     let pixel = DVec2::new(x, y);
@@ -110,9 +110,9 @@ pub(super) fn ray(optics: &Optics, x: f64, y: f64) -> Option<DVec3> {
 
 /// Renders an object without occluders, RGBA, row-major. Alpha is 255 where the object covers the pixel centre; other
 /// pixels are 0. Light and shadows are those of the photo, because photos cannot teach other colours. The colour is the
-/// mean over the covered part of the pixel. It equals that of the photo where the object fills the pixel and nothing
+/// mean over the covered part of the pixel. It equals the photo's colour where the object fills the pixel and nothing
 /// hides it.
-pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8; 4]> {
+pub fn trace_isolated(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8; 4]> {
     let (origin, optics) = (camera.centre(), pinhole(camera));
     let pixel = |at: u32| {
         let (x, y) = (at % camera.width, at / camera.width);
@@ -131,15 +131,15 @@ pub fn alone(world: &World, camera: &Camera, view: u32, index: usize) -> Vec<[u8
     (0..camera.width * camera.height).into_par_iter().map(pixel).collect()
 }
 
-/// Returns the directions of the samples of a pixel, each with its position on the light.
+/// Returns the sample directions of a pixel, each with its position on the light.
 fn samples(optics: &Optics, view: u32, x: u32, y: u32) -> impl Iterator<Item = (DVec3, [f64; 2])> {
-    (0..SIDE * SIDE).filter_map(move |sample| {
+    (0..SAMPLES_PER_SIDE * SAMPLES_PER_SIDE).filter_map(move |sample| {
         let random = |what: u64| hash01(u64::from(view), u64::from(y) << 32 | u64::from(x), u64::from(sample), what);
-        let (column, row) = (sample % SIDE, sample / SIDE);
-        let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SIDE);
+        let (column, row) = (sample % SAMPLES_PER_SIDE, sample / SAMPLES_PER_SIDE);
+        let within = |cell: u32, what: u64| (f64::from(cell) + random(what)) / f64::from(SAMPLES_PER_SIDE);
         let direction = ray(optics, f64::from(x) + within(column, 0), f64::from(y) + within(row, 1))?;
-        // Every pixel has the same positions on the light, so that shadows have no noise that differs between views.
-        let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SIDE) * 2.0 - 1.0;
+        // Every pixel uses the same positions on the light, so that shadows have no noise that differs between views.
+        let spot = |cell: u32| (f64::from(cell) + 0.5) / f64::from(SAMPLES_PER_SIDE) * 2.0 - 1.0;
         Some((direction, [spot(column), spot(row)]))
     })
 }
@@ -162,7 +162,7 @@ fn pixel(world: &World, optics: &Optics, view: u32, x: u32, y: u32) -> Pixel {
     }
 }
 
-/// Returns the mean colour over a pixel. `note` receives the objects without which it may be another.
+/// Returns the mean colour over a pixel. `note` receives the objects on which it may depend.
 fn colour(world: &World, optics: &Optics, view: u32, (x, y): (u32, u32), note: &mut impl FnMut(usize)) -> [u8; 3] {
     let origin = optics.camera.centre();
     let (sum, count) = samples(optics, view, x, y)

@@ -1,5 +1,4 @@
-//! An object that is turned before a camera, a wall and a stand which stay: the poses are those of the object, and nothing
-//! else follows them.
+//! An object that turns in front of a fixed camera, wall and stand: the poses follow the object only.
 
 use super::cameras::looking;
 use super::material::Pattern;
@@ -13,41 +12,41 @@ use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 
 /// Name of the object.
-pub(super) const NAME: &str = "loaf";
-/// Half sizes of the object and its added radius, world units.
-const HALF: DVec3 = DVec3::new(0.34, 0.2, 0.26);
-const ROUND: f64 = 0.1;
-/// Its two colours, bright as the wall.
-pub(super) const COLOURS: [DVec3; 2] = [DVec3::new(0.96, 0.93, 0.84), DVec3::new(0.84, 0.74, 0.58)];
+pub(super) const OBJECT_NAME: &str = "loaf";
+/// Half sizes of the object.
+const OBJECT_HALF_SIZES: DVec3 = DVec3::new(0.34, 0.2, 0.26);
+const OBJECT_ROUNDING: f64 = 0.1;
+/// Its two colours, as bright as the wall.
+pub(super) const OBJECT_COLOURS: [DVec3; 2] = [DVec3::new(0.96, 0.93, 0.84), DVec3::new(0.84, 0.74, 0.58)];
 /// Radius of the stand, world units.
-pub(super) const STAND: f64 = 0.95;
-/// Distance of the camera from the object, world units, and its elevations in turn, degrees.
-const DISTANCE: f64 = 2.2;
-const ELEVATIONS: [f64; 3] = [14.0, 30.0, 48.0];
+pub(super) const STAND_RADIUS: f64 = 0.95;
+/// Distance of the camera from the object, world units, and its elevations, alternating, degrees.
+const CAMERA_DISTANCE: f64 = 2.2;
+const CAMERA_ELEVATIONS: [f64; 3] = [14.0, 30.0, 48.0];
 
-/// Returns the object, bright as the wall behind it.
+/// Returns the object, as bright as the wall behind it.
 pub(super) fn rows() -> Vec<Row> {
-    vec![(NAME, Shape::RoundBlock(HALF, ROUND), [0.0; 3], 0.0, Pattern::Checks(0.19))]
+    vec![(OBJECT_NAME, Shape::RoundBlock(OBJECT_HALF_SIZES, OBJECT_ROUNDING), [0.0; 3], 0.0, Pattern::Checks(0.19))]
 }
 
-/// Returns whether the objects of a preset are turned.
+/// Returns true if a preset turns its objects.
 pub(super) fn is_turned(preset: Preset) -> bool {
     matches!(preset, Preset::Turntable | Preset::TurnedOver)
 }
 
-/// Returns how the object stands in the room in a view: room from object.
+/// Returns the pose of the object in the room in a view: room from object.
 fn stance(options: &SynthOptions, view: u32) -> (DMat3, DVec3) {
     let turn = DMat3::from_rotation_z(TAU * f64::from(view) * 2.0 / f64::from(options.views) + 0.2);
     let lies_over = options.preset == Preset::TurnedOver && 2 * view >= options.views;
     let own = if lies_over { DMat3::from_rotation_x(PI) } else { DMat3::IDENTITY };
-    (turn * own, DVec3::Z * (HALF.z + ROUND))
+    (turn * own, DVec3::Z * (OBJECT_HALF_SIZES.z + OBJECT_ROUNDING))
 }
 
 /// Returns the camera in the room.
 fn stands(options: &SynthOptions, view: u32) -> Camera {
-    let elevation = ELEVATIONS[(view % 3) as usize].to_radians();
+    let elevation = CAMERA_ELEVATIONS[(view % 3) as usize].to_radians();
     let outward = DVec3::new(elevation.cos(), 0.0, elevation.sin());
-    looking(options, (DVec3::Z * (HALF.z + ROUND) + outward * DISTANCE, -outward))
+    looking(options, (DVec3::Z * (OBJECT_HALF_SIZES.z + OBJECT_ROUNDING) + outward * CAMERA_DISTANCE, -outward))
 }
 
 /// Returns the camera of a view in the frame of the object.
@@ -57,7 +56,7 @@ pub(super) fn camera(options: &SynthOptions, view: u32) -> Camera {
     Camera { rotation: camera.rotation * turn, translation: camera.to_camera(shift), ..camera }
 }
 
-/// Returns the world of a view and its camera there: the room, if objects are turned.
+/// Returns the world of a view and its camera: the room, if objects are turned.
 pub(super) fn staged<'a>(
     options: &SynthOptions,
     world: &'a World,
@@ -68,7 +67,7 @@ pub(super) fn staged<'a>(
         return (Cow::Borrowed(world), Cow::Borrowed(camera));
     }
     let (turn, shift) = stance(options, view);
-    // The size and lens of the picture stay those of the camera.
+    // Size and lens of the image are those of the camera.
     let room = Camera {
         rotation: camera.rotation * turn.transpose(),
         translation: camera.translation - camera.rotation * (turn.transpose() * shift),

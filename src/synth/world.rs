@@ -1,6 +1,6 @@
 //! The world: objects on a textured ground under a sky.
 
-use super::land::{Land, WALL};
+use super::land::{Land, WALL_COLOUR};
 use super::object::Object;
 use super::{Preset, hash01, presets};
 use glam::{DMat3, DQuat, DVec3};
@@ -34,7 +34,7 @@ pub struct Hit {
 pub struct World {
     /// Objects, with ids 1, 2, ... in order.
     pub objects: Vec<Object>,
-    /// Objects of which only the shadow is there.
+    /// Objects that are invisible but cast a shadow.
     shadows: Vec<Object>,
     land: Land,
     /// Unit vector to the light.
@@ -45,7 +45,7 @@ pub struct World {
 }
 
 impl World {
-    /// Makes the world of a preset. The seed decides colours, offsets and the direction of the light.
+    /// Creates the world of a preset. The seed determines colours, offsets and the direction of the light.
     pub fn new(preset: Preset, seed: u64) -> Self {
         let turn = 0.6 + hash01(seed, 2, 0, 0);
         let light = DVec3::new(turn.cos() * 0.5, turn.sin() * 0.5, 0.87).normalize();
@@ -60,14 +60,14 @@ impl World {
         }
     }
 
-    /// Returns the world without one object, or with nothing but its shadow. Other objects stay where they are, also those
-    /// that stand on it.
+    /// Returns the world without an object, or with only its shadow. Other objects stay where they are, even those that
+    /// stand on it.
     pub fn without(&self, id: u8, shadow: bool) -> Self {
         let (gone, objects): (Vec<Object>, _) = self.objects.iter().cloned().partition(|object| object.id == id);
         Self { objects, shadows: if shadow { gone } else { Vec::new() }, ..self.clone() }
     }
 
-    /// Returns a room in which the objects are turned and moved as one.
+    /// Returns a room with all objects turned and moved together.
     pub(super) fn in_room(&self, turn: DMat3, shift: DVec3) -> Self {
         let rotation = DQuat::from_mat3(&turn);
         let placed = |object: &Object| Object {
@@ -113,13 +113,13 @@ impl World {
         Some(Hit { distance, place: origin + direction * distance, normal, surface: Surface::Object(index) })
     }
 
-    /// Returns the colour of a surface point, the same in every direction, 0 to 1. `spot` (-1 to 1) picks a position on
-    /// the light; a mean over spots gives soft shadows.
+    /// Returns the colour of a surface point, 0 to 1, the same in all directions. `spot` (-1 to 1) selects a position
+    /// on the light; the mean over spots gives soft shadows.
     pub fn colour(&self, hit: &Hit, spot: [f64; 2]) -> DVec3 {
         self.colour_by(hit, spot, &mut |_| ())
     }
 
-    /// The same. `note` receives the indices of the objects without which the colour may be another.
+    /// Like [`Self::colour`]. `note` receives the indices of the objects on which the colour may depend.
     pub(super) fn colour_by(&self, hit: &Hit, spot: [f64; 2], note: &mut impl FnMut(usize)) -> DVec3 {
         let albedo = match hit.surface {
             Surface::Sky => return self.sky_colour(hit.place),
@@ -134,7 +134,7 @@ impl World {
             (self.light + (self.light_sides[0] * spot[0] + self.light_sides[1] * spot[1]) * 0.09).normalize();
         let facing = hit.normal.dot(to_light).max(0.0);
         let lit = facing > 0.0 && self.is_lit(hit.place + hit.normal * 1e-4, to_light, note);
-        // Lamps from all sides light a studio.
+        // A studio is lit from all sides.
         let (around, direct) = if self.land.is_studio { (0.88, 0.12) } else { (0.42, 0.62) };
         let ambient = around * (0.8 + 0.2 * hit.normal.z);
         let shaded = albedo * (ambient + if lit { direct * facing } else { 0.0 });
@@ -145,14 +145,14 @@ impl World {
         shaded.lerp(self.sky_colour(DVec3::X), haze).clamp(DVec3::ZERO, DVec3::ONE)
     }
 
-    /// Whether nothing is between a point and the light. `note` receives the first object that is.
+    /// Returns whether the light reaches a point. `note` receives the first object in between.
     fn is_lit(&self, start: DVec3, to_light: DVec3, note: &mut impl FnMut(usize)) -> bool {
         if let Some(index) = self.objects.iter().position(|object| object.distance(start, to_light).is_some()) {
             note(index);
             return false;
         }
-        // What only throws a shadow may have the point inside, where a ray meets nothing on its way out. So this one
-        // comes from the light.
+        // The point may be inside an object that only casts a shadow, where a ray hits nothing on its way out. So trace
+        // this ray from the light.
         let far = 2.0 * self.land.sky;
         let outside = start + to_light * far;
         !self.shadows.iter().any(|object| object.distance(outside, -to_light).is_some_and(|at| at < far))
@@ -171,7 +171,7 @@ impl World {
     /// Returns the sky colour, from haze at the horizon to a blue zenith.
     fn sky_colour(&self, place: DVec3) -> DVec3 {
         if self.land.is_studio {
-            return WALL;
+            return WALL_COLOUR;
         }
         let height = (place.z / self.land.sky).clamp(0.0, 1.0);
         DVec3::new(0.78, 0.82, 0.86).lerp(DVec3::new(0.36, 0.55, 0.82), height.powf(0.6))

@@ -1,9 +1,9 @@
-//! The files of a made scene: COLMAP model, photos, masks with names, objects alone, depth.
+//! The files of a synthetic scene: COLMAP model, photos, masks with names, isolated objects, depth.
 
 use super::cameras::cameras;
 use super::object::Object;
-use super::points::{self, Seen};
-use super::trace::{Picture, alone, involved, photograph, picture, repaint};
+use super::points::{self, ObservedPoint};
+use super::trace::{TracedView, involved, repaint, trace_isolated, trace_photo, trace_view};
 use super::world::World;
 use super::{SynthLens, SynthOptions, exposure, lens, turntable, view_name};
 use glam::DQuat;
@@ -30,8 +30,8 @@ pub struct Summary {
     pub objects: Vec<LabelEntry>,
 }
 
-/// Makes a scene and writes it into `folder`, which must be empty or new. `after_view` receives the number of finished
-/// views; its error ends the work.
+/// Creates a scene in `folder`, which must be empty or new. `after_view` receives the number of finished views; its
+/// error stops the work.
 pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> Result<()>) -> Result<Summary> {
     if options.width == 0 || options.height == 0 || options.width > 16_384 || options.height > 16_384 {
         return Err(Error::usage("width, height", "need 1 to 16384 px each"));
@@ -52,7 +52,7 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
         if optics.lens.is_pinhole() {
             let (world, camera) = turntable::staged(options, &world, camera, index as u32);
             let (world, camera) = (&*world, &*camera);
-            let made = picture(world, camera, index as u32);
+            let made = trace_view(world, camera, index as u32);
             let rgb = exposure::exposed(options, index as u32, made.rgb.clone());
             write_photo(folder, index, camera, &rgb, &made.ids)?;
             write_truth(folder, index, world, camera, &made)?;
@@ -61,9 +61,9 @@ pub fn write(options: &SynthOptions, folder: &Path, after_view: &dyn Fn(u32) -> 
             }
             count(&mut table, &made.ids);
         } else {
-            // The other pictures are compared with renderings, which are pinhole pictures.
+            // The other images are compared with renders, which use pinhole cameras.
             let (world, staged) = turntable::staged(options, &world, camera, index as u32);
-            let (rgb, ids) = photograph(&world, &Optics::new(staged.into_owned(), optics.lens), index as u32);
+            let (rgb, ids) = trace_photo(&world, &Optics::new(staged.into_owned(), optics.lens), index as u32);
             write_photo(folder, index, camera, &exposure::exposed(options, index as u32, rgb), &ids)?;
             count(&mut table, &ids);
         }
@@ -99,7 +99,7 @@ fn write_photo(folder: &Path, index: usize, camera: &Camera, rgb: &[[u8; 3]], id
     image::write_png_grey8(folder.join("masks").join(&name), camera.width, camera.height, ids)
 }
 
-fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made: &Picture) -> Result<()> {
+fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made: &TracedView) -> Result<()> {
     let name = view_name(index);
     let (width, height) = (made.width, made.height);
     world.objects.par_iter().zip(&made.whole).enumerate().try_for_each(|(place, (object, whole))| {
@@ -107,13 +107,13 @@ fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made
         let bytes: Vec<u8> = whole.iter().map(|&covered| if covered { 255 } else { 0 }).collect();
         image::write_png_grey8(&path, width, height, &bytes)?;
         let path = folder.join("objects").join(object.id.to_string()).join(&name);
-        image::write_png_rgba8(&path, width, height, &alone(world, camera, index as u32, place))
+        image::write_png_rgba8(&path, width, height, &trace_isolated(world, camera, index as u32, place))
     })?;
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }
 
-/// Writes the photo of the view in the world without each object: `without/ID/NAME.png`, and `shadowed/ID/NAME.png` where
-/// its shadow stays. Only views that are held out by default have them, because removals are scored there.
+/// Writes the photo of the view in the world without each object: `without/ID/OBJECT_NAME.png`, and `shadowed/ID/OBJECT_NAME.png`
+/// with its shadow. Only views that are held out by default have these, because removals are scored there.
 fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera, photo: &[[u8; 3]]) -> Result<()> {
     let involved = involved(world, camera, index as u32);
     world.objects.par_iter().zip(&involved).try_for_each(|(object, pixels)| {
@@ -132,7 +132,7 @@ fn save(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 /// Writes `cameras.bin`, `images.bin` and `points3D.bin`, little-endian as in COLMAP.
-fn write_colmap(folder: &Path, lens: SynthLens, optics: &[Optics], seen: &[Seen]) -> Result<()> {
+fn write_colmap(folder: &Path, lens: SynthLens, optics: &[Optics], seen: &[ObservedPoint]) -> Result<()> {
     let folder = folder.join("sparse/0");
     let cameras: Vec<&Camera> = optics.iter().map(|optics| &optics.camera).collect();
     if let Some(camera) = cameras.first() {

@@ -10,7 +10,7 @@ use serde_json::Value;
 /// A place with the object of a preset in the folder `turned`.
 fn place(preset: Preset) -> Place {
     let place = Place::new();
-    let options = SynthOptions { width: 64, height: 48, views: 18, points: 150, ..SynthOptions::of(preset) };
+    let options = SynthOptions { width: 64, height: 48, views: 18, points: 150, ..SynthOptions::for_preset(preset) };
     synth::write(&options, &place.path("turned"), &|_| Ok(())).expect("a scene");
     place
 }

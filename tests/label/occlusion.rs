@@ -244,7 +244,7 @@ fn the_vote_finds_what_hides_in_a_known_scene() {
     let world = World::new(options.preset, options.seed);
     let (mut both, mut found_pairs, mut true_pairs, mut mean_pairs, mut mean_both) = (0, 0, 0, 0, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate() {
-        let made = labelgs::synth::picture(&world, camera, view as u32);
+        let made = labelgs::synth::trace_view(&world, camera, view as u32);
         let labels = map(options.width, &made.ids.iter().map(|&id| u16::from(id)).collect::<Vec<_>>());
         let mut hidden: BTreeMap<(u16, u16), usize> = BTreeMap::new();
         for (object, whole) in world.objects.iter().zip(&made.whole) {

@@ -6,7 +6,7 @@ use labelgs::masks::read_mask;
 use labelgs::scene::path::{Interpolation, short_order, video};
 use labelgs::scene::{Camera, LabelMap};
 use labelgs::synth::{Fault, Preset, SynthOptions, spoil};
-use labelgs::synth::{World, picture, ring_of_cameras};
+use labelgs::synth::{World, ring_of_cameras, trace_view};
 
 const HOW: Overlap = Overlap { least: 0.1, memory: 5 };
 
@@ -105,7 +105,7 @@ fn frames_between_sparse_photos_keep_ids() {
     let cameras: Vec<&Camera> = cameras.iter().collect();
     let cameras: Vec<&Camera> = short_order(&cameras).into_iter().map(|index| cameras[index]).collect();
     let ids_at = |camera: &Camera, number: usize| {
-        let ids = picture(&world, camera, number as u32).ids.into_iter().map(u16::from).collect();
+        let ids = trace_view(&world, camera, number as u32).ids.into_iter().map(u16::from).collect();
         LabelMap { width: camera.width, height: camera.height, ids }
     };
     let mut table = Vec::new();

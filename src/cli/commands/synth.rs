@@ -44,7 +44,7 @@ pub struct SynthArgs {
 
 /// Writes the scene.
 pub(crate) fn run(args: &SynthArgs, context: &Context) -> Result<()> {
-    let of_preset = SynthOptions::of(args.preset);
+    let of_preset = SynthOptions::for_preset(args.preset);
     let options = SynthOptions {
         preset: args.preset,
         width: args.size.0,

@@ -15,7 +15,7 @@ use crate::label::vote::decide::decide;
 use crate::label::vote::model::vote_engine;
 use crate::render::{Parts, Render, RenderOptions, render};
 use crate::scene::{Gaussians, LabelMap, Pixels, View};
-use crate::segment::{Place, Prepared, Prompt};
+use crate::segment::{PhotoPoint, PreparedPhoto, Prompt};
 use glam::{DVec2, DVec3};
 use photos::Masks;
 use question::{Question, Spot, Target};
@@ -123,7 +123,7 @@ fn nothing(by_box: bool) -> Error {
 }
 
 /// Returns the index of the pixel at a position; positions outside are clamped to the border.
-fn pixel_of([x, y]: Place, view: &View) -> usize {
+fn pixel_of([x, y]: PhotoPoint, view: &View) -> usize {
     let along = |at: f32, size: u32| (at.max(0.0) as u32).min(size - 1);
     (along(y, view.camera.height) * view.camera.width + along(x, view.camera.width)) as usize
 }
@@ -132,7 +132,7 @@ fn pixel_of([x, y]: Place, view: &View) -> usize {
 #[derive(Default)]
 struct ViewCache {
     shown: Option<Render>,
-    prepared: Option<Prepared>,
+    prepared: Option<PreparedPhoto>,
 }
 
 impl<'a> ObjectFinder<'a> {
@@ -211,7 +211,7 @@ impl<'a> ObjectFinder<'a> {
     }
 
     /// Returns the surface point at a position in a view, if there is one.
-    fn surface(&mut self, view: usize, [x, y]: Place) -> Result<Option<DVec3>> {
+    fn surface(&mut self, view: usize, [x, y]: PhotoPoint) -> Result<Option<DVec3>> {
         let place = DVec2::new(f64::from(x), f64::from(y));
         let depth = self.depth(view, place)?;
         Ok(depth.map(|depth| self.photos.views[view].camera.unproject(place, depth)))
@@ -233,7 +233,7 @@ impl<'a> ObjectFinder<'a> {
     }
 
     /// Returns the position at which a view sees a point, if nothing hides it.
-    fn place_of(&mut self, view: usize, point: DVec3) -> Result<Option<Place>> {
+    fn place_of(&mut self, view: usize, point: DVec3) -> Result<Option<PhotoPoint>> {
         let camera = &self.photos.views[view].camera;
         let z = camera.to_camera(point).z;
         let Some(place) = camera.sees(point) else { return Ok(None) };
@@ -264,7 +264,7 @@ impl<'a> ObjectFinder<'a> {
                     self.looked = (self.looked.0 + time, self.looked.1 + 1);
                 }
             }
-            let ask = |(view, prompt): &(usize, Prompt), prepared: Option<Prepared>| {
+            let ask = |(view, prompt): &(usize, Prompt), prepared: Option<PreparedPhoto>| {
                 let prepared = prepared.map_or_else(|| Ok(self.photos.prepare(*view)?.0), Ok::<_, Error>)?;
                 let masks = self.photos.ask(*view, &prepared, prompt)?;
                 Ok((*view, prepared, masks))

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::files::resize::bounded_size;
 use crate::scene::{Dataset, LabelMap, View};
-use crate::segment::{Answer, FeatureCache, Network, Place, Prepared, Prompt};
+use crate::segment::{Answer, FeatureCache, Network, PhotoPoint, PreparedPhoto, Prompt};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -61,13 +61,13 @@ impl Photos {
     }
 
     /// Converts a pixel corner from the user's size to the drawn view; add 0.5 to each coordinate for the pixel centre.
-    pub(super) fn drawn(&self, view: usize, [x, y]: [f32; 2]) -> Place {
+    pub(super) fn drawn(&self, view: usize, [x, y]: [f32; 2]) -> PhotoPoint {
         let ((width, height), to) = (self.typed[view], self.views[view].camera.size());
         [x * to.0 as f32 / width as f32, y * to.1 as f32 / height as f32]
     }
 
     /// Converts a position in the drawn view to a pixel in the user's size.
-    pub(super) fn pixel(&self, view: usize, [x, y]: Place) -> [u32; 2] {
+    pub(super) fn pixel(&self, view: usize, [x, y]: PhotoPoint) -> [u32; 2] {
         let ((width, height), from) = (self.typed[view], self.views[view].camera.size());
         let along = |at: f32, from: u32, to: u32| ((at * to as f32 / from as f32).max(0.0) as u32).min(to - 1);
         [along(x, from.0, width), along(y, from.1, height)]
@@ -79,14 +79,14 @@ impl Photos {
     }
 
     /// Returns the network's features of a photo, and the time they took.
-    pub(super) fn prepare(&self, view: usize) -> Result<(Prepared, Duration)> {
+    pub(super) fn prepare(&self, view: usize) -> Result<(PreparedPhoto, Duration)> {
         let start = Instant::now();
-        let features = self.cache.of(&self.network, &*self.views[view].photo()?)?;
+        let features = self.cache.features(&self.network, &*self.views[view].photo()?)?;
         Ok((self.network.prepare(&features)?, start.elapsed()))
     }
 
     /// Queries masks at the size of the view.
-    pub(super) fn ask(&self, view: usize, prepared: &Prepared, prompt: &Prompt) -> Result<Masks> {
+    pub(super) fn ask(&self, view: usize, prepared: &PreparedPhoto, prompt: &Prompt) -> Result<Masks> {
         let (photo, size) = (prepared.frame.size, self.views[view].camera.size());
         let scale = [photo.0 as f32 / size.0 as f32, photo.1 as f32 / size.1 as f32];
         let Answer { masks, scores } = self.network.ask(prepared, &prompt.scaled(scale))?;

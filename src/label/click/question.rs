@@ -7,7 +7,7 @@ use super::{Area, ObjectFinder, Progress, ProgressObserver, nothing};
 use crate::error::Result;
 use crate::render::label_map;
 use crate::scene::LabelMap;
-use crate::segment::{Place, Prompt};
+use crate::segment::{PhotoPoint, Prompt};
 use glam::DVec3;
 
 /// Most views queried for a first answer.
@@ -146,7 +146,7 @@ impl ObjectFinder<'_> {
     }
 
     /// Returns the positions at which a view sees spots that nothing hides.
-    fn places_of(&mut self, view: usize, spots: &[Spot]) -> Result<Vec<Place>> {
+    fn places_of(&mut self, view: usize, spots: &[Spot]) -> Result<Vec<PhotoPoint>> {
         let mut places = Vec::new();
         for spot in spots {
             places.extend(self.place_of(view, spot.point)?);
@@ -181,7 +181,7 @@ impl ObjectFinder<'_> {
     }
 
     /// Returns the box in the drawn view, if it belongs to this view.
-    fn area(&self, view: usize, question: &Question) -> Option<[Place; 2]> {
+    fn area(&self, view: usize, question: &Question) -> Option<[PhotoPoint; 2]> {
         let [x0, y0, x1, y1] = question.area().filter(|area| area.view == view)?.corners.map(|at| at as f32);
         Some([self.photos.drawn(view, [x0, y0]), self.photos.drawn(view, [x1, y1])])
     }

@@ -5,7 +5,7 @@ use super::photos::Masks;
 use crate::label::masks::nested::{NestedMasks, sight::ViewSight};
 use crate::render::Render;
 use crate::scene::LabelMap;
-use crate::segment::{Place, Prompt};
+use crate::segment::{PhotoPoint, Prompt};
 
 /// Smallest overlap of two views' masks at which both show the object.
 const AGREEING_MIN: f64 = 0.5;
@@ -61,8 +61,8 @@ pub(super) fn agreeing(asked: &[ViewMasks]) -> Vec<(usize, LabelMap)> {
 }
 
 /// Returns the masks that contain none of these positions.
-pub(super) fn without((masks, qualities): Masks, off: &[Place]) -> Masks {
-    let has = |mask: &LabelMap, [x, y]: Place| mask.ids[y as usize * mask.width as usize + x as usize] != 0;
+pub(super) fn without((masks, qualities): Masks, off: &[PhotoPoint]) -> Masks {
+    let has = |mask: &LabelMap, [x, y]: PhotoPoint| mask.ids[y as usize * mask.width as usize + x as usize] != 0;
     let kept = masks.into_iter().zip(qualities).filter(|(mask, _)| !off.iter().any(|place| has(mask, *place)));
     kept.unzip()
 }
@@ -84,7 +84,7 @@ pub(super) fn prompt_of(map: &LabelMap) -> Option<Prompt> {
 }
 
 /// Returns positions spread over a mask, starting with the one farthest from its border.
-pub(super) fn places(map: &LabelMap) -> Vec<Place> {
+pub(super) fn places(map: &LabelMap) -> Vec<PhotoPoint> {
     let depths = map.depths(OBJECT_ID);
     let mut inside: Vec<usize> = (0..depths.len()).filter(|&at| depths[at] > 0).collect();
     inside.sort_by_key(|&at| std::cmp::Reverse(depths[at]));
@@ -92,7 +92,7 @@ pub(super) fn places(map: &LabelMap) -> Vec<Place> {
 }
 
 /// Returns the centre of a pixel.
-fn place(map: &LabelMap, at: usize) -> Place {
+fn place(map: &LabelMap, at: usize) -> PhotoPoint {
     let width = map.width as usize;
     [(at % width) as f32 + 0.5, (at / width) as f32 + 0.5]
 }

@@ -5,7 +5,7 @@ use labelgs_scene::{Camera, Dataset, LabelMap, View};
 use labelgs_scenes::LoadOptions;
 use labelgs_scenes::lens::{Division, Eucm, Fisheye, Fov, Lens, Optics, Polynomial, Projection, RadTan};
 use labelgs_scenes::window::{Window, ids_of_photo, windows};
-use labelgs_synth::{self as synth, World, photograph, picture};
+use labelgs_synth::{self as synth, World, trace_photo, trace_view};
 use labelgs_synth::{Preset, SynthLens, SynthOptions};
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
@@ -129,7 +129,7 @@ fn read(folder: &Path, options: &SynthOptions) -> Dataset {
 /// ids; the number of covered pixels.
 fn compared(world: &World, view: &View) -> (f64, f64, usize) {
     let (photo, mask) = (view.photo().expect("a photo"), view.mask().expect("read").expect("a mask"));
-    let made = picture(world, &view.camera, 0);
+    let made = trace_view(world, &view.camera, 0);
     let (mut error, mut same, mut count) = (0.0, 0, 0);
     for at in (0..photo.rgba.len()).filter(|&at| photo.rgba[at][3] == 255) {
         for channel in 0..3 {
@@ -246,7 +246,7 @@ fn observed_points_are_where_the_lens_shows_them() {
 fn photographs_show_nothing_beyond_the_lens() {
     let world = World::new(Preset::Simple, 0);
     let folded = Fisheye { radial: [-1.0, 0.0, 0.0, 0.0], ..Fisheye::default() };
-    let (rgb, ids) = photograph(&world, &Optics::new(camera(20, 16, 6.0), Lens::Fisheye(folded)), 0);
+    let (rgb, ids) = trace_photo(&world, &Optics::new(camera(20, 16, 6.0), Lens::Fisheye(folded)), 0);
     assert_eq!((rgb[0], ids[0]), ([0; 3], 0));
     assert_ne!(rgb[8 * 20 + 10], [0; 3]);
 }

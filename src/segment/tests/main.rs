@@ -1,4 +1,4 @@
-//! A network is found, asked and understood; its masks become levels.
+//! A network is found, prompted and understood; its masks become levels.
 #![allow(missing_docs, reason = "a test")]
 
 mod tiny;
@@ -7,14 +7,14 @@ use labelgs_scene::{LabelMap, Photo};
 use labelgs_segment::{FeatureCache, Features, Level, Network, Prompt, Search, masks_of_photo, threads_for};
 use std::path::Path;
 
-const SEARCH: Search = Search { grid: 8, min_score: 0.7, min_stability: 0.5 };
+const SEARCH_OPTIONS: Search = Search { grid: 8, min_score: 0.7, min_stability: 0.5 };
 
 fn network(folder: &Path) -> Network {
     tiny::write(folder);
     Network::open(folder, 2).expect("network")
 }
 
-/// Red at the left, green at the right, a blue square in the red.
+/// Red on the left, green on the right, a blue square in the red half.
 fn photo(width: u32, height: u32) -> Photo {
     let at = |at: u32| {
         let (x, y) = (at % width, at / width);
@@ -36,7 +36,7 @@ fn message<T>(result: labelgs_scene::Result<T>) -> String {
 fn a_prompt_is_answered_where_it_was_asked() {
     let folder = tempfile::tempdir().expect("folder");
     let network = network(folder.path());
-    // Wide and tall photos lie differently in the square of the network.
+    // Wide and tall photos have different layouts in the network's square.
     for (width, height) in [(320, 240), (120, 360)] {
         let photo = photo(width, height);
         let features = network.encode(&photo).expect("features");
@@ -44,7 +44,7 @@ fn a_prompt_is_answered_where_it_was_asked() {
         let (columns, rows) = prepared.frame.grid();
         for (x, y) in [(0.75, 0.5), (0.4, 0.8), (0.18, 0.36)] {
             let place = [x * width as f32, y * height as f32];
-            let answer = network.ask(&prepared, &Prompt::at(place)).expect("answer");
+            let answer = network.ask(&prepared, &Prompt::from_point(place)).expect("answer");
             assert_eq!((answer.masks.len(), answer.scores.as_slice()), (1, [0.95].as_slice()));
             let wanted = photo.rgba[place[1] as usize * width as usize + place[0] as usize];
             let cells = answer.masks[0].iter().enumerate();
@@ -54,7 +54,8 @@ fn a_prompt_is_answered_where_it_was_asked() {
                 let shown = photo.rgba[(py.min(height - 1) * width + px.min(width - 1)) as usize];
                 (*logit > 0.0) == (shown == wanted)
             });
-            // Where colours meet, a cell of 16 px has both: of a tall photo, with 341 px across in the network, 5 % at the long border.
+            // Where colours meet, a cell of 16 px mixes both: for a tall photo, 341 px wide in the network, 5 % on the
+            // long border.
             let share = right.count() as f64 / (columns * rows) as f64;
             assert!(share > 0.9, "{width} x {height}, {place:?}: {share}");
         }
@@ -68,7 +69,8 @@ fn masks_do_not_depend_on_threads_and_levels_show_them() {
     let photo = photo(160, 120);
     let features = first.encode(&photo).expect("features");
     let levels = [Level::Objects, Level::Parts, Level::Wholes];
-    let find = |network: &Network| masks_of_photo(network, &features, &SEARCH, &levels, (160, 120)).expect("masks");
+    let find =
+        |network: &Network| masks_of_photo(network, &features, &SEARCH_OPTIONS, &levels, (160, 120)).expect("masks");
     let found = find(&first);
     assert_eq!(found.masks.len(), 3, "each colour once");
     let one = Network::open(folder.path(), 1).expect("network");
@@ -79,7 +81,7 @@ fn masks_do_not_depend_on_threads_and_levels_show_them() {
         let (red, blue, green) = (at(map, 60, 100), at(map, 30, 45), at(map, 120, 60));
         assert!(red != blue && blue != green && red != green && red * blue * green != 0, "{red} {blue} {green}");
     }
-    // Half of a photo is no whole, but surroundings.
+    // Half a photo counts as surroundings, not as a whole.
     assert_eq!(at(&found.levels[2], 120, 60), 0);
 }
 
@@ -89,15 +91,15 @@ fn features_on_the_disk_are_those_of_the_network() {
     let network = network(&folder.path().join("network"));
     let cache = FeatureCache::new(Some(&folder.path().join("cache")), &network);
     let photo = photo(80, 60);
-    let fresh = cache.of(&network, &photo).expect("features");
-    assert_eq!(cache.of(&network, &photo).expect("features"), fresh);
+    let fresh = cache.features(&network, &photo).expect("features");
+    assert_eq!(cache.features(&network, &photo).expect("features"), fresh);
     let files: Vec<_> = walk(&folder.path().join("cache"));
     assert_eq!(files.len(), 1);
     assert_eq!(Features::read(&files[0], (80, 60)), Some(fresh.clone()));
-    // A damaged file is made again.
+    // A damaged file is replaced.
     #[expect(clippy::disallowed_methods, reason = "a test damages a file")]
     std::fs::write(&files[0], b"half").expect("written");
-    assert_eq!(cache.of(&network, &photo).expect("features"), fresh);
+    assert_eq!(cache.features(&network, &photo).expect("features"), fresh);
 }
 
 #[test]
@@ -123,21 +125,21 @@ fn features_that_were_not_used_for_longest_make_room() {
             file.set_modified(time - std::time::Duration::from_secs(age)).expect("older");
         }
     };
-    cache.of(&network, &photos[0]).expect("features");
+    cache.features(&network, &photos[0]).expect("features");
     let bytes = std::fs::metadata(&walk(&root)[0]).expect("a file").len();
     old(10);
-    cache.of(&network, &photos[1]).expect("features");
+    cache.features(&network, &photos[1]).expect("features");
     old(10);
-    // Looked at again: the second is what was not used for longest.
-    cache.of(&network, &photos[0]).expect("features");
-    // Another file of the folder is not counted.
+    // The first photo was used again, so the second is the least recently used.
+    cache.features(&network, &photos[0]).expect("features");
+    // Other files in the folder are not counted.
     #[expect(clippy::disallowed_methods, reason = "a test makes a file")]
     std::fs::write(root.join("pipelines-x.bin"), vec![0; 3 * bytes as usize]).expect("written");
-    cache.bounded(2 * bytes).of(&network, &photos[2]).expect("features");
+    cache.bounded(2 * bytes).features(&network, &photos[2]).expect("features");
     assert!(known("80") && !known("96") && known("112"), "{:?}", walk(&root));
     assert!(root.join("pipelines-x.bin").is_file());
     let cache = FeatureCache::new(Some(&root), &network).bounded(1);
-    cache.of(&network, &photos[1]).expect("features");
+    cache.features(&network, &photos[1]).expect("features");
     assert!(!known("80") && known("96") && !known("112"), "the newest stays");
 }
 
@@ -162,5 +164,5 @@ fn what_is_no_network_is_refused_with_what_was_expected() {
     assert!(open().contains("decoder.onnx: has the"), "{}", open());
     let cut = &tiny::encoder()[..100];
     std::fs::write(folder.path().join("encoder.onnx"), cut).expect("written");
-    assert!(open().contains("encoder.onnx: is no ONNX network that can be run"), "{}", open());
+    assert!(open().contains("encoder.onnx: is not a usable ONNX network"), "{}", open());
 }

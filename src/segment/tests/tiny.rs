@@ -1,13 +1,13 @@
-//! A promptable network of 2 kB: what has the colour of the first place that was asked for, or of the middle of a box, within a
-//! threshold.
+//! A promptable network of 2 kB: the mask is everything with the colour of the first prompt point, or of a box's
+//! centre, within a threshold.
 
 use std::path::Path;
 
-/// Squared distance of colours, in deviations, below which a place belongs to the object.
-const THRESHOLD: f32 = 0.1;
-/// Types of ONNX.
-const FLOAT: u64 = 1;
-const INT64: u64 = 7;
+/// Squared colour distance, in standard deviations, below which a pixel belongs to the object.
+const COLOUR_DISTANCE_MAX: f32 = 0.1;
+/// ONNX type codes.
+const FLOAT_TYPE: u64 = 1;
+const INT64_TYPE: u64 = 7;
 
 fn varint(mut value: u64, out: &mut Vec<u8>) {
     while value > 127 {
@@ -60,19 +60,19 @@ fn tensor(name: &str, shape: &[u64], kind: u64, data: &[u8]) -> Vec<u8> {
 }
 
 fn floats(name: &str, shape: &[u64], values: &[f32]) -> Vec<u8> {
-    tensor(name, shape, FLOAT, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
+    tensor(name, shape, FLOAT_TYPE, &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
 }
 
 fn longs(name: &str, values: &[i64]) -> Vec<u8> {
     let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-    tensor(name, &[values.len() as u64], INT64, &data)
+    tensor(name, &[values.len() as u64], INT64_TYPE, &data)
 }
 
-/// An input (field 11) or output (12); a side of 0 is known at run time only.
+/// An input (field 11) or output (12); a side of 0 is only known at run time.
 fn port(field: u64, name: &str, shape: &[u64]) -> Vec<u8> {
     let side = |&side: &u64| bytes(1, &if side > 0 { number(1, side) } else { text(2, "n") });
     let shape: Vec<Vec<u8>> = shape.iter().map(side).collect();
-    let of_tensor = [number(1, FLOAT), bytes(2, &shape.concat())].concat();
+    let of_tensor = [number(1, FLOAT_TYPE), bytes(2, &shape.concat())].concat();
     bytes(field, &[text(1, name), bytes(2, &bytes(1, &of_tensor))].concat())
 }
 
@@ -109,13 +109,13 @@ pub fn decoder(points: &str) -> Vec<u8> {
         floats("cell", &[1], &[16.0]),
         floats("least", &[1], &[0.0]),
         floats("most", &[1], &[63.0]),
-        floats("threshold", &[1], &[THRESHOLD]),
+        floats("threshold", &[1], &[COLOUR_DISTANCE_MAX]),
         floats("sharp", &[1], &[100.0]),
         floats("scales", &[4], &[1.0, 1.0, 4.0, 4.0]),
         floats("one", &[1], &[1.0]),
         floats("half", &[1], &[0.5]),
         floats("score", &[1, 1], &[0.95]),
-        // Of a box that comes first, the second corner is next: a label of 2 becomes 1, all others 0.
+        // If a box comes first, its second corner is next: a label of 2 becomes 1, all others 0.
         node("Slice", &[points, "first", "second", "axis"], "asked", &[]),
         node("Slice", &[points, "second", "third", "axis"], "next", &[]),
         node("Slice", &["point_labels", "first", "second", "axis"], "kind", &[]),
@@ -128,7 +128,7 @@ pub fn decoder(points: &str) -> Vec<u8> {
         node("Div", &["point", "cell"], "cells", &[]),
         node("Max", &["cells", "least"], "above", &[]),
         node("Min", &["above", "most"], "within", &[]),
-        node("Cast", &["within"], "whole", &[int("to", INT64)]),
+        node("Cast", &["within"], "whole", &[int("to", INT64_TYPE)]),
         node("Reshape", &["whole", "pair"], "xy", &[]),
         node("Gather", &["xy", "yx"], "place", &[int("axis", 1)]),
         node("Transpose", &["image_embeddings"], "last", &[ints("perm", &[0, 2, 3, 1])]),

@@ -1,4 +1,4 @@
-//! The made scenes.
+//! Tests of synthetic scenes.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,

@@ -1,11 +1,13 @@
-//! The made scene: its pictures, masks, depth and points must agree with each other.
+//! A synthetic scene is consistent: images, masks, depth and points agree.
 
 use glam::DVec3;
 use labelgs_files::LabelTable;
 use labelgs_masks::read_mask;
 use labelgs_scene::{Camera, Error};
 use labelgs_scenes::LoadOptions;
-use labelgs_synth::{self as synth, Picture, Preset, SynthOptions, World, alone, picture, ring_of_cameras};
+use labelgs_synth::{
+    self as synth, Preset, SynthOptions, TracedView, World, ring_of_cameras, trace_isolated, trace_view,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +15,7 @@ fn small() -> SynthOptions {
     SynthOptions { width: 64, height: 48, views: 6, points: 60, ..SynthOptions::default() }
 }
 
-/// Every file under a folder with its bytes.
+/// All files under a folder with their bytes.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).expect("folder") {
@@ -31,7 +33,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn visible_pixels_belong_to_the_whole_object() {
     let world = World::new(Preset::Default, 0);
     for (view, camera) in ring_of_cameras(&small()).iter().enumerate() {
-        let made = picture(&world, camera, view as u32);
+        let made = trace_view(&world, camera, view as u32);
         let mut hidden = 0;
         for (object, whole) in world.objects.iter().zip(&made.whole) {
             for (&id, &covered) in made.ids.iter().zip(whole) {
@@ -61,7 +63,8 @@ fn every_object_is_seen_often() {
 fn depth_and_ids_agree_between_views() {
     let world = World::new(Preset::Simple, 3);
     let cameras = ring_of_cameras(&small());
-    let made: Vec<_> = cameras.iter().enumerate().map(|(view, camera)| picture(&world, camera, view as u32)).collect();
+    let made: Vec<_> =
+        cameras.iter().enumerate().map(|(view, camera)| trace_view(&world, camera, view as u32)).collect();
     let (mut same, mut seen) = (0, 0);
     for y in 0..48 {
         for x in 0..64 {
@@ -94,7 +97,7 @@ fn a_ball_has_its_own_outline() {
     let world = World::new(Preset::Simple, 0);
     let (index, ball) = world.objects.iter().enumerate().find(|(_, object)| object.name == "ball").expect("ball");
     for camera in ring_of_cameras(&small()) {
-        let made = picture(&world, &camera, 0);
+        let made = trace_view(&world, &camera, 0);
         let centre = camera.to_camera(ball.position);
         for (pixel, &covered) in made.whole[index].iter().enumerate() {
             let (x, y) = ((pixel % 64) as f64 + 0.5, (pixel / 64) as f64 + 0.5);
@@ -117,7 +120,7 @@ fn files_are_complete_and_the_same_every_time() {
     synth::write(&options, &again, &|_| Ok(())).expect("written");
     synth::write(&SynthOptions { seed: 1, ..options }, &other, &|_| Ok(())).expect("written");
     let (a, b, c) = (files(&first), files(&again), files(&other));
-    // Per view a photo, a mask, a depth map, 8 whole outlines and 8 objects alone; 3 of COLMAP; the names; in the
+    // Per view a photo, a mask, a depth map, 8 whole outlines and 8 isolated objects; 3 COLMAP files; the names; in the
     // held-out view photos without each of 8 objects, with its shadow and without.
     assert_eq!(a.len(), 6 * 19 + 4 + 16);
     assert!(a.values().eq(b.values()), "two runs differ");
@@ -134,7 +137,7 @@ fn files_are_complete_and_the_same_every_time() {
     assert_eq!(told, counted[1..]);
     let file = image::open(first.join("objects/2/000.png")).expect("PNG").into_rgba8();
     let world = World::new(options.preset, options.seed);
-    let made = synth::alone(&world, &ring_of_cameras(&options)[0], 0, 1);
+    let made = synth::trace_isolated(&world, &ring_of_cameras(&options)[0], 0, 1);
     assert_eq!(file.into_raw(), made.concat());
 }
 
@@ -142,15 +145,15 @@ fn files_are_complete_and_the_same_every_time() {
 fn a_world_without_an_object_has_its_shadow_or_not() {
     let world = World::new(Preset::Simple, 0);
     let camera = &ring_of_cameras(&small())[0];
-    let made = picture(&world, camera, 0);
+    let made = trace_view(&world, camera, 0);
     for object in &world.objects {
         let (bare, shadowed) = (world.without(object.id, false), world.without(object.id, true));
-        let (bare, shadowed) = (picture(&bare, camera, 0), picture(&shadowed, camera, 0));
+        let (bare, shadowed) = (trace_view(&bare, camera, 0), trace_view(&shadowed, camera, 0));
         assert_eq!((&bare.ids, &bare.depth), (&shadowed.ids, &shadowed.depth));
         assert!(!bare.ids.contains(&object.id), "object {} is still there", object.id);
         let (mut lighter, mut other) = (0, 0);
         for at in 0..made.ids.len() {
-            // Away from the object, photos differ by its shadow only.
+            // Away from the object, photos differ only by its shadow.
             if is_other(&made, at, object.id) {
                 assert_eq!(shadowed.rgb[at], made.rgb[at]);
                 other += 1;
@@ -191,16 +194,16 @@ fn a_filled_folder_is_left_alone() {
     assert!(error.to_string().contains("not empty"), "{error}");
 }
 
-/// True where the mask names `id` nowhere in the neighbourhood of a pixel.
-fn is_other(made: &Picture, at: usize, id: u8) -> bool {
+/// True where no pixel in the neighbourhood has `id`.
+fn is_other(made: &TracedView, at: usize, id: u8) -> bool {
     let (width, height) = (made.width as usize, made.height as usize);
     let (x, y) = (at % width, at / width);
     let inside = (1..width - 1).contains(&x) && (1..height - 1).contains(&y);
     inside && (y - 1..=y + 1).all(|y| (x - 1..=x + 1).all(|x| made.ids[y * width + x] != id))
 }
 
-/// True where the mask names `id` in the whole neighbourhood of a pixel.
-fn is_inner(made: &Picture, at: usize, id: u8) -> bool {
+/// True where all pixels in the neighbourhood have `id`.
+fn is_inner(made: &TracedView, at: usize, id: u8) -> bool {
     let (width, height) = (made.width as usize, made.height as usize);
     let (x, y) = (at % width, at / width);
     let inside = (1..width - 1).contains(&x) && (1..height - 1).contains(&y);
@@ -212,10 +215,10 @@ fn an_object_alone_is_the_photo_where_nothing_hides_it() {
     let options = SynthOptions { width: 128, height: 96, ..small() };
     let world = World::new(Preset::Default, 0);
     for (view, camera) in ring_of_cameras(&options).iter().enumerate().take(3) {
-        let made = picture(&world, camera, view as u32);
+        let made = trace_view(&world, camera, view as u32);
         let (mut compared, mut slivers, mut hidden) = (0, 0, 0);
         for (index, object) in world.objects.iter().enumerate() {
-            let alone = alone(&world, camera, view as u32, index);
+            let alone = trace_isolated(&world, camera, view as u32, index);
             for (at, &[r, g, b, alpha]) in alone.iter().enumerate() {
                 assert_eq!(alpha == 255, made.whole[index][at], "alpha is the whole outline");
                 assert!(alpha == 255 || [r, g, b, alpha] == [0; 4], "nothing is black and transparent");
@@ -227,17 +230,17 @@ fn an_object_alone_is_the_photo_where_nothing_hides_it() {
             }
         }
         assert!(compared > 800 && hidden > 100, "{compared} pixels compared, {hidden} hidden ones have own colours");
-        // Tips of other objects between the centres of pixels.
+        // Tips of other objects lie between the centres of pixels.
         assert!(slivers * 200 <= compared, "{slivers} of {compared} pixels of view {view} differ");
     }
 }
 
-/// The hard scene at half of its default size.
-fn hard() -> (World, Vec<Camera>, Vec<Picture>) {
+/// The hard scene at half its default size.
+fn hard() -> (World, Vec<Camera>, Vec<TracedView>) {
     let world = World::new(Preset::Hard, 0);
     let options = SynthOptions { width: 160, height: 120, ..SynthOptions::default() };
     let cameras: Vec<Camera> = ring_of_cameras(&options).into_iter().step_by(5).collect();
-    let made = cameras.iter().enumerate().map(|(view, camera)| picture(&world, camera, view as u32)).collect();
+    let made = cameras.iter().enumerate().map(|(view, camera)| trace_view(&world, camera, view as u32)).collect();
     (world, cameras, made)
 }
 
@@ -287,7 +290,9 @@ fn the_hard_scene_has_thin_cut_dark_and_hidden_objects() {
     }
 
     let sums = cameras.iter().enumerate().flat_map(|(view, camera)| {
-        alone(&world, camera, view as u32, index_of(&world, "coal")).into_iter().filter(|pixel| pixel[3] == 255)
+        trace_isolated(&world, camera, view as u32, index_of(&world, "coal"))
+            .into_iter()
+            .filter(|pixel| pixel[3] == 255)
     });
     let coal: Vec<[u8; 4]> = sums.collect();
     let mean = coal.iter().flat_map(|pixel| pixel[..3].to_vec()).map(f64::from).sum::<f64>() / (3 * coal.len()) as f64;
@@ -304,14 +309,14 @@ fn the_hard_scene_has_thin_cut_dark_and_hidden_objects() {
 #[test]
 fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
     let (world, cameras, made) = hard();
-    // The photo without the object, at the pixels of the object.
+    // The photo without the object, at the object's pixels.
     let change = |name: &str| {
         let index = index_of(&world, name);
         let mut without = world.clone();
         let id = without.objects.remove(index).id;
         let (mut sum, mut count) = (0.0, 0);
         for (view, (camera, made)) in cameras.iter().zip(&made).enumerate().take(3) {
-            let empty = picture(&without, camera, view as u32);
+            let empty = trace_view(&without, camera, view as u32);
             for at in (0..made.ids.len()).filter(|&at| made.ids[at] == id) {
                 sum += (0..3).map(|c| f64::from(made.rgb[at][c].abs_diff(empty.rgb[at][c]))).sum::<f64>() / 3.0;
                 count += 1;
@@ -327,14 +332,14 @@ fn the_flagstone_looks_like_the_ground_and_the_twins_touch() {
         let pairs = (1..made.ids.len()).filter(|&at| {
             (made.ids[at - 1], made.ids[at]) == (brick, twin) || (made.ids[at - 1], made.ids[at]) == (twin, brick)
         });
-        // The same depth on both sides of the seam.
+        // The depth is the same on both sides of the seam.
         pairs.filter(|&at| (made.depth[at] / made.depth[at - 1] - 1.0).abs() < 0.01).count() > 2
     });
     let touching = touching.count();
     assert!(touching >= 3, "the seam is seen in {touching} views");
 }
 
-/// Where a ray enters a shape is at distance 0, and a step along the normal is as far.
+/// The point where a ray enters a shape is at distance 0, and a step along the normal is as far away.
 #[test]
 fn distances_agree_with_rays() {
     for preset in [Preset::Default, Preset::Hard] {

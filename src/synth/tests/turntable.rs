@@ -1,15 +1,15 @@
-//! An object on a turntable: it follows the poses, and nothing around it does.
+//! On a turntable, only the object follows the poses.
 
 use labelgs_scene::Dataset;
 use labelgs_scenes::capture::still_share;
 use labelgs_synth::{self as synth, Preset, SynthOptions};
 
 fn made(preset: Preset) -> Dataset {
-    let options = SynthOptions { width: 64, height: 48, views: 18, points: 150, ..SynthOptions::of(preset) };
+    let options = SynthOptions { width: 64, height: 48, views: 18, points: 150, ..SynthOptions::for_preset(preset) };
     synth::dataset(&options, 0)
 }
 
-/// The photos show the points of the object, by their poses, in the points' colours and within the masks.
+/// The photos show the object's points, by their poses, in the points' colours and within the masks.
 #[test]
 fn the_object_follows_the_poses() {
     for preset in [Preset::Turntable, Preset::TurnedOver] {
@@ -20,7 +20,7 @@ fn the_object_follows_the_poses() {
             let mask = view.mask().expect("read").expect("a mask");
             for point in &dataset.points {
                 let at = view.camera.sees(point.position).expect("in the picture");
-                // Points have errors of some thousandths of their distance.
+                // Points have errors of a few thousandths of their distance.
                 let is_shown = mask.near_contour(1)[at.y as usize * 64 + at.x as usize];
                 let on = mask.at(at.x as u32, at.y as u32) == 1 || is_shown;
                 if on { inside += 1 } else { outside += 1 }
@@ -31,7 +31,8 @@ fn the_object_follows_the_poses() {
     }
 }
 
-/// Both are seen to be turned, with masks and without; a scene with its own surroundings is not, with few photos either.
+/// Both are recognised as turned, with and without masks; a scene with its own surroundings is not, even with few
+/// photos.
 #[test]
 fn surroundings_that_stay_are_found() {
     let share = |preset: Preset, with_masks: bool| {

@@ -169,7 +169,7 @@ fn remember(args: &MakeArgs, network: &Network) -> Result<()> {
 fn of_photo(args: &MakeArgs, network: &Network, cache: &FeatureCache, view: &View) -> Result<PhotoMasks> {
     let search = Search { grid: usize::from(args.grid), min_score: args.min_score, min_stability: args.min_stability };
     let photo = view.photo()?;
-    let features = cache.of(network, &photo)?;
+    let features = cache.features(network, &photo)?;
     let size = bounded_size(features.photo, Some(MASK_PX));
     masks_of_photo(network, &features, &search, &LEVELS.map(|(level, _)| level), size)
 }
