@@ -8,7 +8,7 @@ use crate::Result;
 use crate::eval::metrics::{psnr_over, scores};
 use crate::render::{Parts, Render, RenderOptions};
 use crate::scene::{Camera, LabelMap, Photo, Pixels, View};
-use crate::scenes::shelf::Shelf;
+use crate::scenes::array_store::ArrayStore;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -70,7 +70,7 @@ pub(super) struct TrainingDepths {
 impl TrainingDepths {
     /// Renders the depth of every training view.
     pub(super) fn new(subject: &mut dyn Subject, train: &[View], options: RenderOptions) -> Result<Self> {
-        let mut shelf = Shelf::default();
+        let mut shelf = ArrayStore::default();
         let depth = |view: &View| {
             let of_depth = RenderOptions { parts: Parts::DEPTH, sh_degree: Some(0), ..options };
             let depth = subject.render(&view.camera, &of_depth)?.mean_depth()?;

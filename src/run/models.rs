@@ -163,7 +163,7 @@ impl StepJob<Run<'_>> for ModelJob {
 }
 
 pub(crate) fn save_cameras(out: &Path, cameras: &[(&str, &Camera)]) -> Result<()> {
-    camera_json::write_cameras(out.join(camera_json::CAMERAS), cameras)
+    camera_json::write_cameras(out.join(camera_json::CAMERAS_FILE), cameras)
 }
 
 /// Writes photo, render and (if it was rendered) label map side by side.

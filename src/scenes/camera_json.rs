@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Name of the file with the cameras of a run, as 3DGS has it.
-pub const CAMERAS: &str = "cameras.json";
+/// File with the cameras of a run, named as in 3DGS.
+pub const CAMERAS_FILE: &str = "cameras.json";
 
 /// A camera in the JSON layout of `labelgs render --camera`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -53,7 +53,7 @@ pub fn read_camera(path: impl AsRef<Path>) -> Result<Camera> {
     camera_of(path, &file)
 }
 
-/// Returns the camera, checked. Errors name `path`, where it came from.
+/// Returns the camera after checking it. Errors name `path`, its source.
 pub fn camera_of(path: &Path, file: &CameraFile) -> Result<Camera> {
     let refuse =
         || Error::data(path, "w2c", "is not a camera-from-world pose: 4 x 4 numbers, the upper left 3 x 3 a rotation");
@@ -81,7 +81,7 @@ struct Entry<'a> {
     rotation: [[f64; 3]; 3],
     fy: f64,
     fx: f64,
-    /// 3DGS leaves the principal point out; it is in the middle then.
+    /// 3DGS omits the principal point, which then is the image centre.
     cx: Option<f64>,
     cy: Option<f64>,
 }
@@ -105,10 +105,10 @@ pub fn write_cameras<'a>(path: impl AsRef<Path>, cameras: &[(&'a str, &Camera)])
     atomic::write_json(path.as_ref(), &entries)
 }
 
-/// Reads the views in the `cameras.json` of the run that a model belongs to, of any 3DGS trainer, without photos. Returns none
+/// Reads the views in the `cameras.json` of a model's run, from any 3DGS trainer, without photos. Returns an empty list
 /// if there is no such file.
 pub fn views_of_model(model: &Path) -> Result<Vec<View>> {
-    let path = run_folder::find_for_model(model).map(|run| run.join(CAMERAS)).filter(|path| path.is_file());
+    let path = run_folder::find_for_model(model).map(|run| run.join(CAMERAS_FILE)).filter(|path| path.is_file());
     let Some(path) = path else { return Ok(Vec::new()) };
     let expected = "expected a list of cameras, each with img_name, width, height, position, rotation, fx, fy; delete the file \
                     to go on without";
@@ -120,7 +120,7 @@ fn view(path: &Path, entry: &Entry) -> Result<View> {
     let place = format!("camera {}", entry.img_name);
     // Rows of world-from-camera are columns of camera-from-world.
     let rotation = rotation_of(DMat3::from_cols_array_2d(&entry.rotation))
-        .ok_or_else(|| Error::data(path, &place, "has a rotation that is none; delete the file to go on without"))?;
+        .ok_or_else(|| Error::data(path, &place, "has no valid rotation; fix it or delete the file"))?;
     let Entry { width, height, fx, fy, .. } = *entry;
     let (cx, cy) = (entry.cx.unwrap_or(f64::from(width) / 2.0), entry.cy.unwrap_or(f64::from(height) / 2.0));
     let translation = -(rotation * DVec3::from_array(entry.position));

@@ -1,4 +1,4 @@
-//! Paths of a camera as JSON: keyframes, which a smooth curve goes through.
+//! Camera paths as JSON: keyframes along a smooth curve.
 
 use super::camera_json::{CameraFile, camera_of};
 use labelgs_files::read;
@@ -20,7 +20,7 @@ struct File {
 
 #[derive(Debug, Deserialize, Serialize)]
 struct Keyframe {
-    /// Seconds; they increase from one to the next.
+    /// Time in seconds, increasing between keyframes.
     time: f64,
     camera: CameraFile,
 }
@@ -30,12 +30,12 @@ struct Keyframe {
 pub struct PathFrames {
     /// Frames per second.
     pub per_second: f64,
-    /// The cameras of the frames, of one size.
+    /// The cameras of the frames, all of the same size.
     pub cameras: Vec<Camera>,
 }
 
 /// Reads a path: `{"schema_version": 1, "fps": 30, "keyframes": [{"time": s, "camera": {..}}, ..]}`, with cameras as
-/// [`read_camera`](super::read_camera) reads them. Times that do not increase and cameras of several sizes are errors.
+/// [`read_camera`](super::read_camera) reads them. Times must increase, and all cameras must have the same size.
 pub fn read_path(path: &Path) -> Result<PathFrames> {
     let expected = r#"expected {"schema_version": 1, "fps": 30, "keyframes": [{"time": 0.0, "camera": {"w2c", "fx", "fy", "cx", "cy", "W", "H"}}, ..]}"#;
     let file: File = read::json(path, expected)?;

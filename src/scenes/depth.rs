@@ -1,6 +1,6 @@
-//! Depth maps of the photos of a scene, from a folder.
+//! Depth maps of a scene's photos, from a folder.
 //!
-//! A map belongs to the photo file. It is undistorted and resized in the same way as the mask of the photo.
+//! A map belongs to the photo file. It is undistorted and resized like the mask of the photo.
 
 use super::lookup::Lookup;
 use super::resample::resample_nearest;
@@ -13,14 +13,14 @@ use labelgs_scene::{DepthMap, Error, Result, View};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// A folder of depth maps, with what matches them to the views of a scene.
+/// A folder of depth maps, and how they match the views of a scene.
 pub struct DepthFolder {
     files: PhotoFiles,
     windows: BTreeMap<String, Window>,
 }
 
 impl DepthFolder {
-    /// Opens the maps in `folder` for the photos of `scene`. The scene must have been opened before.
+    /// Opens the maps in `folder` for the photos of `scene`, which must have been opened before.
     pub fn open(folder: &Path, scene: &Path, lookup: &Lookup) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::data(folder, "", "there is no such folder of depth maps"));
@@ -48,7 +48,7 @@ impl DepthFolder {
         Err(Error::data(&self.files.folder, "", problem))
     }
 
-    /// Reads the map of `view`, at its size. Pixels outside of the photo are holes.
+    /// Reads the map of `view` at its size. Pixels outside the photo are holes.
     pub fn read(&self, view: &View) -> Result<DepthMap> {
         let Some((window, path)) = self.find(&view.name) else {
             return Err(Error::data(&self.files.folder, &view.name, "has no depth map"));
@@ -66,14 +66,14 @@ impl DepthFolder {
         Ok(DepthMap { width, height, values })
     }
 
-    /// Finds how a view lies in its photo, and the map of that.
+    /// Finds the window of a view in its photo, and the photo's map.
     fn find(&self, view: &str) -> Option<(&Window, &Path)> {
         let window = self.windows.get(view)?;
         Some((window, self.files.find(&window.photo)?))
     }
 }
 
-/// Returns the view's part of a picture of its whole window: views of objects alone are cut to these.
+/// Crops values of the whole window to the view: views of isolated objects are crops.
 fn part_of(window: &Window, view: &View, whole: impl FnOnce((u32, u32)) -> Vec<f32>) -> Vec<f32> {
     let (of, camera) = (&window.camera, &view.camera);
     let side = |side: u32, scale: f64| (f64::from(side) * scale).round() as u32;

@@ -1,36 +1,36 @@
-//! Tests whether poses, points and photos of a scene are in one frame, and names the convention that fits if not.
+//! Tests whether poses, points and photos of a scene share a frame, and if not, names the convention that fits.
 //!
-//! Poses with other axes, or inverted ones, read without an error: the cameras then look at nothing, and a training
-//! makes fog.
+//! Poses with other axes, or inverted ones, read without an error. The cameras then look at nothing, and training
+//! produces floaters.
 
 use super::pose_convention::{Native, PoseConvention};
 use labelgs_files::names::shortened;
 use labelgs_scene::agreement::{Agreement, Sample};
 use labelgs_scene::{Dataset, Result, SceneProblem, Setting, View};
 
-/// Fewest points that can judge a scene.
+/// Fewest points for judging a scene.
 const POINTS_MIN: usize = 50;
-/// Correlation of colours below which points and photos do not fit, and from which they do. Scenes as they should be
-/// have 0.5 to 0.95, wrong ones -0.1 to 0.2.
-const COLOUR_WRONG: f64 = 0.2;
-const COLOUR_RIGHT: f64 = 0.3;
-/// Mean share of the points in a picture below which a scene without photos is looked at more closely.
-const SHARE_WRONG: f64 = 0.02;
-/// Share from which another convention convinces, and how many times that of the scene as it is.
-const SHARE_RIGHT: f64 = 0.05;
-const SHARE_TIMES: f64 = 4.0;
+/// Points and photos do not fit if their colour correlation is below the first value, and fit if it is above the
+/// second. Correct scenes have 0.5 to 0.95, wrong ones -0.1 to 0.2.
+const COLOUR_CORRELATION_MIN: f64 = 0.2;
+const COLOUR_CORRELATION_GOOD: f64 = 0.3;
+/// A scene without photos is examined more closely if the mean share of points inside an image is below this value.
+const SHARE_MIN: f64 = 0.02;
+/// Another convention is convincing above this share, and above this multiple of the current share.
+const SHARE_GOOD: f64 = 0.05;
+const SHARE_RATIO_MIN: f64 = 4.0;
 
-/// What is found.
+/// The results of the check.
 #[derive(Default)]
-struct Found {
-    /// What does not fit.
+struct FrameFindings {
+    /// Problems.
     flaws: Vec<String>,
-    /// What may be wrong.
+    /// Possible problems.
     notes: Vec<String>,
 }
 
-/// Compares the points of a scene with its views, and says what it finds. `native` is the convention of its file, `None` if its views are turned
-/// against their photos or `given` is in its place.
+/// Compares the points of a scene with its views and notes problems. `native` is the convention of its file; `None` if
+/// its views are cube faces or `given` overrides it.
 pub(super) fn check(dataset: &mut Dataset, native: Option<Native>, given: PoseConvention) -> Result<()> {
     let found = find(dataset, native, given)?;
     dataset.notes.extend(found.flaws.iter().cloned().chain(found.notes));
@@ -38,9 +38,9 @@ pub(super) fn check(dataset: &mut Dataset, native: Option<Native>, given: PoseCo
     Ok(())
 }
 
-fn find(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Result<Found> {
+fn find(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Result<FrameFindings> {
     let views = dataset.all();
-    let mut found = Found::default();
+    let mut found = FrameFindings::default();
     let sample = Sample::new(&views, dataset.points.iter().copied())?;
     if sample.point_count() < POINTS_MIN || views.len() < 2 {
         return Ok(found);
@@ -77,22 +77,24 @@ fn find(dataset: &Dataset, native: Option<Native>, given: PoseConvention) -> Res
         ));
     } else if let Some(colour) = as_is.colour {
         found.notes.push(format!(
-            "the colours of the points are not those of the photos at their pixels (correlation {colour:.2}, usual are 0.5 \
+            "the colours of the points differ from the photos at their pixels (correlation {colour:.2}; usual are 0.5 \
              to 0.95): poses, points and photos may not belong together"
         ));
     }
     Ok(found)
 }
 
-/// `is_empty` if most photos show none of the points.
+/// `is_empty`: most photos show none of the points.
 fn is_doubtful(as_is: &Agreement, is_empty: bool) -> bool {
-    as_is.colour.map_or(is_empty || as_is.in_picture < SHARE_WRONG, |colour| colour < COLOUR_WRONG)
+    as_is.colour.map_or(is_empty || as_is.in_picture < SHARE_MIN, |colour| colour < COLOUR_CORRELATION_MIN)
 }
 
 fn convinces(other: &Agreement, as_is: &Agreement) -> bool {
     match (other.colour, as_is.colour) {
-        (Some(other), as_is) => other > COLOUR_RIGHT.max(as_is.unwrap_or(0.0) + COLOUR_RIGHT - COLOUR_WRONG),
-        (None, _) => other.in_picture > SHARE_RIGHT.max(SHARE_TIMES * as_is.in_picture),
+        (Some(other), as_is) => {
+            other > COLOUR_CORRELATION_GOOD.max(as_is.unwrap_or(0.0) + COLOUR_CORRELATION_GOOD - COLOUR_CORRELATION_MIN)
+        }
+        (None, _) => other.in_picture > SHARE_GOOD.max(SHARE_RATIO_MIN * as_is.in_picture),
     }
 }
 
@@ -100,9 +102,9 @@ fn colours(of: &Agreement) -> String {
     of.colour.map_or(String::new(), |colour| format!(", whose colours have a correlation of {colour:.2} with it"))
 }
 
-/// Names photos that show none of the points, where the others show many.
+/// Names photos that show no points although most photos show many.
 fn blind(sample: &Sample, views: &[&View], as_is: &Agreement) -> Option<String> {
-    if as_is.in_median_picture < SHARE_RIGHT {
+    if as_is.in_median_picture < SHARE_GOOD {
         return None;
     }
     let sees_none = |view: &&&View| sample.is_unseen(&view.camera);
@@ -110,7 +112,7 @@ fn blind(sample: &Sample, views: &[&View], as_is: &Agreement) -> Option<String> 
     (!blind.is_empty()).then(|| {
         tracing::debug!("photos that show no point: {}", blind.join(", "));
         format!(
-            "{} of {} photos show none of the points, and most show {:.0} %: their poses are wrong, or they look away ({})",
+            "{} of {} photos show none of the points, although most show {:.0} %: wrong poses, or looking away ({})",
             blind.len(),
             views.len(),
             100.0 * as_is.in_median_picture,

@@ -1,4 +1,4 @@
-//! `frames.json`: the frames of a video through the photos of a scene, and the photo of some frames.
+//! `frames.json`: the frames of a video through a scene's photos, and the photo of each frame that has one.
 
 use super::camera_json::CameraFile;
 use labelgs_files::{atomic, read};
@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Name of the file in the folder of the video.
-pub const FILE: &str = "frames.json";
+/// Name of the file in the video folder.
+pub const FILE_NAME: &str = "frames.json";
 const SCHEMA_VERSION: u32 = 1;
 
 /// A frame of the video.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Frame {
-    /// Its picture, relative to the folder of the file.
+    /// Its image, relative to the folder of the file.
     pub file: String,
-    /// Name of the photo with the same pose, or of a face of a photo through a wide lens; null between photos.
+    /// Name of the photo or cube face with the same pose; null between photos.
     pub photo: Option<String>,
-    /// Width and height of the photo, px, which lies in the upper left of the frame; without it, the frame is the photo.
+    /// Width and height of the photo, px, at the upper left of the frame; if absent, the photo fills the frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
-    /// Its camera, in the layout of `labelgs render --camera`.
+    /// The camera, in the layout of `labelgs render --camera`.
     pub camera: CameraFile,
 }
 
@@ -30,7 +30,7 @@ pub struct Frame {
 pub struct Frames {
     /// Version of the layout.
     pub schema_version: u32,
-    /// True if photos were taken through lenses, so that their masks are no pictures of a pinhole camera.
+    /// Whether photos were taken through lenses, so that their masks do not match a pinhole camera.
     #[serde(default)]
     pub lenses: bool,
     /// The frames.
@@ -38,13 +38,13 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Makes a video of these frames.
+    /// Creates a video of these frames.
     pub fn new(frames: Vec<Frame>, lenses: bool) -> Self {
         Self { schema_version: SCHEMA_VERSION, lenses, frames }
     }
 
-    /// Reads the file. Another version, a photo with two frames or beyond its frame, and a video without
-    /// photos are errors.
+    /// Reads the file. Another version, a photo with two frames or larger than its frame, and a video without photos
+    /// are errors.
     pub fn read(path: &Path) -> Result<Self> {
         let expected = r#"expected {"schema_version": 1, "frames": [{"file", "photo", "camera"}]}"#;
         let video: Self = read::json(path, expected)?;
@@ -55,7 +55,7 @@ impl Frames {
             })
         };
         if let Some(frame) = video.frames.iter().find(|frame| !inside(frame)) {
-            return Err(Error::data(path, format!("frame {}", frame.file), "has a `size` beyond that of its camera"));
+            return Err(Error::data(path, format!("frame {}", frame.file), "has a `size` larger than its camera"));
         }
         let mut seen = BTreeSet::new();
         for name in video.frames.iter().filter_map(|frame| frame.photo.as_deref()) {
@@ -69,7 +69,7 @@ impl Frames {
         Ok(video)
     }
 
-    /// Writes the file, atomically.
+    /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<()> {
         atomic::write_json(path, self)
     }

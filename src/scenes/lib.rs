@@ -1,11 +1,13 @@
 //! Scenes: posed photos with masks, as reconstructions and data sets store them.
 //!
-//! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses, a `recipe` says how a
-//! photo becomes a view ([`lens`], [`window`], size), and the photos that memory cannot hold stay in files
-//! (`photo_store`). [`capture`] looks for faults of photos and poses, [`initial_gaussians`] makes the first Gaussians.
+//! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses. A `photo_recipe`
+//! defines how a photo becomes a view ([`lens`], [`window`], size). Photos that do not fit into memory stay in files
+//! (`photo_store`). [`capture`] finds problems of photos and poses, and [`initial_gaussians`] creates the first
+//! Gaussians.
 //!
 //! To add a reader, add a file beside `llff` that returns a `Listing`, and a case in `list`.
 
+pub mod array_store;
 mod bad_photos;
 pub mod camera_json;
 pub mod camera_path;
@@ -26,16 +28,15 @@ mod mask_notes;
 pub mod matte;
 mod metashape;
 mod missing;
+mod outlier_poses;
 mod photo_finder;
+mod photo_recipe;
 mod photo_store;
 pub mod points;
 mod pose_convention;
 mod read_options;
-mod recipe;
 pub mod resample;
-pub mod shelf;
 mod split;
-mod stray;
 mod transforms;
 pub mod truth;
 pub mod window;
@@ -57,46 +58,46 @@ pub use lookup::Lookup;
 pub use pose_convention::PoseConvention;
 pub use read_options::ReadOptions;
 
-/// The options for reading a scene.
+/// Options for reading a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
-    /// Folder of id masks; without it no masks are read.
+    /// Folder of id masks; `None` reads no masks.
     pub masks: Option<PathBuf>,
-    /// Folder of pictures named as masks, whose pixels above 0 leave the photo out: of the loss, of votes, of scores. A
-    /// photo without a picture counts as a whole.
+    /// Folder of ignore masks: pixels above 0 are excluded from the loss, from votes and from scores. A photo without
+    /// such a mask counts completely.
     pub ignore: Option<PathBuf>,
     /// Limit on the longest side of photos, px.
     pub max_resolution: Option<u32>,
-    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. Another N than `None` leaves
-    /// a scene its own split.
+    /// Every N-th view by name is held out, starting with the first; `None` holds out nothing. A scene's own split
+    /// takes precedence unless this is `None`.
     pub test_every: Option<u32>,
     /// Colour behind transparent photos, R, G, B, 0 to 1.
     pub background: [f32; 3],
-    /// Keeps the opacity of transparent photos that are not held out, over black, instead.
+    /// Keeps the opacity of transparent training photos, over black, instead.
     pub keep_opacity: bool,
-    /// The photos show the objects of the masks alone: see [`matte`]. Those without an object are left out.
+    /// Isolates the objects of the masks in photos: see [`matte`]. Photos without an object are omitted.
     pub masked_only: bool,
-    /// Cuts such photos to their objects, unless they are held out.
+    /// Crops training photos to their objects.
     pub cut: bool,
     /// Decodes the photos. Their sizes are read in any case.
     pub photos: bool,
     /// Largest share of undecodable photos, 0 to 1. They are skipped with a note.
     pub max_bad_photos: f32,
-    /// Where the scene's files are and how its poses are meant, where the scene itself does not say it right.
+    /// Where the scene's files are and how its poses are meant, if the scene itself is wrong about it.
     pub lookup: Lookup,
-    /// Turns photos into pinhole views. Without it a view has the pixels of the photo as stored, whatever its lens, and a
-    /// camera that is right for pinholes only.
+    /// Undistorts photos to pinhole views. Without it, a view has the pixels of the stored photo, whatever its lens,
+    /// and its camera is only correct for pinholes.
     pub undistort: bool,
-    /// Most bytes of memory for photos and masks. In a larger scene some of them wait in a temporary file until they are
-    /// asked for, with the same bits.
+    /// Most bytes of memory for photos and masks. In a larger scene, some of them are kept in a temporary file, with
+    /// the same bits.
     pub photo_memory: u64,
-    /// Names of the views to read, of those that are in the scene; `None` reads all. The split is that of all views.
+    /// Names of the views to read among the scene's; `None` reads all. The split is computed over all views.
     pub only: Option<Arc<BTreeSet<String>>>,
-    /// Folder for that file; with `None` there is no file, and such photos are decoded again each time.
+    /// Folder of the temporary file; with `None` there is no file, and such photos are decoded again each time.
     pub photo_folder: Option<PathBuf>,
 }
 
-/// Default for the memory of photos and masks, bytes.
+/// Default memory for photos and masks, bytes.
 pub const PHOTO_MEMORY: u64 = 3 << 29;
 
 /// Default for the largest share of undecodable photos.
@@ -125,24 +126,25 @@ impl Default for LoadOptions {
 }
 
 /// Reads the scene in the folder `scene`: a COLMAP model (in `sparse/0`, `sparse`, `colmap/sparse/0` or the folder
-/// itself), else `transforms_train.json` with `transforms_test.json` or `transforms_val.json`, else `transforms.json`, else `poses_bounds.npy` of
-/// LLFF, else an `.xml` of Metashape. A path to one of the last three reads that file.
+/// itself), otherwise `transforms_train.json` with `transforms_test.json` or `transforms_val.json`, otherwise
+/// `transforms.json`, otherwise LLFF's `poses_bounds.npy`, otherwise a Metashape `.xml`. A path to one of the last
+/// three reads that file.
 ///
-/// Views are undistorted and resized, each with a pinhole camera of its own size; see [`LoadOptions`] and the notes of
-/// the result. Pixels outside of the photo get alpha 0 and id 0. A polynomial keeps focal lengths and principal point,
-/// other lenses keep the scale of the middle of the photo; one of 110 degrees and more becomes faces of a cube, each a
-/// view with the face in its name (`00.left.jpg`), all of them held out or none.
-/// Photos without a file are skipped before the split, undecodable ones after it.
+/// Views are undistorted and resized, each with its own pinhole camera; see [`LoadOptions`] and the notes of the
+/// result. Pixels outside the photo get alpha 0 and id 0. A polynomial lens keeps its focal lengths and principal
+/// point; other lenses keep the scale at the centre of the photo. A lens of 110 degrees or more becomes cube faces,
+/// each a view with the face in its name (`00.left.jpg`); the faces of a photo are held out together. Photos without a
+/// file are skipped before the split, undecodable ones after it.
 pub fn open(scene: &Path, options: &LoadOptions) -> Result<Dataset> {
     if options.max_resolution == Some(0) {
         return Err(Error::usage(Setting("max_resolution"), "0 px leaves no image; expected 1 or more"));
     }
     if !(0.0..=1.0).contains(&options.max_bad_photos) {
-        let problem = format!("{} is no share; expected a number from 0 to 1", options.max_bad_photos);
+        let problem = format!("{} is not a share; expected a number from 0 to 1", options.max_bad_photos);
         return Err(Error::usage(Setting("max_bad_photos"), problem));
     }
     if options.masked_only && options.photos && options.masks.is_none() {
-        let problem = format!("needs the masks of the objects: name their folder in {}", Setting("masks"));
+        let problem = format!("needs the masks of the objects: set {} to their folder", Setting("masks"));
         return Err(Error::usage(Setting("masked_only"), problem));
     }
     let stage = Stage::new("reading poses and points", 0);

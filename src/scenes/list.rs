@@ -1,10 +1,10 @@
-//! The list of a scene's photos, whatever its kind.
+//! Lists a scene's photos, whatever its format.
 
-use super::listed_path::Place;
+use super::listed_path::SceneFolder;
 use super::listing::Listing;
 use super::lookup::Lookup;
 use super::photo_finder::count_photos;
-use super::split::Split;
+use super::split::SceneSplit;
 use super::{colmap, llff, metashape, transforms};
 use labelgs_files::content::{self, Content};
 use labelgs_files::names::shortened;
@@ -13,7 +13,7 @@ use labelgs_scene::{Error, Result, SceneProblem, Setting};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// One of this many photos of a folder may have no pose without a note: programs that find poses drop some.
+/// If at most one of this many photos in a folder has no pose, there is no note: programs that find poses drop some.
 const UNPOSED_ONE_OF: usize = 10;
 
 /// Returns the folder of a scene, given the folder or one file in it.
@@ -31,17 +31,17 @@ pub(super) fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
     {
         return Err(Error::usage(
             Setting("images"),
-            format!("{} is no folder; expected the folder of the photos", images.display()),
+            format!("{} is not a folder; expected the folder of the photos", images.display()),
         ));
     }
-    let place = Place::new(folder_of(scene), lookup);
+    let place = SceneFolder::new(folder_of(scene), lookup);
     let mut listing = if scene.is_file() { list_file(&place, scene)? } else { list_folder(&place, scene)? };
     listing.notes.extend(place.photos.note());
     if listing.is_incomplete() {
         listing.hint = place.photos.hint() + &listing.hint;
     }
     if listing.views.iter().all(|view| view.test.is_none())
-        && let Some(split) = Split::find(&place, &listing.source)?
+        && let Some(split) = SceneSplit::find(&place, &listing.source)?
     {
         split.apply(&mut listing);
     }
@@ -50,7 +50,7 @@ pub(super) fn list(scene: &Path, lookup: &Lookup) -> Result<Listing> {
     Ok(listing)
 }
 
-fn list_file(place: &Place, scene: &Path) -> Result<Listing> {
+fn list_file(place: &SceneFolder, scene: &Path) -> Result<Listing> {
     let extension = scene.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("npy") => llff::list_file(place, scene),
@@ -62,7 +62,7 @@ fn list_file(place: &Place, scene: &Path) -> Result<Listing> {
     }
 }
 
-fn list_folder(place: &Place, scene: &Path) -> Result<Listing> {
+fn list_folder(place: &SceneFolder, scene: &Path) -> Result<Listing> {
     if !scene.is_dir() {
         return Err(Error::data(scene, "", "there is no such folder; expected the folder of a scene"));
     }
@@ -100,8 +100,8 @@ fn list_folder(place: &Place, scene: &Path) -> Result<Listing> {
     Err(Error::data(scene, "", problem))
 }
 
-/// Returns the other lists of poses in the folder of a scene, which lose to that of reader `at`, with the numbers of their
-/// photos.
+/// Returns the other pose files in the folder of a scene, which reader `at` takes precedence over, with their numbers
+/// of photos.
 fn others(scene: &Path, at: usize) -> Vec<(PathBuf, Option<usize>)> {
     type Count = fn(&Path) -> Option<usize>;
     let lists: [(usize, &str, Count); 3] = [
@@ -114,8 +114,8 @@ fn others(scene: &Path, at: usize) -> Vec<(PathBuf, Option<usize>)> {
     files.map(|(path, count)| (path.clone(), count(&path))).collect()
 }
 
-/// Notes the other lists in the folder of a scene. Data sets bring their poses in several forms: only a list of other
-/// photos is worth a line.
+/// Notes the other pose files in the folder of a scene. Data sets store their poses in several formats, so only a file
+/// with other photos is worth a note.
 fn name_others(scene: &Path, at: usize, listing: &mut Listing) {
     let used = listing.views.len() + listing.missing.len() + listing.bad.len();
     for (path, count) in others(scene, at) {
@@ -124,15 +124,15 @@ fn name_others(scene: &Path, at: usize, listing: &mut Listing) {
             let (source, path) = (listing.source.display(), path.display());
             let photos = count.map_or(String::new(), |count| format!(" with {}", counted(count, "photo")));
             listing.notes.push(format!(
-                "poses of {} come from {source}; {path}{photos} lies there too: name it as the scene to use that",
+                "poses of {} come from {source}; {path}{photos} also exists: name it as the scene to use it instead",
                 counted(used, "photo")
             ));
-            listing.hint += &format!("; or name {path} as the scene, which lies there too");
+            listing.hint += &format!("; or name {path} as the scene, which also exists");
         }
     }
 }
 
-/// Says how many photos that lie beside those of the listing have no pose, if they are many.
+/// Describes how many photos in the listing's folders have no pose, if they are many.
 fn without_pose(listing: &Listing) -> Option<String> {
     let photos: BTreeSet<&Path> = listing.views.iter().filter_map(|view| view.photo.as_deref()).collect();
     let folders: BTreeSet<&Path> = photos.iter().filter_map(|photo| photo.parent()).collect();
@@ -149,7 +149,7 @@ fn without_pose(listing: &Listing) -> Option<String> {
     })
 }
 
-/// Says of a file that is no list of photos what it is and what to do.
+/// Describes a file that does not list photos, and what to do.
 fn no_scene(content: Content) -> String {
     let Content { what, .. } = content;
     if what.starts_with("a video") {

@@ -1,7 +1,7 @@
-//! Paths of photos and points as a scene lists them.
+//! Paths of photos and points as listed in a scene.
 //!
-//! A scene is untrusted input. Its paths are opened for reading and, as names of views, used for writing. A path
-//! outside of the scene's folder is refused, unless the user allows it.
+//! A scene is untrusted input. Its paths are opened for reading, and used for writing as the names of views. A path
+//! outside the scene's folder is refused unless the user allows it.
 
 use super::lookup::Lookup;
 use super::photo_finder::PhotoFinder;
@@ -9,22 +9,22 @@ use labelgs_scene::{Error, Result, Setting};
 use std::path::{Component, Path, PathBuf};
 
 /// The folder of a scene, and how its files are found.
-pub struct Place<'a> {
+pub struct SceneFolder<'a> {
     pub root: &'a Path,
     lookup: &'a Lookup,
     pub photos: PhotoFinder,
 }
 
-/// A file in the list of a scene.
+/// A file listed in a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ListedPath {
-    /// Path below the folder of the scene. It is absolute or has `..` only if that is allowed.
+    /// Path below the scene's folder. It is absolute or contains `..` only if that is allowed.
     pub path: PathBuf,
-    /// The same path as a name: separated by `/`, relative and without `..`, so that it is safe below any folder.
+    /// The path as a name: separated by `/`, relative and without `..`, so that it is safe below any folder.
     pub name: String,
 }
 
-impl<'a> Place<'a> {
+impl<'a> SceneFolder<'a> {
     pub fn new(root: &'a Path, lookup: &'a Lookup) -> Self {
         Self { root, lookup, photos: PhotoFinder::new(root, lookup.images_of(root)) }
     }
@@ -39,7 +39,7 @@ impl<'a> Place<'a> {
         }
         let name = name_of(&path);
         if name.is_empty() || text.contains('\0') {
-            return refuse("is no path of a file; list photos by paths relative to the scene folder");
+            return refuse("is not a file path; list photos by paths relative to the scene folder");
         }
         let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         if !self.lookup.allow_outside && (!inside || has_drive(&text)) {
@@ -66,7 +66,7 @@ fn name_of(path: &Path) -> String {
     parts.join("/")
 }
 
-/// Returns true for paths such as `C:/photo.png`, which are absolute on Windows only.
+/// Returns true for paths such as `C:/photo.png`, which are absolute only on Windows.
 fn has_drive(text: &str) -> bool {
     matches!(text.as_bytes(), [letter, b':', b'/', ..] if letter.is_ascii_alphabetic())
 }

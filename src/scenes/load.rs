@@ -1,9 +1,9 @@
 //! Loads a data set from a listing: split, decode, undistort, resize, masks.
 
-use super::listing::{Listed, Listing};
+use super::listing::{ListedPhoto, Listing};
+use super::photo_recipe::{MadeView, MadeViews, PhotoRecipe};
 use super::photo_store::PhotoStore;
-use super::recipe::{MadeView, MadeViews, Recipe};
-use super::{LoadOptions, bad_photos, frame_check, init, mask_notes, missing, stray};
+use super::{LoadOptions, bad_photos, frame_check, init, mask_notes, missing, outlier_poses};
 use labelgs_files::error_list::all_or_one_error;
 use labelgs_files::names::shortened;
 use labelgs_files::photo_files::PhotoFiles;
@@ -21,14 +21,14 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     let mut notes = std::mem::take(&mut listing.notes);
     let mut faults = Vec::new();
     let mut views = missing::existing(&listing, options, &mut notes, &mut faults)?;
-    stray::remove(&mut views, &listing.points, options.max_bad_photos, &mut faults);
+    outlier_poses::remove(&mut views, &listing.points, options.max_bad_photos, &mut faults);
     views.sort_by(|a, b| a.name.cmp(&b.name));
     split(&mut views, options.test_every, &mut notes)?;
     if let Some(only) = &options.only {
-        // Photos of wide lenses have their views below their names.
+        // Views of wide photos have names derived from the photo's.
         views.retain(|view| only.contains(&view.name) || !view.lens.is_pinhole());
         if views.is_empty() {
-            return Err(Error::data(root, "photos", "none of the asked ones is in the scene"));
+            return Err(Error::data(root, "photos", "none of the requested ones is in the scene"));
         }
     }
     let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
@@ -38,12 +38,12 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     if let Some(ignore) = &ignore {
         note_missing(root, ignore, &names, "picture of what to ignore", &mut notes)?;
     }
-    let recipe = |view: &Listed| {
+    let recipe = |view: &ListedPhoto| {
         let of = |files: &Option<PhotoFiles>| files.as_ref()?.find(&view.name).map(Path::to_owned);
-        Arc::new(Recipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], options))
+        Arc::new(PhotoRecipe::new((view.clone(), listing.source.clone()), [of(&masks), of(&ignore)], options))
     };
-    let recipes: Vec<Arc<Recipe>> = views.iter().map(recipe).collect();
-    let Read { photos, resampled, blank } = read_views(&recipes, options);
+    let recipes: Vec<Arc<PhotoRecipe>> = views.iter().map(recipe).collect();
+    let LoadedViews { photos, resampled, blank } = read_views(&recipes, options);
     let mut undecodable = std::mem::take(&mut listing.bad);
     let total = views.len() + undecodable.len();
     let mut loaded = Vec::with_capacity(views.len());
@@ -73,18 +73,18 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
     let (train, test) = divided(loaded, options.only.as_deref());
     let Listing { source, native, points, .. } = listing;
     let mut dataset = Dataset { root: root.to_owned(), source, train, test, objects_only: false, points, notes, flaws };
-    // Some of the views say nothing about all masks.
+    // A subset of the views does not represent all masks.
     if let (Some(masks), None) = (&masks, &options.only) {
         dataset.notes.extend(mask_notes::notes(masks, &dataset));
     }
     require_unique(root, &dataset)?;
-    // Faces of wide photos are turned against them.
+    // Cube faces are rotated against their photos.
     let native = Some(native).filter(|_| !is_wide && options.lookup.poses.is_native());
     frame_check::check(&mut dataset, native, options.lookup.poses)?;
     if options.masked_only && options.photos { without_surroundings(dataset) } else { Ok(dataset) }
 }
 
-/// Takes the scene for one of objects alone, without the points that the masks show to be no part of them.
+/// Turns the scene into isolated objects and drops the points that masks show to be outside them.
 fn without_surroundings(mut dataset: Dataset) -> Result<Dataset> {
     let places: Vec<_> = dataset.points.iter().map(|point| point.position).collect();
     dataset.objects_only = true;
@@ -93,14 +93,12 @@ fn without_surroundings(mut dataset: Dataset) -> Result<Dataset> {
     dataset.points.retain(|_| inside.next() == Some(true));
     if dataset.points.len() < before {
         let left_out = counted(before - dataset.points.len(), "point");
-        dataset
-            .notes
-            .push(format!("{left_out} of {before} lie outside of the objects, by their masks, and are left out"));
+        dataset.notes.push(format!("{left_out} of {before} lie outside the objects, by their masks, and are omitted"));
     }
     Ok(dataset)
 }
 
-/// Divides the views into those to train on and those held out, each sorted by name.
+/// Divides the views into training and held-out ones, each sorted by name.
 fn divided(loaded: Vec<(Vec<View>, bool)>, only: Option<&BTreeSet<String>>) -> (Vec<View>, Vec<View>) {
     let (mut train, mut test) = (Vec::new(), Vec::new());
     for (views, is_test) in loaded {
@@ -108,23 +106,23 @@ fn divided(loaded: Vec<(Vec<View>, bool)>, only: Option<&BTreeSet<String>>) -> (
     }
     for views in [&mut train, &mut test] {
         views.retain(|view| only.is_none_or(|only| only.contains(&view.name)));
-        // Faces of a photo are not in the order of their names.
+        // Cube faces are not in the order of their names.
         views.sort_by(|a, b| a.name.cmp(&b.name));
     }
     (train, test)
 }
 
-/// Notes the photos of which there are several views; returns whether there are any.
+/// Notes the photos with several views, and returns whether there are any.
 fn note_wide(loaded: &[(Vec<View>, bool)], notes: &mut Vec<String>) -> bool {
     let wide: Vec<&Vec<View>> = loaded.iter().map(|(views, _)| views).filter(|views| views.len() > 1).collect();
     if !wide.is_empty() {
         let faces: usize = wide.iter().map(|views| views.len()).sum();
-        notes.push(format!("{} photos are wider than a pinhole picture and became {faces} faces of cubes", wide.len()));
+        notes.push(format!("{} photos are too wide for a pinhole view and became {faces} cube faces", wide.len()));
     }
     !wide.is_empty()
 }
 
-/// Notes the photos without a picture in the folder; refuses one without any.
+/// Notes the photos without a file in the folder; errors if none has one.
 fn note_missing(root: &Path, files: &PhotoFiles, photos: &[&str], what: &str, notes: &mut Vec<String>) -> Result<()> {
     let without: Vec<&str> = photos.iter().copied().filter(|name| files.find(name).is_none()).collect();
     if without.len() == photos.len() {
@@ -136,13 +134,13 @@ fn note_missing(root: &Path, files: &PhotoFiles, photos: &[&str], what: &str, no
     Ok(())
 }
 
-/// Notes the views without a pixel that counts; refuses a scene of nothing else.
+/// Notes the views without a valid pixel; errors if all views are blank.
 fn note_blank(root: &Path, blank: &[String], is_all: bool, notes: &mut Vec<String>) -> Result<()> {
     if blank.is_empty() {
         return Ok(());
     }
     let problem = format!(
-        "{} have no pixel that counts: all are ignored, outside of the lens, or without the mask of an object where objects \
+        "{} have no valid pixel: all are ignored, outside the lens, or without the mask of an object where objects \
          alone are trained",
         shortened(blank)
     );
@@ -153,18 +151,18 @@ fn note_blank(root: &Path, blank: &[String], is_all: bool, notes: &mut Vec<Strin
     Ok(())
 }
 
-/// What is read of all photos.
-struct Read {
-    /// Views of each. The outer error is that of an undecodable photo.
+/// The views of all photos.
+struct LoadedViews {
+    /// Views of each photo. The outer error is that of an undecodable photo.
     photos: Vec<Result<Result<Vec<View>>>>,
-    /// Number of masks with another size than their photos.
+    /// Number of masks whose size differs from their photos'.
     resampled: usize,
-    /// Names of the views without a valid pixel, which are left out: nothing can be learned or scored there.
+    /// Names of the views without a valid pixel. They are omitted, because nothing can be trained or scored there.
     blank: Vec<String>,
 }
 
-/// Makes the views of each photo.
-fn read_views(recipes: &[Arc<Recipe>], options: &LoadOptions) -> Read {
+/// Creates the views of each photo.
+fn read_views(recipes: &[Arc<PhotoRecipe>], options: &LoadOptions) -> LoadedViews {
     let stored: Vec<_> = recipes.par_iter().map(|recipe| recipe.stored()).collect();
     let store = PhotoStore::new(recipes, &stored, options);
     let read = |index: usize| {
@@ -191,15 +189,15 @@ fn read_views(recipes: &[Arc<Recipe>], options: &LoadOptions) -> Read {
         (Ok(_), None) => Err(Error::Bug("a photo of known size was not read".to_owned())),
     };
     let photos = stored.into_iter().zip(read).map(of_photo).collect();
-    Read { photos, resampled, blank }
+    LoadedViews { photos, resampled, blank }
 }
 
-/// Refuses a photo that is named as the face of another.
+/// Refuses a photo with the name of another photo's cube face.
 fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
     let all = dataset.all();
     match all.windows(2).find(|pair| pair[0].name == pair[1].name) {
         Some(pair) => {
-            let problem = "is the name of a photo and of a face of a wide photo; rename the photo";
+            let problem = "is the name of both a photo and a cube face of a wide photo; rename the photo";
             Err(Error::data(root, format!("view {}", pair[0].name), problem))
         }
         None => Ok(()),
@@ -207,7 +205,7 @@ fn require_unique(root: &Path, dataset: &Dataset) -> Result<()> {
 }
 
 /// Decides which of the views, sorted by name, are held out.
-fn split(views: &mut [Listed], every: Option<u32>, notes: &mut Vec<String>) -> Result<()> {
+fn split(views: &mut [ListedPhoto], every: Option<u32>, notes: &mut Vec<String>) -> Result<()> {
     let Some(every) = every else {
         views.iter_mut().for_each(|view| view.test = Some(false));
         return Ok(());
@@ -216,7 +214,7 @@ fn split(views: &mut [Listed], every: Option<u32>, notes: &mut Vec<String>) -> R
         return Ok(());
     }
     if every == 0 {
-        return Err(Error::usage(Setting("test_every"), "0 holds out nothing and everything; expected 1 or more"));
+        return Err(Error::usage(Setting("test_every"), "must be at least 1; omit it to hold out no views"));
     }
     let is_alone = views.len() == 1 && every > 1;
     if is_alone {

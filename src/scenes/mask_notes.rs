@@ -1,4 +1,4 @@
-//! What is odd about the masks of a scene as a whole, for a training.
+//! Notes problems of all masks of a scene that affect training.
 
 use labelgs_files::photo_files::PhotoFiles;
 use labelgs_masks::check::{held_out, no_object, one_area};
@@ -8,7 +8,7 @@ use labelgs_scene::{Dataset, LabelMap, Pixels};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Most masks whose edges are looked at.
+/// Most masks whose edges are examined.
 const SAMPLE_MAX: usize = 16;
 
 /// Returns notes on masks that mark no object, belong to no training photo, or have soft edges.
@@ -17,7 +17,7 @@ pub(super) fn notes(masks: &PhotoFiles, dataset: &Dataset) -> Vec<String> {
     found.map(|problem| format!("{}: {problem}", masks.folder.display())).collect()
 }
 
-/// Says why a training learns no object from the masks.
+/// Explains why training learns no object from the masks.
 fn unused(dataset: &Dataset) -> Option<String> {
     let masks: Vec<&Pixels<LabelMap>> = dataset.train.iter().filter_map(|view| view.mask.as_ref()).collect();
     if masks.is_empty() {
@@ -26,7 +26,7 @@ fn unused(dataset: &Dataset) -> Option<String> {
     let Some(id) = masks.iter().find_map(|mask| mask.objects().first().copied()) else {
         return Some(no_object(masks.len()));
     };
-    // The pixels are read for masks of one id only.
+    // Pixels are only read for masks with a single id.
     let is_whole = |mask: &&Pixels<LabelMap>| {
         mask.objects() == [id] && mask.get().is_ok_and(|mask| mask.ids.iter().all(|&found| found == id))
     };

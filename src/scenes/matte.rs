@@ -1,28 +1,29 @@
-//! Photos of objects alone: masks as opacity.
+//! Photos of isolated objects: masks as opacity.
 //!
-//! A mask says inside or outside, to a few pixels where a person drew it, and a photo mixes both at the edge. So the pixels
-//! within a band along a contour are compared with the mean colours of both sides next to them: their place between the two is
-//! the opacity, and what the surroundings add is taken off. Where both sides look alike, the distance from the contour is the
-//! opacity. A step compares the result over a colour of its own ([`Photo::over`]).
+//! A mask distinguishes inside and outside, within a few pixels if drawn by hand, and a photo mixes both at the edge.
+//! So the pixels within a band along a contour are compared with the mean colours next to them on both sides. Their
+//! position between the two colours is the opacity, and the contribution of the surroundings is removed. If both sides
+//! look alike, the distance from the contour determines the opacity. A training step compares the result over its own
+//! background colour ([`Photo::over`]).
 
 use labelgs_scene::view::{ALPHA_CLEAR, alpha_of};
 use labelgs_scene::{LabelMap, Photo};
 use rayon::prelude::*;
 
-/// Half the width of the band, as a share of the photo's longest side: contours that people draw are off by so much.
+/// Half the width of the band, as a share of the photo's longest side: hand-drawn contours are off by this much.
 const BAND_SHARE: f64 = 1.0 / 400.0;
-/// Reaches of the windows for the mean colours, in cells of a band's width: the first that has enough pixels counts.
-const REACHES: [usize; 3] = [2, 6, 20];
-/// Share of a window's pixels of a side that tell its colour.
-const TOLD_SHARE: f64 = 0.02;
-/// Distance of the two colours, 0 to 255 in each channel, from which they tell more of the opacity than the contour.
-const CONTRAST: f64 = 40.0;
+/// Radii of the windows for the mean colours, in cells of a band's width: the first with enough pixels is used.
+const WINDOW_RADII: [usize; 3] = [2, 6, 20];
+/// Smallest share of a window's pixels that must be on a side for its colour to be used.
+const SIDE_SHARE_MIN: f64 = 0.02;
+/// Colour distance, 0 to 255 per channel, above which colours determine the opacity more than the contour.
+const CONTRAST_MIN: f64 = 40.0;
 
-/// Leaves nothing of the photo but the objects of a mask, of any scale. Pixels without weight stay so.
+/// Removes everything from the photo except the objects of a mask, of any scale. Invalid pixels stay invalid.
 pub fn cut_out(photo: &mut Photo, mask: &LabelMap) {
     let (width, height) = (photo.width as usize, photo.height as usize);
     let band = ((f64::from(photo.width.max(photo.height)) * BAND_SHARE).round() as usize).max(1);
-    let inside = of_photo(photo, mask);
+    let inside = scaled_mask(photo, mask);
     let near = inside.near_contour(band as u32);
     let colours = Colours::new(photo, &inside, &near, 2 * band);
     let soft = |x: usize, y: usize| {
@@ -38,8 +39,8 @@ pub fn cut_out(photo: &mut Photo, mask: &LabelMap) {
         .filter(|&at| near[at])
         .map(|at| {
             let (texel, (x, y)) = (photo.rgba[at], (at % width, at / width));
-            // Transparent photos tell their own edges.
-            if texel[3] < u8::MAX { texel } else { edge(texel, soft(x, y), colours.around(x, y)) }
+            // Transparent photos have their own edges.
+            if texel[3] < u8::MAX { texel } else { edge(texel, soft(x, y), colours.mean_colours(x, y)) }
         })
         .collect();
     let mut edges = edges.into_iter();
@@ -55,8 +56,8 @@ pub fn cut_out(photo: &mut Photo, mask: &LabelMap) {
     }
 }
 
-/// Returns a pixel of the band over black, with its opacity. `soft` is that by the contour alone; colours are those of the
-/// surroundings and of the object nearby.
+/// Returns a pixel of the band over black, with its opacity. `soft` is the opacity by the contour alone; the colours
+/// are those of the nearby surroundings and object.
 fn edge([r, g, b, _]: [u8; 4], soft: f64, [surroundings, object]: [Option<[f64; 3]>; 2]) -> [u8; 4] {
     let colour = [r, g, b].map(f64::from);
     let Some(behind) = surroundings else { return [r, g, b, u8::MAX] };
@@ -68,7 +69,7 @@ fn edge([r, g, b, _]: [u8; 4], soft: f64, [surroundings, object]: [Option<[f64; 
                 along += (colour[channel] - behind[channel]) * way;
                 square += way * way;
             }
-            let trust = square / (square + 3.0 * CONTRAST * CONTRAST);
+            let trust = square / (square + 3.0 * CONTRAST_MIN * CONTRAST_MIN);
             let told = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { soft };
             soft + trust * (told - soft)
         }
@@ -81,8 +82,8 @@ fn edge([r, g, b, _]: [u8; 4], soft: f64, [surroundings, object]: [Option<[f64; 
     [of_object(0), of_object(1), of_object(2), alpha_of(opacity)]
 }
 
-/// Returns the mask at the size of the photo: 1 where it shows an object.
-fn of_photo(photo: &Photo, mask: &LabelMap) -> LabelMap {
+/// Returns the mask at the size of the photo: 1 for objects.
+fn scaled_mask(photo: &Photo, mask: &LabelMap) -> LabelMap {
     let mut map = if (mask.width, mask.height) == (photo.width, photo.height) {
         mask.clone()
     } else {
@@ -92,21 +93,21 @@ fn of_photo(photo: &Photo, mask: &LabelMap) -> LabelMap {
     map
 }
 
-/// Sums of red, green, blue and number of pixels on both sides of the contours, outside and inside, without the band.
-type Sums = [[u32; 4]; 2];
+/// Sums of red, green, blue and number of pixels on both sides of the contours, outside and inside, excluding the band.
+type SideSums = [[u32; 4]; 2];
 
-/// Mean colours on both sides of the contours, by squares of a photo.
+/// Mean colours on both sides of the contours, in cells of a photo.
 struct Colours {
     side: usize,
     columns: usize,
-    cells: Vec<Sums>,
+    cells: Vec<SideSums>,
 }
 
 impl Colours {
     fn new(photo: &Photo, inside: &LabelMap, near: &[bool], side: usize) -> Self {
         let (width, height) = (photo.width as usize, photo.height as usize);
         let columns = width.div_ceil(side);
-        let mut cells = vec![Sums::default(); columns * height.div_ceil(side)];
+        let mut cells = vec![SideSums::default(); columns * height.div_ceil(side)];
         for y in 0..height {
             let row = y * width..(y + 1) * width;
             let texels = photo.rgba[row.clone()].chunks(side).zip(inside.ids[row.clone()].chunks(side));
@@ -126,11 +127,12 @@ impl Colours {
         Self { side, columns, cells }
     }
 
-    /// Returns the mean colours of the surroundings and of the object near a pixel; `None` without a pixel of them far around.
-    fn around(&self, x: usize, y: usize) -> [Option<[f64; 3]>; 2] {
+    /// Returns the mean colours of the surroundings and of the object near a pixel; `None` if there are too few pixels
+    /// far around.
+    fn mean_colours(&self, x: usize, y: usize) -> [Option<[f64; 3]>; 2] {
         let (x, y, rows) = (x / self.side, y / self.side, self.cells.len() / self.columns);
         [0, 1].map(|side| {
-            REACHES.into_iter().find_map(|reach| {
+            WINDOW_RADII.into_iter().find_map(|reach| {
                 let columns = x.saturating_sub(reach)..(x + reach + 1).min(self.columns);
                 let mut sums = [0_u32; 4];
                 let mut count = 0;
@@ -142,7 +144,7 @@ impl Colours {
                 }
                 let [r, g, b, told] = sums.map(f64::from);
                 let area = (count * self.side * self.side) as f64;
-                (told > 0.0 && told >= TOLD_SHARE * area).then(|| [r, g, b].map(|sum| sum / told))
+                (told > 0.0 && told >= SIDE_SHARE_MIN * area).then(|| [r, g, b].map(|sum| sum / told))
             })
         })
     }

@@ -1,13 +1,15 @@
-//! Cameras of Agisoft Metashape, as "Export Cameras" writes them: XML with sensors, components and cameras.
+//! Agisoft Metashape cameras, as written by "Export Cameras": XML with sensors, components and cameras.
 //!
-//! A camera's `transform` is camera-to-component with axes x right, y down, z forward; that of its component, or of the
-//! chunk, goes on to the world. Lenses follow appendix D of Metashape's manual, where the focal length is in px, the
-//! principal point relative to the middle of the photo, and p1 and p2 the other way round than in OpenCV. In a rig, slaves
-//! have no transform but that of their sensor in the master's frame.
+//! A camera's `transform` is camera-to-component with axes x right, y down, z forward; the transform of its component,
+//! or of the chunk, leads to the world. Lenses follow appendix D of Metashape's manual: the focal length is in px, the
+//! principal point is relative to the photo's centre, and p1 and p2 are swapped relative to OpenCV. In a rig, slaves
+//! have only the transform of their sensor in the master's frame.
 
 use super::lens::{Fisheye, Lens, Polynomial};
-use super::listed_path::Place;
-use super::listing::{Listed, Listing, check_camera, invert_pose, require_some, rotation_of, side, with_extension};
+use super::listed_path::SceneFolder;
+use super::listing::{
+    ListedPhoto, Listing, check_camera, invert_pose, require_some, rotation_of, side, with_extension,
+};
 use super::pose_convention::Native;
 use glam::{DAffine3, DMat3, DVec3};
 use labelgs_files::read;
@@ -17,13 +19,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::path::Path;
 
-/// Most elements and texts of a file; a photo takes a dozen.
+/// Most elements and texts of a file; a photo has a dozen.
 const NODES_MAX: u32 = 1 << 24;
-/// Most elements in each other. The parser calls itself for each of them, and Metashape has seven.
+/// Deepest nesting of elements. The parser recurses for each level; Metashape uses seven.
 const DEPTH_MAX: usize = 64;
 
-/// Reads the scene, if its folder has one XML file of Metashape.
-pub fn list(scene: &Place) -> Result<Option<Listing>> {
+/// Reads the scene if its folder contains one Metashape XML file.
+pub fn list(scene: &SceneFolder) -> Result<Option<Listing>> {
     let is_xml = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("xml"));
     let mut found: Vec<_> = read::folder(scene.root)?.into_iter().filter(is_xml).collect();
     found.sort();
@@ -31,23 +33,23 @@ pub fn list(scene: &Place) -> Result<Option<Listing>> {
         [] => Ok(None),
         [path] => list_file(scene, path).map(Some),
         [first, second, ..] => {
-            let problem = format!("lies beside {}; name the one with the cameras as the scene", second.display());
+            let problem = format!("is not the only such file, see {}; name the one with the cameras", second.display());
             Err(Error::data(first, "", problem))
         }
     }
 }
 
-pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+pub fn list_file(scene: &SceneFolder, path: &Path) -> Result<Listing> {
     let text = read::text(path)?;
     if let Some(line) = too_deep(&text) {
-        let problem = format!("elements are nested deeper than {DEPTH_MAX}; expected cameras of Metashape in XML");
+        let problem = format!("elements are nested deeper than {DEPTH_MAX}; expected Metashape cameras in XML");
         return Err(Error::data(path, format!("line {line}"), problem));
     }
     let options = ParsingOptions { nodes_limit: NODES_MAX, ..ParsingOptions::default() };
     let document = Document::parse_with_options(&text, options).map_err(|error| {
-        Error::data(path, format!("line {}", error.pos().row), format!("{error}; expected cameras of Metashape in XML"))
+        Error::data(path, format!("line {}", error.pos().row), format!("{error}; expected Metashape cameras in XML"))
     })?;
-    let file = File { path, document: &document };
+    let file = XmlFile { path, document: &document };
     let mut chunks = document.root_element().descendants().filter(|node| node.has_tag_name("chunk"));
     let Some(chunk) = chunks.next() else {
         return Err(Error::data(path, "", "has no `chunk`; expected the XML of Metashape's \"Export Cameras\""));
@@ -64,11 +66,11 @@ pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
     let Reader { mut listing, counts, .. } = reader;
     require_some(listing.views.len(), &mut listing.bad)?;
     let counts = [
-        (counts.disabled, "disabled in Metashape and left out"),
-        (counts.lost, "without a pose and left out: not aligned, or exported without it"),
+        (counts.disabled, "disabled in Metashape and omitted"),
+        (counts.lost, "without a pose and omitted: not aligned, or exported without it"),
         (
             counts.slaves,
-            "posed as slaves of a rig: by the master's pose, then rotation and location of the sensor. If they are \
+            "posed as slaves of a rig: by the master's pose, then the sensor's rotation and location. If they are \
              displaced, export the cameras without the rig",
         ),
     ];
@@ -86,9 +88,9 @@ struct Counts {
     slaves: usize,
 }
 
-/// The cameras of a chunk while they are read.
+/// The cameras of a chunk while they are being read.
 struct Reader<'a> {
-    scene: &'a Place<'a>,
+    scene: &'a SceneFolder<'a>,
     chunk: &'a Chunk<'a>,
     listing: Listing,
     names: BTreeSet<String>,
@@ -96,7 +98,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Adds a camera to the listing. One that cannot be used is a photo less.
+    /// Adds a camera to the listing. One that cannot be used only costs its photo.
     fn read(&mut self, camera: Node<'a, 'a>) -> Result<()> {
         if matches!(camera.attribute("enabled"), Some("0" | "false")) {
             self.counts.disabled += 1;
@@ -123,15 +125,15 @@ impl<'a> Reader<'a> {
         let photo = self.scene.photos.find(&["images", "."], &resolved.path);
         let name = with_extension(resolved.name, photo.as_deref());
         if !self.names.insert(name.clone()) {
-            return Err(self.chunk.refusal(camera, "another camera has this label too; rename one of the photos"));
+            return Err(self.chunk.refusal(camera, "another camera has the same label; rename one of the photos"));
         }
-        self.listing.views.push(Listed { name, photo, camera: own, lens, test: None });
+        self.listing.views.push(ListedPhoto { name, photo, camera: own, lens, test: None });
         Ok(())
     }
 }
 
-/// Returns the line in which elements are nested deeper than [`DEPTH_MAX`]. Markup that is not well formed may count more;
-/// the parser refuses it.
+/// Returns the line at which elements are nested deeper than [`DEPTH_MAX`]. Malformed markup may count more, but the
+/// parser refuses it.
 fn too_deep(text: &str) -> Option<usize> {
     let (mut rest, mut depth) = (text, 0_usize);
     while let Some(at) = rest.find('<') {
@@ -143,7 +145,7 @@ fn too_deep(text: &str) -> Option<usize> {
         } else if rest.starts_with('/') {
             depth = depth.saturating_sub(1);
         } else {
-            // The end of the tag, outside of quotes.
+            // The end of the tag, outside quotes.
             let mut quote = None;
             let end = rest.bytes().position(|byte| match (byte, quote) {
                 (b'"' | b'\'', None) => {
@@ -175,15 +177,15 @@ fn child_with_text<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     child(node, name).filter(|node| node.text().is_some_and(|text| !text.trim().is_empty()))
 }
 
-/// Finds all elements of a name below a node, by their ids.
+/// Finds all elements with a name below a node, by their ids.
 fn by_id<'a>(chunk: Node<'a, 'a>, name: &str) -> BTreeMap<&'a str, Node<'a, 'a>> {
     let nodes = chunk.descendants().filter(|node| node.has_tag_name(name));
     nodes.filter_map(|node| Some((node.attribute("id")?, node))).collect()
 }
 
-/// A chunk: what its cameras refer to by id.
+/// A chunk: everything that its cameras refer to by id.
 struct Chunk<'a> {
-    file: &'a File<'a>,
+    file: &'a XmlFile<'a>,
     node: Node<'a, 'a>,
     sensors: BTreeMap<&'a str, Node<'a, 'a>>,
     components: BTreeMap<&'a str, Node<'a, 'a>>,
@@ -194,12 +196,12 @@ struct Chunk<'a> {
 /// The pose of a camera in the world, with axes x right, y down, z forward.
 struct Pose {
     to_world: DAffine3,
-    /// It follows from another camera of the rig.
+    /// Whether the pose is derived from another camera of the rig.
     is_slave: bool,
 }
 
 impl<'a> Chunk<'a> {
-    fn new(file: &'a File<'a>, node: Node<'a, 'a>) -> Result<Self> {
+    fn new(file: &'a XmlFile<'a>, node: Node<'a, 'a>) -> Result<Self> {
         let [sensors, components, cameras] = ["sensor", "component", "camera"].map(|name| by_id(node, name));
         Ok(Self { file, node, sensors, components, cameras, to_world: file.similarity(node)? })
     }
@@ -212,8 +214,8 @@ impl<'a> Chunk<'a> {
         Error::data(self.file.path, self.place(camera), problem)
     }
 
-    /// Returns the pose of a camera; `None` if it is not aligned. A slave of a rig without a pose of its own has that of its
-    /// sensor in the master's frame.
+    /// Returns the pose of a camera; `None` if it is not aligned. A rig slave without its own pose gets its sensor's in
+    /// the master's frame.
     fn pose(&self, camera: Node<'a, 'a>) -> Result<Option<Pose>> {
         if let Some(transform) = child(camera, "transform") {
             let to_world = self.to_world(camera)? * self.file.matrix(transform)?;
@@ -225,17 +227,17 @@ impl<'a> Chunk<'a> {
         };
         let of_master = self.to_world(master)? * self.file.matrix(transform)?;
         let in_master = self.file.mounting(self.sensor(camera)?)?.ok_or_else(|| {
-            let problem = "is a slave of a rig, and its sensor has no `rotation` and `location`; export the cameras without \
-                           the rig";
+            let problem = "is a slave of a rig, but its sensor has no `rotation` and `location`; export the cameras \
+                           without the rig";
             self.refusal(camera, problem)
         })?;
         Ok(Some(Pose { to_world: of_master * in_master, is_slave: true }))
     }
 
-    /// Returns the camera at its pose, and its lens.
+    /// Returns the posed camera and its lens.
     fn view(&self, camera: Node<'a, 'a>, to_world: DAffine3) -> Result<(Camera, Lens)> {
         let (intrinsics, lens) = self.file.sensor(self.sensor(camera)?)?;
-        let problem = "the transform is no rotation with a scale; export the cameras again";
+        let problem = "the transform is not a rotation with a scale; export the cameras again";
         let rotation = rotation_of(to_world.matrix3).ok_or_else(|| self.refusal(camera, problem))?;
         let (rotation, translation) = invert_pose(rotation, to_world.translation);
         let own = Camera { rotation, translation, ..intrinsics };
@@ -248,7 +250,7 @@ impl<'a> Chunk<'a> {
         sensor.ok_or_else(|| self.refusal(camera, "names no sensor of the chunk; export the cameras again"))
     }
 
-    /// Returns the transform of a camera's component, which takes the place of the chunk's. A file may have no components.
+    /// Returns the transform of a camera's component, which overrides the chunk's. A file may have no components.
     fn to_world(&self, camera: Node) -> Result<DAffine3> {
         let own = match camera.attribute("component_id") {
             Some(id) if !self.components.is_empty() => match self.components.get(id) {
@@ -262,12 +264,12 @@ impl<'a> Chunk<'a> {
 }
 
 /// A parsed file, for messages.
-struct File<'a> {
+struct XmlFile<'a> {
     path: &'a Path,
     document: &'a Document<'a>,
 }
 
-impl<'a> File<'a> {
+impl<'a> XmlFile<'a> {
     fn line(&self, node: Node) -> String {
         format!("line {}", self.document.text_pos_at(node.range().start).row)
     }
@@ -282,16 +284,16 @@ impl<'a> File<'a> {
             words.iter().map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect();
         match numbers.and_then(|numbers| numbers.try_into().ok()) {
             Some(numbers) => Ok(numbers),
-            None => self.refuse(node, format!("`{}` holds no {N} finite numbers", node.tag_name().name())),
+            None => self.refuse(node, format!("`{}` does not hold {N} finite numbers", node.tag_name().name())),
         }
     }
 
-    /// Reads the number in a child; 0 if there is none.
+    /// Reads the number in a child; 0 if it is missing.
     fn number(&self, node: Node<'a, 'a>, name: &str) -> Result<f64> {
         child(node, name).map_or(Ok(0.0), |child| self.numbers::<1>(child).map(|[value]| value))
     }
 
-    /// Reads a 4 x 4 matrix, row by row.
+    /// Reads a 4 x 4 matrix, row-major.
     fn matrix(&self, node: Node) -> Result<DAffine3> {
         let m: [f64; 16] = self.numbers(node)?;
         let column = |index: usize| DVec3::new(m[index], m[4 + index], m[8 + index]);
@@ -299,7 +301,7 @@ impl<'a> File<'a> {
         Ok(DAffine3 { matrix3, translation: column(3) })
     }
 
-    /// Reads the `transform` of a chunk or a component: rotation, row by row, translation and scale.
+    /// Reads the `transform` of a chunk or a component: rotation (row-major), translation and scale.
     fn similarity(&self, node: Node<'a, 'a>) -> Result<Option<DAffine3>> {
         let Some(transform) = child(node, "transform") else { return Ok(None) };
         let motion = self.motion(transform, "translation")?;
@@ -307,14 +309,14 @@ impl<'a> File<'a> {
         Ok(Some(DAffine3 { matrix3: motion.matrix3 * scale[0], ..motion }))
     }
 
-    /// Reads how a sensor is mounted in a rig: from its axes to those of the master, with its centre there, in units of the
-    /// chunk. `None` if the sensor does not say.
+    /// Reads how a sensor is mounted in a rig: the transform from its axes to the master's, with its centre in chunk
+    /// units. `None` if the sensor does not specify it.
     fn mounting(&self, sensor: Node<'a, 'a>) -> Result<Option<DAffine3>> {
         let says = ["rotation", "location"].into_iter().any(|name| child_with_text(sensor, name).is_some());
         says.then(|| self.motion(sensor, "location")).transpose()
     }
 
-    /// Reads the child `rotation`, row by row, and the child with the place; none turns or moves nothing.
+    /// Reads the child `rotation`, row-major, and the child called `place`; missing ones are the identity.
     fn motion(&self, node: Node<'a, 'a>, place: &str) -> Result<DAffine3> {
         let rotation = child_with_text(node, "rotation").map(|node| self.numbers::<9>(node)).transpose()?;
         let matrix3 = rotation.map_or(DMat3::IDENTITY, |rows| DMat3::from_cols_array(&rows).transpose());
@@ -340,7 +342,7 @@ impl<'a> File<'a> {
         let (w, h) = (f64::from(size.0), f64::from(size.1));
         let kind = sensor.attribute("type").unwrap_or("frame");
         if kind == "spherical" {
-            // Pixels are square: what lacks above and below was cut off.
+            // Pixels are square: what is missing at the top and bottom was cropped.
             let f = w / (2.0 * PI);
             return Ok((Camera::at_origin([f, f, w / 2.0, h / 2.0], size), Lens::Equirectangular));
         }
@@ -349,7 +351,7 @@ impl<'a> File<'a> {
         };
         if let Some(other) = calibration.attribute("type").filter(|&other| other != kind) {
             let problem =
-                format!("the sensor is of type {kind} and its calibration of type {other}; export the cameras again");
+                format!("the sensor is of type {kind}, but its calibration of type {other}; export the cameras again");
             return Err(Error::data(self.path, place, problem));
         }
         let value = |name: &str| self.number(calibration, name);

@@ -1,8 +1,8 @@
-//! The file of a listed photo.
+//! Finds the file of a listed photo.
 //!
 //! Programs rename, convert and move photos after their poses are known. A photo that is not at its listed path is
-//! looked for in the folders in which programs put photos, under the same name in another case or composition, and then
-//! under the same name with another extension. Only a single match counts.
+//! looked for in the usual photo folders, under the same name in another case or Unicode composition, and then under
+//! the same name with another extension. Only a unique match counts.
 
 use labelgs_files::names::folded;
 use labelgs_files::read;
@@ -13,20 +13,20 @@ use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Extensions of the photos that can be read.
-const READABLE: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Extensions of photos that cannot be read. They are found, so that the message can say what they are.
-const UNREADABLE: [&str; 13] =
+/// Extensions of readable photos.
+const READABLE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Extensions of unreadable photos. They are found too, so that messages can name them.
+const UNREADABLE_EXTENSIONS: [&str; 13] =
     ["tif", "tiff", "webp", "heic", "heif", "avif", "bmp", "gif", "jxl", "dng", "cr2", "nef", "arw"];
-/// Folders of photos below a scene, besides all that start with `images`.
-const FOLDERS: [&str; 6] = ["images", "input", "photos", "rgb", "frames", "imgs"];
+/// Photo folders below a scene, besides all that start with `images`.
+const PHOTO_FOLDERS: [&str; 6] = ["images", "input", "photos", "rgb", "frames", "imgs"];
 
 /// Extensions to try for a photo that is listed without one.
-pub const EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
+pub const PHOTO_EXTENSIONS: [&str; 7] = ["", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"];
 
-/// Returns true for the name of a photo that can be read.
+/// Returns true for the name of a readable photo.
 pub fn is_readable(path: &Path) -> bool {
-    extension_is_of(path, &READABLE)
+    extension_is_of(path, &READABLE_EXTENSIONS)
 }
 
 fn extension_is_of(path: &Path, extensions: &[&str]) -> bool {
@@ -34,12 +34,12 @@ fn extension_is_of(path: &Path, extensions: &[&str]) -> bool {
     extensions.iter().any(|known| known.eq_ignore_ascii_case(extension))
 }
 
-/// True for the name of a folder of photos.
+/// Returns true for the name of a photo folder.
 fn is_folder_of_photos(name: &str) -> bool {
-    name.starts_with("images") || FOLDERS.contains(&name)
+    name.starts_with("images") || PHOTO_FOLDERS.contains(&name)
 }
 
-/// The entries of a folder, by their keys.
+/// The entries of a folder, by key.
 #[derive(Debug, Default)]
 struct Entries {
     by_name: HashMap<String, Vec<PathBuf>>,
@@ -48,13 +48,13 @@ struct Entries {
 }
 
 impl Entries {
-    fn of(folder: &Path) -> Self {
+    fn read(folder: &Path) -> Self {
         let mut found = Self::default();
-        // A folder that is not there or closed has no photos.
+        // A missing or unreadable folder has no photos.
         for path in read::folder(folder).unwrap_or_default() {
             let Some(name) = path.file_name().and_then(OsStr::to_str) else { continue };
             let stem = path.file_stem().and_then(OsStr::to_str).unwrap_or(name);
-            if extension_is_of(&path, &READABLE) || extension_is_of(&path, &UNREADABLE) {
+            if extension_is_of(&path, &READABLE_EXTENSIONS) || extension_is_of(&path, &UNREADABLE_EXTENSIONS) {
                 found.by_stem.entry(folded(stem)).or_default().push(path.clone());
             }
             found.by_name.entry(folded(name)).or_default().push(path);
@@ -67,18 +67,18 @@ impl Entries {
 #[derive(Debug)]
 pub struct PhotoFinder {
     root: PathBuf,
-    /// The folder that the user named.
+    /// The folder named by the user.
     images: Option<PathBuf>,
     folders: RefCell<HashMap<PathBuf, Entries>>,
     bases: OnceCell<Vec<PathBuf>>,
-    /// The folder of photos of a scene of which this is one of the models.
+    /// The photo folder of the scene of which this is one of several models.
     above: OnceCell<Option<PathBuf>>,
-    /// Number of photos that are not at their listed paths, and the first of them with its file.
+    /// Number of photos not found at their listed paths, and the first of them with its file.
     elsewhere: RefCell<Option<(usize, PathBuf, PathBuf)>>,
 }
 
 impl PhotoFinder {
-    /// Makes one for the scene in `root`; `images` replaces all folders.
+    /// Creates a finder for the scene in `root`; `images` replaces all folders.
     pub fn new(root: &Path, images: Option<PathBuf>) -> Self {
         Self {
             root: root.to_owned(),
@@ -90,14 +90,14 @@ impl PhotoFinder {
         }
     }
 
-    /// Returns the folder of photos: the one that the user named, or this one of the scene.
+    /// Returns the photo folder: the one that the user named, or `usual` below the scene.
     pub fn folder(&self, usual: &str) -> PathBuf {
         let below = || if usual == "." { self.root.clone() } else { self.root.join(usual) };
         self.images.clone().unwrap_or_else(below)
     }
 
-    /// Finds the photo listed as `relative`: at this path below one of `folders` of the scene, also with an extension
-    /// if it is listed without one, or elsewhere.
+    /// Finds the photo listed as `relative`: at this path below one of the scene's `folders`, with any extension if it
+    /// is listed without one, or elsewhere.
     pub fn find(&self, folders: &[&str], relative: &Path) -> Option<PathBuf> {
         let given = self.images.as_deref();
         let bases: Vec<PathBuf> = match given {
@@ -110,7 +110,7 @@ impl PhotoFinder {
         if let Some(found) = exact.clone().find_map(|path| with_any(&path)) {
             return Some(found);
         }
-        // A photo that lacks among others is missing, whatever a folder of smaller copies has.
+        // A photo missing among others is missing, even if a folder of smaller copies contains it.
         let has_others = bases[0].join(relative).parent().is_some_and(|folder| self.has_photos(folder));
         let bases = if given.is_some() || has_others { bases } else { self.bases() };
         let found = bases.iter().find_map(|base| paths.iter().find_map(|path| self.alike(base, path)))?;
@@ -122,7 +122,7 @@ impl PhotoFinder {
         Some(found)
     }
 
-    /// The folder of photos of a scene of which this is one of the models, as `sparse/1` is.
+    /// Returns the photo folder of the scene, if this is one of its models, such as `sparse/1`.
     fn above(&self) -> Option<PathBuf> {
         let look = || {
             let root = std::path::absolute(&self.root).ok()?;
@@ -138,14 +138,14 @@ impl PhotoFinder {
         let elsewhere = self.elsewhere.borrow();
         let (count, listed, found) = elsewhere.as_ref()?;
         Some(format!(
-            "{} not at the listed path and found by name: {} is {}",
+            "{} not at the listed path but found by name: {} is {}",
             counted(count, "photo"),
             listed.display(),
             found.strip_prefix(&self.root).unwrap_or(found).display()
         ))
     }
 
-    /// Says where photos were looked for and what lies below the scene, for messages.
+    /// Describes where photos were looked for and what is below the scene, for messages.
     pub fn hint(&self) -> String {
         if let Some(images) = &self.images {
             let count = count_photos(images);
@@ -172,7 +172,7 @@ impl PhotoFinder {
         self.counts().into_iter().next().map(|(count, folder)| (folder, count))
     }
 
-    /// Numbers of photos in the scene's folder and those in it, the largest first.
+    /// Returns the numbers of photos in the scene's folder and its subfolders, the largest first.
     fn counts(&self) -> Vec<(usize, PathBuf)> {
         let below = read::folder(&self.root).unwrap_or_default().into_iter().filter(|path| path.is_dir());
         let folders = std::iter::once(self.root.clone()).chain(below);
@@ -182,14 +182,15 @@ impl PhotoFinder {
         counts
     }
 
-    /// Folders that may hold the photos: those of photos, with the full sizes first, then the scene's own.
+    /// Returns the folders that may contain the photos: photo folders, full-size ones first, then the scene's own.
     fn bases(&self) -> Vec<PathBuf> {
         let look = || {
             let entries = read::folder(&self.root).unwrap_or_default();
             let folders = entries.iter().filter(|path| path.is_dir());
             let names = folders.filter_map(|path| path.file_name()?.to_str());
             let mut found: Vec<&str> = names.filter(|name| is_folder_of_photos(name)).collect();
-            let rank = |name: &str| FOLDERS.iter().position(|known| *known == name).unwrap_or(FOLDERS.len());
+            let rank =
+                |name: &str| PHOTO_FOLDERS.iter().position(|known| *known == name).unwrap_or(PHOTO_FOLDERS.len());
             found.sort_by_key(|&name| (rank(name), name.len(), name));
             found.into_iter().map(|name| self.root.join(name)).chain([self.root.clone()]).collect()
         };
@@ -198,10 +199,10 @@ impl PhotoFinder {
 
     fn has_photos(&self, folder: &Path) -> bool {
         let mut folders = self.folders.borrow_mut();
-        !folders.entry(folder.to_owned()).or_insert_with(|| Entries::of(folder)).by_stem.is_empty()
+        !folders.entry(folder.to_owned()).or_insert_with(|| Entries::read(folder)).by_stem.is_empty()
     }
 
-    /// Finds the only file below `base` whose path matches, or whose name does but for the extension.
+    /// Finds the only file below `base` whose path matches, or whose name matches except for its extension.
     fn alike(&self, base: &Path, relative: &Path) -> Option<PathBuf> {
         let mut folder = base.to_owned();
         let parts: Vec<&str> = relative.iter().map(OsStr::to_str).collect::<Option<_>>()?;
@@ -216,8 +217,8 @@ impl PhotoFinder {
         if let Some(found) = self.only(&folder, |entries| entries.by_name.get(&key), Path::is_file) {
             return Some(found);
         }
-        let has_extension =
-            extension_is_of(Path::new(name), &READABLE) || extension_is_of(Path::new(name), &UNREADABLE);
+        let has_extension = extension_is_of(Path::new(name), &READABLE_EXTENSIONS)
+            || extension_is_of(Path::new(name), &UNREADABLE_EXTENSIONS);
         let stem = if has_extension { Path::new(name).file_stem()?.to_str()? } else { name };
         let stem = folded(stem);
         let readable =
@@ -233,14 +234,14 @@ impl PhotoFinder {
         is_wanted: impl Fn(&Path) -> bool,
     ) -> Option<PathBuf> {
         let mut folders = self.folders.borrow_mut();
-        let entries = folders.entry(folder.to_owned()).or_insert_with(|| Entries::of(folder));
+        let entries = folders.entry(folder.to_owned()).or_insert_with(|| Entries::read(folder));
         let mut found = matches(entries)?.iter().filter(|path| is_wanted(path));
         let first = found.next()?;
         found.next().is_none().then(|| first.clone())
     }
 }
 
-/// Returns the path, then without its leading folders of photos; with `any`, then its name alone.
+/// Returns the path, then without its leading photo folders; with `any`, then its name alone.
 fn trimmed(relative: &Path, any: bool) -> Vec<PathBuf> {
     let parts: Vec<&OsStr> = relative.iter().filter(|part| *part != "." && *part != "/").collect();
     let leading = parts.iter().take_while(|part| part.to_str().is_some_and(is_folder_of_photos)).count();
@@ -252,15 +253,15 @@ fn trimmed(relative: &Path, any: bool) -> Vec<PathBuf> {
     starts.dedup();
     let rest = |&start: &usize| parts[start.min(parts.len().saturating_sub(1))..].iter().collect::<PathBuf>();
     let mut paths: Vec<PathBuf> = starts.iter().map(rest).collect();
-    // The first is the path as it is, which may be absolute.
+    // The first is the unchanged path, which may be absolute.
     paths[0] = relative.to_owned();
     paths.dedup();
     paths
 }
 
-/// Returns the file at a path, with one of the extensions if it has none.
+/// Returns the file at a path, trying all extensions if it has none.
 fn with_any(path: &Path) -> Option<PathBuf> {
-    EXTENSIONS.iter().find_map(|extension| {
+    PHOTO_EXTENSIONS.iter().find_map(|extension| {
         let mut candidate = path.as_os_str().to_owned();
         candidate.push(extension);
         let candidate = PathBuf::from(candidate);
@@ -268,7 +269,7 @@ fn with_any(path: &Path) -> Option<PathBuf> {
     })
 }
 
-/// Returns the number of photos in a folder that can be read.
+/// Returns the number of readable photos in a folder.
 pub fn count_photos(folder: &Path) -> usize {
     read::folder(folder).unwrap_or_default().iter().filter(|path| is_readable(path) && path.is_file()).count()
 }

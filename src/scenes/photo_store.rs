@@ -1,11 +1,11 @@
-//! Photos and masks within a budget of memory.
+//! Keeps photos and masks within a memory budget.
 //!
-//! If the views of a scene fit into the budget, all of them stay in memory. Otherwise the first ones get a half of it, and
-//! the others wait in a temporary file, as made: they cost a read each time, no decoding. Which ones wait has no effect on
-//! any bit. The other half is for the pictures that are just being made or used.
+//! If the views of a scene fit into the budget, all of them stay in memory. Otherwise the first ones get half of it.
+//! The finished pixels of the others go to a temporary file, and each use costs a read but no decoding. The choice does
+//! not affect any bit. The other half of the budget is for images that are being made or used.
 
 use super::LoadOptions;
-use super::recipe::{MadeView, Recipe};
+use super::photo_recipe::{MadeView, PhotoRecipe};
 use labelgs_files::scratch::{Scratch, ScratchOffset};
 use labelgs_scene::pixels::{PixelBuffer, PixelSource};
 use labelgs_scene::{Error, LabelMap, Photo, Pixels, Result, Setting, View};
@@ -16,38 +16,38 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// Bytes per pixel of a photo in memory: RGBA, and the smaller copy for early steps.
 const PHOTO_BYTES: u64 = 8;
-/// Bytes per pixel of a mask: ids, and the layout of the device.
+/// Bytes per pixel of a mask: ids, and the GPU's layout.
 const MASK_BYTES: u64 = 6;
-/// Bytes per pixel of a photo's file while its views are made: those of the decoder, RGBA, undistorted, and of its mask.
+/// Bytes per pixel of a photo while its views are made: the decoder's, RGBA, undistorted, and the mask.
 const MAKING_BYTES: u64 = 16;
 
-/// What happens without space for the file.
+/// What happens if there is no space for the file.
 const WITHOUT_FILE: &str = "photos are decoded again each time, which takes longer";
 
-/// Size in a photo's file, if there is one.
-type Size = Option<(u32, u32)>;
+/// Size of a photo's file, if there is one.
+type FileSize = Option<(u32, u32)>;
 
 /// Decides which pixels stay in memory.
 #[derive(Debug)]
 pub(super) struct PhotoStore {
-    /// Whether the views of a photo stay in memory.
+    /// Whether the views of each photo stay in memory.
     holds: Vec<bool>,
     files: Arc<Files>,
 }
 
-/// Where the others are.
+/// Where the other pixels are.
 #[derive(Debug)]
 struct Files {
-    /// The temporary file; without it pixels are made again.
+    /// The temporary file; without it, pixels are made again.
     scratch: Option<Scratch>,
     at_once: usize,
     was_damaged: AtomicBool,
 }
 
 impl PhotoStore {
-    /// Plans the memory of all photos, of known sizes. Views to train on have it before held-out ones.
-    pub(super) fn new(recipes: &[Arc<Recipe>], stored: &[Result<Size>], options: &LoadOptions) -> Self {
-        let cost = |(recipe, stored): (&Arc<Recipe>, &Result<Size>)| {
+    /// Plans the memory of all photos, whose sizes are known. Training views have precedence over held-out ones.
+    pub(super) fn new(recipes: &[Arc<PhotoRecipe>], stored: &[Result<FileSize>], options: &LoadOptions) -> Self {
+        let cost = |(recipe, stored): (&Arc<PhotoRecipe>, &Result<FileSize>)| {
             let photo = if recipe.photos && recipe.listed.photo.is_some() { PHOTO_BYTES } else { 0 };
             let mask = if recipe.mask.is_some() { MASK_BYTES } else { 0 };
             if photo + mask == 0 { 0 } else { stored.as_ref().map_or(0, |&size| recipe.pixels(size)) * (photo + mask) }
@@ -58,7 +58,7 @@ impl PhotoStore {
         if holds.contains(&false) {
             let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
             tracing::info!(
-                "photos and masks take {:.1} GiB, and {} is {:.1} GiB: {} of {} photos stay in memory, the \
+                "photos and masks take {:.1} GiB, but {} is {:.1} GiB: {} of {} photos stay in memory, the \
                  others {}",
                 gib(costs.iter().sum()),
                 Setting("photo_memory"),
@@ -71,29 +71,35 @@ impl PhotoStore {
                 }
             );
         }
-        let pixels = |size: &Result<Size>| size.as_ref().map_or(0, |size| size.map_or(0, area));
+        let pixels = |size: &Result<FileSize>| size.as_ref().map_or(0, |size| size.map_or(0, area));
         let largest = stored.iter().map(pixels).max().unwrap_or(0) * MAKING_BYTES;
         let at_once = usize::try_from(options.photo_memory / 2 / largest.max(1)).unwrap_or(usize::MAX).max(1);
         let scratch = options.photo_folder.as_deref().map(Scratch::new);
         Self { holds, files: Arc::new(Files { scratch, at_once, was_damaged: false.into() }) }
     }
 
-    /// Number of photos that may be decoded at the same time.
+    /// Returns the number of photos that may be decoded at the same time.
     pub(super) fn at_once(&self) -> usize {
         self.files.at_once
     }
 
-    /// Takes the views of the photo at `index`.
-    pub(super) fn keep(&self, index: usize, recipe: &Arc<Recipe>, stored: Size, made: Vec<MadeView>) -> Vec<View> {
+    /// Stores the views of the photo at `index`.
+    pub(super) fn keep(
+        &self,
+        index: usize,
+        recipe: &Arc<PhotoRecipe>,
+        stored: FileSize,
+        made: Vec<MadeView>,
+    ) -> Vec<View> {
         let view = |(at, MadeView { name, camera, photo, mask })| {
-            let origin = Origin { recipe: Arc::clone(recipe), stored, view: at };
+            let origin = ViewOrigin { recipe: Arc::clone(recipe), stored, view: at };
             let mask = mask.map(|mask| self.pixels(index, mask, origin.clone()));
             View { name, camera, photo: photo.map(|photo| self.pixels(index, photo, origin)), mask }
         };
         made.into_iter().enumerate().map(view).collect()
     }
 
-    fn pixels<T: Kept>(&self, index: usize, picture: T, origin: Origin) -> Pixels<T> {
+    fn pixels<T: StoredPixels>(&self, index: usize, picture: T, origin: ViewOrigin) -> Pixels<T> {
         if self.holds[index] {
             return picture.into();
         }
@@ -101,7 +107,7 @@ impl PhotoStore {
         let place = self.files.scratch.as_ref().and_then(|scratch| scratch.put(picture.bytes(), WITHOUT_FILE));
         let files = Arc::clone(&self.files);
         Pixels::from_source(
-            Arc::new(Waiting { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }),
+            Arc::new(EvictedPixels { files, origin, place, size, crc: facts.crc, kind: PhantomData::<T> }),
             facts,
         )
     }
@@ -119,25 +125,25 @@ fn held(costs: &[u64], test: &[bool], budget: u64) -> Vec<bool> {
     for wanted in [false, true] {
         for index in (0..costs.len()).filter(|&index| test.get(index) == Some(&wanted)) {
             held[index] = costs[index] <= left;
-            // The first that does not fit ends it: a smaller one later is no better.
+            // Stop at the first photo that does not fit, so that the resident set is a prefix.
             left = if held[index] { left - costs[index] } else { 0 };
         }
     }
     held
 }
 
-/// What a store keeps: a photo or a mask.
-trait Kept: PixelBuffer + std::fmt::Debug + Send + Sync + Sized + 'static {
+/// Pixels that the store can hold: a photo or a mask.
+trait StoredPixels: PixelBuffer + std::fmt::Debug + Send + Sync + Sized + 'static {
     /// Returns width and height, px.
     fn size(&self) -> (u32, u32);
-    /// Makes one without content, and lets `fill` write its bytes.
+    /// Creates an image and lets `fill` write its bytes.
     fn filled(size: (u32, u32), fill: impl FnOnce(&mut [u8]) -> std::io::Result<()>) -> std::io::Result<Self>;
-    /// Returns the recipe of this alone, and its file.
-    fn recipe(all: &Recipe) -> (Recipe, PathBuf);
-    fn of(view: MadeView) -> Option<Self>;
+    /// Returns the recipe for only these pixels, and their file.
+    fn recipe(all: &PhotoRecipe) -> (PhotoRecipe, PathBuf);
+    fn from_view(view: MadeView) -> Option<Self>;
 }
 
-impl Kept for Photo {
+impl StoredPixels for Photo {
     fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
@@ -148,18 +154,18 @@ impl Kept for Photo {
         Ok(Self { width: size.0, height: size.1, rgba })
     }
 
-    fn recipe(all: &Recipe) -> (Recipe, PathBuf) {
-        // A photo of objects alone needs their mask.
+    fn recipe(all: &PhotoRecipe) -> (PhotoRecipe, PathBuf) {
+        // A photo of isolated objects needs their mask.
         let mask = all.mask.clone().filter(|_| all.masked_only);
-        (Recipe { mask, ..all.clone() }, all.listed.photo.clone().unwrap_or_default())
+        (PhotoRecipe { mask, ..all.clone() }, all.listed.photo.clone().unwrap_or_default())
     }
 
-    fn of(view: MadeView) -> Option<Self> {
+    fn from_view(view: MadeView) -> Option<Self> {
         view.photo
     }
 }
 
-impl Kept for LabelMap {
+impl StoredPixels for LabelMap {
     fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
@@ -170,37 +176,37 @@ impl Kept for LabelMap {
         Ok(Self { width: size.0, height: size.1, ids })
     }
 
-    fn recipe(all: &Recipe) -> (Recipe, PathBuf) {
-        (Recipe { photos: false, ignore: None, ..all.clone() }, all.mask.clone().unwrap_or_default())
+    fn recipe(all: &PhotoRecipe) -> (PhotoRecipe, PathBuf) {
+        (PhotoRecipe { photos: false, ignore: None, ..all.clone() }, all.mask.clone().unwrap_or_default())
     }
 
-    fn of(view: MadeView) -> Option<Self> {
+    fn from_view(view: MadeView) -> Option<Self> {
         view.mask
     }
 }
 
-/// The photo that a view was made of.
+/// The photo of a view.
 #[derive(Clone, Debug)]
-struct Origin {
-    recipe: Arc<Recipe>,
-    stored: Size,
-    /// Index of the view among those of the photo.
+struct ViewOrigin {
+    recipe: Arc<PhotoRecipe>,
+    stored: FileSize,
+    /// Index of the view among the photo's views.
     view: usize,
 }
 
 /// Pixels that are not in memory.
 #[derive(Debug)]
-struct Waiting<T> {
+struct EvictedPixels<T> {
     files: Arc<Files>,
-    origin: Origin,
-    /// Place in the temporary file, if it took them.
+    origin: ViewOrigin,
+    /// Offset in the temporary file, if the pixels are there.
     place: Option<ScratchOffset>,
     size: (u32, u32),
     crc: u32,
     kind: PhantomData<T>,
 }
 
-impl<T: Kept> PixelSource<T> for Waiting<T> {
+impl<T: StoredPixels> PixelSource<T> for EvictedPixels<T> {
     fn make(&self) -> Result<Arc<T>> {
         match self.place.and_then(|place| self.read(place)) {
             Some(picture) => Ok(Arc::new(picture)),
@@ -213,8 +219,8 @@ impl<T: Kept> PixelSource<T> for Waiting<T> {
     }
 }
 
-impl<T: Kept> Waiting<T> {
-    /// Reads the temporary file. A disk that returns other bytes than it got costs time, not bits.
+impl<T: StoredPixels> EvictedPixels<T> {
+    /// Reads the temporary file. If the disk returns wrong bytes, the pixels are made again.
     fn read(&self, place: ScratchOffset) -> Option<T> {
         let scratch = self.files.scratch.as_ref()?;
         let found = T::filled(self.size, |bytes| scratch.read(place, bytes));
@@ -231,22 +237,22 @@ impl<T: Kept> Waiting<T> {
 
     /// Makes the pixels from their files again.
     fn again(&self) -> Result<T> {
-        let Origin { recipe, stored, view } = &self.origin;
+        let ViewOrigin { recipe, stored, view } = &self.origin;
         let (recipe, path) = T::recipe(recipe);
         let gone = |error| match error {
             Error::Read { path, source } => {
-                let problem = format!("{source}; it was there when the scene was opened: bring it back and go on");
+                let problem = format!("{source}; it existed when the scene was opened: restore it and resume");
                 Error::Read { path, source: std::io::Error::new(source.kind(), problem) }
             }
             other => other,
         };
-        let changed = "has other pixels than when the scene was opened; restore it, or start anew";
+        let changed = "has different pixels than when the scene was opened; restore it, or start again";
         let changed = || Error::data(&path, "", changed);
         let photo = recipe.decode(*stored).map_err(gone)?;
         if photo.as_ref().is_some_and(|photo| Some(photo.size()) != *stored) {
             return Err(changed());
         }
-        let made = recipe.views(*stored, photo).map_err(gone)?.views.into_iter().nth(*view).and_then(T::of);
+        let made = recipe.views(*stored, photo).map_err(gone)?.views.into_iter().nth(*view).and_then(T::from_view);
         made.filter(|made| made.size() == self.size && made.crc() == self.crc).ok_or_else(changed)
     }
 }

@@ -1,4 +1,4 @@
-//! Coloured points.
+//! Reads coloured points.
 
 use super::listing::DISTANCE_MAX;
 use glam::DVec3;
@@ -6,22 +6,22 @@ use labelgs_formats::ply_table::Table;
 use labelgs_scene::{Error, Point, Result};
 use std::path::Path;
 
-/// What programs call red, green and blue.
-const COLOURS: [[&str; 3]; 3] =
+/// Property names of red, green and blue in different programs.
+const COLOUR_NAMES: [[&str; 3]; 3] =
     [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
 
-/// Reads points from a PLY with `x y z` and colours, if it has them. Colours are integers from 0 to 255 or, where they have
-/// 16 bits and one exceeds 255, to 65535; or floats from 0 to 1, or to 255 if one of them exceeds 1. Points without colour
-/// become mid-grey. Leaves out points that are not finite or whose squares do not fit into f32.
+/// Reads points from a PLY with `x y z` and optional colours. Colours are integers from 0 to 255 (or to 65535 if they
+/// have 16 bits and one exceeds 255), or floats from 0 to 1 (or to 255 if one exceeds 1). Points without colour become
+/// mid-grey. Omits points that are not finite or whose squares do not fit into f32.
 pub fn read_points(path: impl AsRef<Path>) -> Result<Vec<Point>> {
     let path = path.as_ref();
     let table = Table::open(path)?;
     if table.has("packed_position") {
-        let cure = "a compressed PLY, which is read as a model only; convert it to a plain PLY first";
+        let cure = "a compressed PLY, which can only be read as a model; convert it to a plain PLY first";
         return Err(Error::data(path, "header", cure));
     }
     let has = |colours: &&[&str; 3]| colours.iter().all(|colour| table.names().any(|name| name == *colour));
-    let colours = COLOURS.iter().find(has);
+    let colours = COLOUR_NAMES.iter().find(has);
     let largest = colours.and_then(|colours| table.integer_max(colours[0]));
     let columns: Vec<&str> = ["x", "y", "z"].iter().chain(colours.into_iter().flatten()).copied().collect();
     let mut rows: Vec<([f64; 3], [f64; 3])> = Vec::new();

@@ -1,7 +1,7 @@
-//! The convention of poses that a file has in place of its format's own.
+//! The pose convention of a file that deviates from its format.
 //!
-//! A format says whether its poses are camera-to-world or world-to-camera, and whether cameras have the axes of OpenCV
-//! (y down, looking along z) or of OpenGL (y up, looking along -z). Programs that write it at times mean another one.
+//! A format defines whether its poses are camera-to-world or world-to-camera, and whether camera axes are OpenCV's (y
+//! down, looking along z) or OpenGL's (y up, looking along -z). Some programs write another convention.
 
 use glam::{DMat3, DQuat, DVec3};
 use labelgs_scene::Camera;
@@ -10,29 +10,29 @@ use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
-/// Which way a pose leads.
+/// The direction of a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Direction {
     CameraToWorld,
     WorldToCamera,
 }
 
-/// Axes of a camera.
+/// Camera axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Axes {
     OpenCv,
     OpenGl,
 }
 
-/// What a file means by its poses where it differs from its format: words of `c2w` or `w2c` (camera-to-world,
-/// world-to-camera), `opencv` or `opengl` (axes of the camera) and `xyzw` (quaternions whose real part is last), with
-/// commas between. What is not named is as in the format.
+/// Deviations of a file's poses from its format: comma-separated words `c2w` or `w2c` (camera-to-world,
+/// world-to-camera), `opencv` or `opengl` (camera axes) and `xyzw` (quaternions with the real part last). Everything
+/// else is as in the format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct PoseConvention {
     direction: Option<Direction>,
     axes: Option<Axes>,
-    /// Quaternions are (x, y, z, w).
+    /// Whether quaternions are (x, y, z, w).
     is_xyzw: bool,
 }
 
@@ -45,10 +45,10 @@ impl Native {
     pub const COLMAP: Self = Self(Direction::WorldToCamera, Axes::OpenCv);
     /// The transforms of Blender, instant-ngp and nerfstudio.
     pub const TRANSFORMS: Self = Self(Direction::CameraToWorld, Axes::OpenGl);
-    /// Metashape's transforms, and the poses of LLFF as its reader turns them.
+    /// Metashape's transforms, and LLFF's poses after its reader has turned them.
     pub const CAMERA_TO_WORLD: Self = Self(Direction::CameraToWorld, Axes::OpenCv);
 
-    /// Returns the other conventions that the file may mean, those of fewer differences first.
+    /// Returns the other conventions that the file may use, those with fewer differences first.
     pub fn others(self) -> Vec<PoseConvention> {
         let Self(direction, axes) = self;
         let turned = match direction {
@@ -60,7 +60,7 @@ impl Native {
         let mut all =
             vec![of(None, Some(swapped), false), of(Some(turned), None, false), of(Some(turned), Some(swapped), false)];
         if direction == Direction::WorldToCamera {
-            // Only COLMAP lists quaternions.
+            // Only COLMAP stores quaternions.
             all.push(of(None, None, true));
             all.push(of(None, Some(swapped), true));
             all.push(of(Some(turned), None, true));
@@ -76,25 +76,25 @@ fn inverse((rotation, translation): Motion) -> Motion {
     (rotation.transpose(), -(rotation.transpose() * translation))
 }
 
-/// From the axes of OpenGL to those of OpenCV, and back.
-const SWAP: DMat3 = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+/// Converts OpenGL's axes to OpenCV's and back.
+const AXES_SWAP: DMat3 = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
 
 impl PoseConvention {
-    /// Returns true if nothing differs from the format.
+    /// Returns true if the convention is the format's.
     pub fn is_native(self) -> bool {
         self == Self::default()
     }
 
-    /// Turns a camera that was read by the convention of its format into what the file means.
+    /// Corrects a camera that was read by the convention of its format.
     pub fn apply(self, native: Native, camera: &mut Camera) {
         if self.is_native() {
             return;
         }
         let Native(direction, axes) = native;
-        // The pose as it stands in the file.
+        // The pose as stored in the file.
         let mut file = (camera.rotation, camera.translation);
         if axes == Axes::OpenGl {
-            file = (SWAP * file.0, SWAP * file.1);
+            file = (AXES_SWAP * file.0, AXES_SWAP * file.1);
         }
         if direction == Direction::CameraToWorld {
             file = inverse(file);
@@ -107,26 +107,26 @@ impl PoseConvention {
             file = inverse(file);
         }
         if self.axes.unwrap_or(axes) == Axes::OpenGl {
-            file = (SWAP * file.0, SWAP * file.1);
+            file = (AXES_SWAP * file.0, AXES_SWAP * file.1);
         }
         (camera.rotation, camera.translation) = file;
     }
 
-    /// Returns its words as they are typed, each with its meaning.
+    /// Returns the words to type, with their meanings.
     fn words(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let direction = self.direction.map(|direction| match direction {
             Direction::CameraToWorld => ("c2w", "camera-to-world poses"),
             Direction::WorldToCamera => ("w2c", "world-to-camera poses"),
         });
         let axes = self.axes.map(|axes| match axes {
-            Axes::OpenCv => ("opencv", "camera axes of OpenCV"),
-            Axes::OpenGl => ("opengl", "camera axes of OpenGL"),
+            Axes::OpenCv => ("opencv", "OpenCV camera axes"),
+            Axes::OpenGl => ("opengl", "OpenGL camera axes"),
         });
         let order = self.is_xyzw.then_some(("xyzw", "quaternions with the real part last"));
         [direction, axes, order].into_iter().flatten()
     }
 
-    /// Returns what the file means, in words.
+    /// Returns a description of the convention.
     pub fn text(self) -> String {
         let all: Vec<&str> = self.words().map(|(_, meaning)| meaning).collect();
         if all.is_empty() { "the convention of its format".to_owned() } else { all.join(" and ") }
@@ -154,7 +154,7 @@ impl FromStr for PoseConvention {
                 "xyzw" => !std::mem::replace(&mut found.is_xyzw, true),
                 _ => {
                     return Err(format!(
-                        "`{word}` is no convention of poses; expected c2w, w2c, opencv, opengl or xyzw"
+                        "`{word}` is not a pose convention; expected c2w, w2c, opencv, opengl or xyzw"
                     ));
                 }
             };
@@ -194,7 +194,7 @@ mod tests {
         Camera { rotation, translation, fx: 1.0, fy: 1.0, cx: 1.0, cy: 1.0, width: 2, height: 2 }
     }
 
-    /// A pose that was written in each convention, read by that of the format, and set right.
+    /// A pose that was written in each convention, read by the format's, and corrected.
     #[test]
     fn each_convention_gives_the_pose_back() {
         let right = DQuat::from_xyzw(0.1, -0.5, 0.3, 0.8).normalize();
@@ -203,7 +203,7 @@ mod tests {
             let convention: PoseConvention = text.parse().expect("words");
             let (mut stored, native) = ((rotation, translation), Native::COLMAP);
             if text.contains("opengl") {
-                stored = (SWAP * stored.0, SWAP * stored.1);
+                stored = (AXES_SWAP * stored.0, AXES_SWAP * stored.1);
             }
             if text.contains("c2w") {
                 stored = inverse(stored);
@@ -225,10 +225,10 @@ mod tests {
         let native = Native::TRANSFORMS;
         let (rotation, translation) = (DMat3::from_rotation_y(0.3), DVec3::new(0.4, -2.0, 3.0));
         let world_from_camera = inverse((rotation, translation));
-        // The reader takes the matrix of the file for camera-to-world with OpenGL's axes.
+        // The reader takes the file's matrix for camera-to-world with OpenGL axes.
         let read = |(rotation, translation): Motion| {
             let (rotation, translation) = inverse((rotation, translation));
-            camera(SWAP * rotation, SWAP * translation)
+            camera(AXES_SWAP * rotation, AXES_SWAP * translation)
         };
         for (text, stored) in [("opencv", world_from_camera), ("w2c,opencv", (rotation, translation))] {
             let mut found = read(stored);

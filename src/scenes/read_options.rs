@@ -1,4 +1,4 @@
-//! Settings for reading the scene of a run.
+//! Settings for reading a run's scene.
 
 use super::pose_convention::PoseConvention;
 use labelgs_scene::options::Options;
@@ -8,27 +8,28 @@ labelgs_scene::options! {
     /// The settings for the pixels that a run trains on and the views that it holds out.
     pub struct ReadOptions {
         "Scene" {
-            /// Longest side of a photo, px; larger photos are shrunk, 0 keeps all sizes.
+            /// Longest side of a photo, px; larger photos are shrunk, and 0 keeps all sizes.
             ///
-            /// 0 (the reference shrinks to a height of 1080). Smaller values are faster and lose fine texture.
+            /// Smaller values are faster and lose fine texture. [default 0; the reference shrinks to a height of 1080]
             max_resolution <"PX">: u32 = 0, fixed;
 
             /// Every N-th view by name is held out.
             ///
-            /// 8 (LabelGS, 3DGS); 0 trains on all views. A scene with its own split keeps it, but for 0.
+            /// 0 trains on all views. A scene's own split takes precedence, except over 0. [default 8, as LabelGS and
+            /// 3DGS]
             test_every <"N">: u32 = 8, fixed;
 
-            /// What the scene's file means by its poses, where it is not the convention of its format.
+            /// Pose convention of the scene's file, if it deviates from its format.
             ///
-            /// Words of c2w or w2c (camera-to-world, world-to-camera), opencv or opengl (axes of the camera: y down and looking
-            /// along z, or y up and looking along -z), and xyzw (quaternions whose real part is last), with commas between.
+            /// Comma-separated words: c2w or w2c (camera-to-world, world-to-camera), opencv or opengl (camera axes: y
+            /// down and looking along z, or y up and looking along -z), and xyzw (quaternions with the real part last).
             poses <"WORDS">: PoseConvention = PoseConvention::default(), fixed;
 
-            /// Train the objects of the masks alone, and nothing of their surroundings.
+            /// Train only the objects of the masks, without their surroundings.
             ///
-            /// For an object on a turntable, whose surroundings do not turn with it. The masks become the opacity of the photos,
-            /// soft at the edges and without the colour of the surroundings there; photos are cut to their objects, those
-            /// without an object are left out, and each step has a random colour behind them (random_background).
+            /// Use this for an object on a turntable, whose surroundings do not turn with it. The masks become the
+            /// opacity of the photos, with soft edges free of background colour. Photos are cropped to their objects,
+            /// and those without an object are omitted. Each step uses a random background colour (random_background).
             masked_only <"SWITCH">: bool = false, fixed;
         }
     }

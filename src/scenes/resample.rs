@@ -1,14 +1,14 @@
-//! Photos and id maps through another lens.
+//! Resamples photos and id maps through another lens.
 //!
-//! Photos are undistorted at their own size with bilinear interpolation, then shrunk by [`labelgs_files::resize`]. Ids are never
-//! mixed: each target pixel takes the id at its centre, with size and lens in one step.
+//! Photos are undistorted at their own size with bilinear interpolation, then shrunk by [`labelgs_files::resize`]. Ids
+//! are never mixed: each target pixel gets the id at its centre, with size and lens in a single step.
 
 use super::window::Window;
 use glam::DVec2;
 use labelgs_scene::{Camera, LabelMap, Photo};
 use rayon::prelude::*;
 
-/// Returns the photo through the pinhole view of it. Pixels outside of the photo are black with alpha 0.
+/// Returns the photo as seen by one of its pinhole views. Pixels outside the photo are black with alpha 0.
 pub fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
     let Camera { width, height, .. } = view.camera;
     let row = |y: u32| {
@@ -21,8 +21,8 @@ pub fn undistort_photo(photo: &Photo, view: &Window) -> Photo {
     Photo { width, height, rgba }
 }
 
-/// Interpolates between the four nearest pixel centres, opacity too; without weight where one of them is. What is at the border
-/// continues outwards by half a pixel.
+/// Interpolates between the four nearest pixel centres, including opacity; invalid if one of them is. Extends the
+/// border outwards by half a pixel.
 fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     let split = |value: f64, side: u32| {
         let value = (value - 0.5).clamp(0.0, f64::from(side - 1));
@@ -44,14 +44,14 @@ fn bilinear(photo: &Photo, at: DVec2) -> [u8; 4] {
     colour
 }
 
-/// Makes the id map of a view with `width` x `height` px from a map of its photo at any scale. Pixels outside of the
+/// Creates the id map of a view with `width` x `height` px from a map of its photo at any scale. Pixels outside the
 /// photo get 0.
 pub fn resample_ids(ids: &LabelMap, view: &Window, (width, height): (u32, u32)) -> LabelMap {
     let ids = resample_nearest(&ids.ids, (ids.width, ids.height), view, (width, height), 0);
     LabelMap { width, height, ids }
 }
 
-/// Like [`resample_ids`] for values of any kind; pixels outside of the photo get `nothing`.
+/// Like [`resample_ids`] for values of any type; pixels outside the photo get `nothing`.
 pub fn resample_nearest<T: Copy + Send + Sync>(
     values: &[T],
     from: (u32, u32),

@@ -1,7 +1,7 @@
-//! The split that a data set brings: which photos are held out, and which are trained on.
+//! The split of a data set: which photos are held out, and which are for training.
 
-use super::listed_path::Place;
-use super::listing::{Listed, Listing};
+use super::listed_path::SceneFolder;
+use super::listing::{ListedPhoto, Listing};
 use labelgs_files::names::shortened;
 use labelgs_files::read;
 use labelgs_scene::words::counted;
@@ -10,55 +10,56 @@ use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Names of photos, one a line, in the folder of the scene or of its model: 3DGS has the first, nerfstudio the next two.
-const HELD_OUT: [&str; 3] = ["test.txt", "test_list.txt", "validation_list.txt"];
-const TRAINED_ON: [&str; 2] = ["train.txt", "train_list.txt"];
-/// Both lists, as ScanNet++ has them.
-const BOTH: &str = "train_test_lists.json";
+/// Lists of photo names, one per line, in the folder of the scene or of its model: 3DGS has the first, nerfstudio the
+/// next two.
+const HELD_OUT_LISTS: [&str; 3] = ["test.txt", "test_list.txt", "validation_list.txt"];
+const TRAINING_LISTS: [&str; 2] = ["train.txt", "train_list.txt"];
+/// Both lists in one file, as in ScanNet++.
+const BOTH_LISTS: &str = "train_test_lists.json";
 
-/// Lists of names of photos.
+/// Lists of photo names.
 #[derive(Debug, Default)]
-pub(super) struct Split {
-    /// Where they come from, for messages.
+pub(super) struct SceneSplit {
+    /// Source of the lists, for messages.
     pub(super) source: String,
-    /// Photos to train on; `None` means all that are not held out.
+    /// Photos for training; `None` means all that are not held out.
     pub(super) train: Option<Vec<String>>,
     pub(super) test: Vec<String>,
 }
 
 #[derive(Deserialize)]
-struct Both {
+struct BothLists {
     train: Vec<String>,
     test: Vec<String>,
 }
 
-impl Split {
+impl SceneSplit {
     /// Reads the lists beside a scene; `None` without any.
-    pub(super) fn find(scene: &Place, source: &Path) -> Result<Option<Self>> {
+    pub(super) fn find(scene: &SceneFolder, source: &Path) -> Result<Option<Self>> {
         let folders = [source.parent().unwrap_or(scene.root), scene.root];
         let file = |name: &&str| folders.iter().map(|folder| folder.join(name)).find(|path| path.is_file());
-        if let Some(path) = file(&BOTH) {
-            let Both { train, test } = read::json(&path, "expected {\"train\": [names], \"test\": [names]}")?;
+        if let Some(path) = file(&BOTH_LISTS) {
+            let BothLists { train, test } = read::json(&path, "expected {\"train\": [names], \"test\": [names]}")?;
             return Ok(Some(Self { source: path.display().to_string(), train: Some(train), test }));
         }
-        let held_out: Vec<PathBuf> = HELD_OUT.iter().filter_map(file).collect();
+        let held_out: Vec<PathBuf> = HELD_OUT_LISTS.iter().filter_map(file).collect();
         let Some(first) = held_out.first() else { return Ok(None) };
         let test = held_out.iter().map(|path| lines(path)).collect::<Result<Vec<_>>>()?.concat();
-        let train = TRAINED_ON.iter().find_map(file).map(|path| lines(&path)).transpose()?;
+        let train = TRAINING_LISTS.iter().find_map(file).map(|path| lines(&path)).transpose()?;
         Ok(Some(Self { source: first.display().to_string(), train, test }))
     }
 
-    /// Marks the views, and leaves out those that are in neither list where both are given. Lists that name none of the
-    /// views are of something else.
+    /// Marks the views, and omits views in neither list if both are given. Ignores lists that name none of the views,
+    /// because they belong to something else.
     pub(super) fn apply(&self, listing: &mut Listing) {
         let Self { source, train, test } = self;
-        let test = Names::new(test);
-        let train = train.as_ref().map(|train| Names::new(train));
+        let test = NameSet::new(test);
+        let train = train.as_ref().map(|train| NameSet::new(train));
         let held_out = listing.views.iter().filter(|view| test.has(view)).count();
         if held_out == 0 {
             let known = train.as_ref().is_some_and(|train| listing.views.iter().any(|view| train.has(view)));
             if test.count > 0 || known {
-                listing.notes.push(format!("{source} names no photo to hold out, so it is not used"));
+                listing.notes.push(format!("{source} names no photo to hold out, so it is ignored"));
             }
             return;
         }
@@ -72,11 +73,11 @@ impl Split {
             note += &format!("; {} more in the list are not in the scene", test.count - held_out);
         }
         if let Some(train) = train {
-            let (kept, left): (Vec<Listed>, Vec<Listed>) =
+            let (kept, left): (Vec<ListedPhoto>, Vec<ListedPhoto>) =
                 std::mem::take(&mut listing.views).into_iter().partition(|view| test.has(view) || train.has(view));
             if !left.is_empty() {
                 let names: Vec<&str> = left.iter().map(|view| view.name.as_str()).collect();
-                note += &format!("; {} in no list are left out: {}", counted(left.len(), "photo"), shortened(&names));
+                note += &format!("; {} in no list are omitted: {}", counted(left.len(), "photo"), shortened(&names));
             }
             listing.views = kept;
         }
@@ -84,15 +85,15 @@ impl Split {
     }
 }
 
-/// Names of a list, with and without folders and extensions.
-struct Names {
+/// Names in a list, with and without folders and extensions.
+struct NameSet {
     whole: HashSet<String>,
-    /// Without folders, if no two of the names share one.
+    /// Names without folders, unless two of them are equal.
     last: HashSet<String>,
     count: usize,
 }
 
-impl Names {
+impl NameSet {
     fn new(listed: &[String]) -> Self {
         let whole: HashSet<String> = listed.iter().map(|name| key(name)).collect();
         let last: HashSet<String> = whole.iter().map(|name| last(name).to_owned()).collect();
@@ -100,13 +101,13 @@ impl Names {
         Self { last: if last.len() == count { last } else { HashSet::new() }, whole, count }
     }
 
-    fn has(&self, view: &Listed) -> bool {
+    fn has(&self, view: &ListedPhoto) -> bool {
         let name = key(&view.name);
         self.whole.contains(&name) || (!name.contains('/') && self.last.contains(&name))
     }
 }
 
-/// Returns a name without its extension and the folder of photos.
+/// Returns a name without its extension and without the photo folder.
 fn key(name: &str) -> String {
     let name = name.trim().replace('\\', "/");
     let name = name.trim_start_matches("./").trim_start_matches("images/");

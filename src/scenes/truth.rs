@@ -1,4 +1,4 @@
-//! Ground-truth masks of single objects, as benchmarks ship them: a black and white image per object and frame.
+//! Ground-truth masks of single objects from benchmarks: a black and white image per object and frame.
 
 use super::resample::resample_ids;
 use super::window::Window;
@@ -21,26 +21,26 @@ pub struct TruthMask {
 }
 
 /// Extensions of masks.
-const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+const MASK_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// Lists the PNG and JPEG files below a folder by relative path, sorted. Hidden files are left out.
+/// Lists the PNG and JPEG files below a folder by relative path, sorted. Skips hidden files.
 pub fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     if !folder.is_dir() {
         return Err(Error::data(folder, "", "there is no such folder of true masks"));
     }
     let is_picture = |path: &PathBuf| {
-        path.extension().is_some_and(|found| EXTENSIONS.iter().any(|known| found.eq_ignore_ascii_case(known)))
+        path.extension().is_some_and(|found| MASK_EXTENSIONS.iter().any(|known| found.eq_ignore_ascii_case(known)))
     };
     let mut found: Vec<PathBuf> = below(folder)?.into_iter().map(PathBuf::from).filter(is_picture).collect();
     found.sort();
     Ok(found)
 }
 
-/// Reads the mask of an object in `view`. The object is where the value is above 128, or above 0 in a file without
-/// values above 1.
+/// Reads the mask of an object in `view`. A pixel belongs to the object if its value is above 128, or above 0 in a file
+/// without values above 1.
 ///
-/// The mask belongs to the original photo, and `windows` says how the view lies in it. It is compared at its own size,
-/// undistorted; if it is larger than the view, at the view's size (nearest).
+/// The mask belongs to the original photo, and `windows` maps the view to the photo. The comparison uses the mask's own
+/// size, undistorted, or the view's size if the mask is larger (nearest).
 pub fn read_truth(path: &Path, view: &View, windows: &BTreeMap<String, Window>) -> Result<TruthMask> {
     let (width, height, values) = read_grey(path)?;
     let stored;

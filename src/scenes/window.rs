@@ -2,27 +2,28 @@
 
 use super::lens::{Lens, Optics};
 use super::lookup::Lookup;
-use super::recipe::at_photo_size;
+use super::photo_recipe::at_photo_size;
 use glam::{DMat3, DVec2, DVec3};
 use labelgs_scene::{Camera, LabelMap, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Field of view up to which a photo becomes one view, radians: 110 degrees, where the border of a pinhole picture is
-/// stretched three times as much as its middle.
+/// A photo with a larger field of view, radians, becomes several views. At 110 degrees, a pinhole image stretches its
+/// border three times as much as its centre.
 const ONE_VIEW_ANGLE_MAX: f64 = 110.0 / 180.0 * std::f64::consts::PI;
-/// Share of the fitted field of view that a polynomial's own intrinsics have to show, which programs that undistort keep.
+/// A polynomial keeps its own intrinsics, like other programs that undistort, if they show at least this share of the
+/// fitted field of view.
 const OWN_VIEW_SHARE_MIN: f64 = 0.9;
 /// Most pixels of a view, relative to the photo.
-const PIXELS_TIMES_MAX: f64 = 2.0;
-/// Cells along a side of a face in which its covered part is searched.
-const CELLS: u32 = 64;
-/// Part of a face that the photo covers below which the face is left out.
+const PIXEL_RATIO_MAX: f64 = 2.0;
+/// Cells along a side of a face in the search for its covered part.
+const CELLS_PER_SIDE: u32 = 64;
+/// A face is omitted if the photo covers less than this share of it.
 const COVERED_SHARE_MIN: f64 = 0.02;
 
-/// The faces: name, and the axes of the view (right, down, forward) in those of the photo.
-const FACES: [(&str, [DVec3; 3]); 6] = [
+/// The faces: name, and the axes of the view (right, down, forward) in the photo's axes.
+const CUBE_FACES: [(&str, [DVec3; 3]); 6] = [
     ("front", [DVec3::X, DVec3::Y, DVec3::Z]),
     ("right", [DVec3::NEG_Z, DVec3::Y, DVec3::X]),
     ("back", [DVec3::NEG_X, DVec3::Y, DVec3::NEG_Z]),
@@ -34,7 +35,7 @@ const FACES: [(&str, [DVec3; 3]); 6] = [
 /// A pinhole view of a photo.
 #[derive(Clone, Debug)]
 pub struct Window {
-    /// Name of the view: that of the photo, or with the face before the extension (`00.left.jpg`).
+    /// Name of the view: the photo's name, or with the face before the extension (`00.left.jpg`).
     pub name: String,
     /// Name of the photo.
     pub photo: String,
@@ -42,12 +43,12 @@ pub struct Window {
     pub optics: Optics,
     /// Camera of the view at full size.
     pub camera: Camera,
-    /// Rotation from axes of the view to those of the photo.
+    /// Rotation from the view's axes to the photo's.
     turn: DMat3,
 }
 
 impl Window {
-    /// Returns the view that shows the photo as it is stored, whatever its lens.
+    /// Returns the view that shows the stored photo unchanged, whatever its lens.
     pub fn stored(name: &str, camera: &Camera) -> Self {
         Self::whole(name, &Optics::new(camera.clone(), Lens::Pinhole), camera.clone())
     }
@@ -59,9 +60,10 @@ impl Window {
 
     /// Returns the views of a photo, whose camera has the size of its file.
     ///
-    /// A lens up to `ONE_VIEW_ANGLE_MAX` becomes one view with the scale of the middle of the photo and the field of view between
-    /// the middles of its edges. A polynomial keeps focal lengths, principal point and size where these show `OWN_VIEW_SHARE_MIN` of
-    /// that. Wider lenses and panoramas become faces of 90 degrees at that scale, without what the photo does not cover.
+    /// A lens up to `ONE_VIEW_ANGLE_MAX` becomes a single view with the scale at the photo's centre and the field of
+    /// view between the centres of its edges. A polynomial keeps focal lengths, principal point and size if these show
+    /// at least `OWN_VIEW_SHARE_MIN` of that field of view. Wider lenses and panoramas become cube faces of 90 degrees
+    /// at that scale, without parts that the photo does not cover.
     pub fn all(name: &str, camera: &Camera, lens: &Lens) -> Vec<Self> {
         let optics = Optics::new(camera.clone(), *lens);
         if *lens == Lens::Pinhole {
@@ -70,11 +72,11 @@ impl Window {
         let edges = edges(&optics);
         if 2.0 * edges.into_iter().fold(0.0, f64::max) < ONE_VIEW_ANGLE_MAX {
             let fitted = fitted(&optics, edges);
-            let keeps =
-                matches!(lens, Lens::Polynomial(_)) && shows(camera).cmpge(OWN_VIEW_SHARE_MIN * shows(&fitted)).all();
+            let keeps = matches!(lens, Lens::Polynomial(_))
+                && plane_size(camera).cmpge(OWN_VIEW_SHARE_MIN * plane_size(&fitted)).all();
             return vec![Self::whole(name, &optics, if keeps { camera.clone() } else { fitted })];
         }
-        FACES.iter().filter_map(|&(face, axes)| Self::face(name, &optics, face, axes)).collect()
+        CUBE_FACES.iter().filter_map(|&(face, axes)| Self::face(name, &optics, face, axes)).collect()
     }
 
     /// Returns true if the view has the pixels of the photo.
@@ -82,7 +84,7 @@ impl Window {
         self.optics.lens.is_pinhole()
     }
 
-    /// Returns the place in the photo of a place in the view, px; `None` outside of the photo.
+    /// Returns the position in the photo of a position in the view, px; `None` outside the photo.
     pub fn source(&self, pixel: DVec2) -> Option<DVec2> {
         if self.is_photo() {
             return Some(pixel);
@@ -90,7 +92,7 @@ impl Window {
         self.optics.pixel(self.turn * self.camera.ray(pixel)).filter(|&at| self.optics.holds(at))
     }
 
-    /// Returns the place in the view of a direction in axes of the photo, px; `None` outside of the view.
+    /// Returns the position in the view of a direction in the photo's axes, px; `None` outside the view.
     fn target(&self, direction: DVec3) -> Option<DVec2> {
         let own = self.turn.transpose() * direction;
         let at = self.camera.project(own);
@@ -100,8 +102,8 @@ impl Window {
 
     fn face(name: &str, optics: &Optics, face: &str, axes: [DVec3; 3]) -> Option<Self> {
         let scale = scale(optics);
-        let pixels = PIXELS_TIMES_MAX * f64::from(optics.camera.width) * f64::from(optics.camera.height);
-        // An even side keeps the back of a panorama, where its borders meet, between two pixels.
+        let pixels = PIXEL_RATIO_MAX * f64::from(optics.camera.width) * f64::from(optics.camera.height);
+        // An even side puts the back of a panorama, where its borders meet, between two pixels.
         let half = (scale.x * scale.y).sqrt().min(pixels.sqrt() / 2.0).round().max(1.0);
         let turn = DMat3::from_cols(axes[0], axes[1], axes[2]);
         let photo = &optics.camera;
@@ -129,13 +131,13 @@ impl Window {
         Some(view)
     }
 
-    /// Returns the part of a whole face that the photo covers, px: left, top, right and bottom. It has the middle of the
-    /// face in it, because the principal point of a view lies in its picture.
+    /// Returns the part of a whole face that the photo covers, px: left, top, right and bottom. The part contains the
+    /// centre of the face, because the principal point of a view must be inside its image.
     fn covered(&self) -> Option<[u32; 4]> {
         let (side, half) = (self.camera.width, self.camera.width / 2);
-        let cell = f64::from(side) / f64::from(CELLS);
+        let cell = f64::from(side) / f64::from(CELLS_PER_SIDE);
         let (mut box_, mut count) = ([half.saturating_sub(1), half.saturating_sub(1), half + 1, half + 1], 0);
-        for (x, y) in (0..=CELLS).flat_map(|y| (0..=CELLS).map(move |x| (x, y))) {
+        for (x, y) in (0..=CELLS_PER_SIDE).flat_map(|y| (0..=CELLS_PER_SIDE).map(move |x| (x, y))) {
             let at = DVec2::new(f64::from(x), f64::from(y)) * cell;
             if self.source(at).is_none() {
                 continue;
@@ -150,12 +152,12 @@ impl Window {
                 box_[3].max(high.y as u32),
             ];
         }
-        (f64::from(count) >= COVERED_SHARE_MIN * f64::from((CELLS + 1).pow(2))).then_some(box_)
+        (f64::from(count) >= COVERED_SHARE_MIN * f64::from((CELLS_PER_SIDE + 1).pow(2))).then_some(box_)
     }
 }
 
-/// Returns how the views of `scene` (as in [`super::open`]) lie in their photos, by name of the view. Accepts photos anywhere and
-/// leaves out unreadable ones, because opening the scene has checked them.
+/// Returns how the views of `scene` (as in [`super::open`]) map to their photos, by view name. Accepts photos anywhere
+/// and omits unreadable ones, because they were checked when the scene was opened.
 pub fn windows(scene: &Path, lookup: &Lookup) -> Result<BTreeMap<String, Window>> {
     let mut found = BTreeMap::new();
     for listed in super::list(scene, &Lookup { allow_outside: true, ..lookup.clone() })?.views {
@@ -167,7 +169,7 @@ pub fn windows(scene: &Path, lookup: &Lookup) -> Result<BTreeMap<String, Window>
     Ok(found)
 }
 
-/// Returns the ids of a photo, at its size, from the maps of its views, each of any scale; 0 where no view is.
+/// Returns the ids of a photo, at its size, from the maps of its views, each of any scale; 0 where there is no view.
 pub fn ids_of_photo(views: &[(&Window, &LabelMap)]) -> Option<LabelMap> {
     let &[(first, map), ..] = views else { return None };
     if first.is_photo() {
@@ -187,7 +189,7 @@ pub fn ids_of_photo(views: &[(&Window, &LabelMap)]) -> Option<LabelMap> {
     Some(LabelMap { width, height, ids })
 }
 
-/// Returns the angles from the axis, radians, of the middles of the left, top, right and bottom edge.
+/// Returns the angles from the axis, radians, of the centres of the left, top, right and bottom edges.
 fn edges(optics: &Optics) -> [f64; 4] {
     let Camera { cx, cy, width, height, .. } = optics.camera;
     let angle = |x: f64, y: f64| match optics.direction(DVec2::new(x, y)) {
@@ -198,8 +200,8 @@ fn edges(optics: &Optics) -> [f64; 4] {
     [angle(0.0, cy), angle(cx, 0.0), angle(f64::from(width), cy), angle(cx, f64::from(height))]
 }
 
-/// Returns the width and height of the picture in the plane z = 1.
-fn shows(camera: &Camera) -> DVec2 {
+/// Returns the width and height of the image in the plane z = 1.
+fn plane_size(camera: &Camera) -> DVec2 {
     DVec2::new(f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy)
 }
 
@@ -212,20 +214,20 @@ fn scale(optics: &Optics) -> DVec2 {
     DVec2::new(x, y)
 }
 
-/// Returns the pinhole camera that sees as far as the middles of the edges.
+/// Returns the pinhole camera whose view reaches the centres of the edges.
 fn fitted(optics: &Optics, edges: [f64; 4]) -> Camera {
     let photo = &optics.camera;
     let tangents = edges.map(f64::tan);
     let size = DVec2::new(tangents[0] + tangents[2], tangents[1] + tangents[3]);
     let scale = scale(optics);
-    let pixels = PIXELS_TIMES_MAX * f64::from(photo.width) * f64::from(photo.height);
+    let pixels = PIXEL_RATIO_MAX * f64::from(photo.width) * f64::from(photo.height);
     let scale = scale * (pixels / (size * scale).element_product()).sqrt().min(1.0);
     let side = |side: f64| (side.round() as u32).max(1);
     let (width, height) = (side(size.x * scale.x), side(size.y * scale.y));
     Camera {
         fx: scale.x,
         fy: scale.y,
-        // Rounding may make the picture smaller than its left or upper part.
+        // Rounding may make the image smaller than its left or upper part.
         cx: (scale.x * tangents[0]).min(f64::from(width)),
         cy: (scale.y * tangents[1]).min(f64::from(height)),
         width,

@@ -2,12 +2,12 @@
 
 use super::SynthOptions;
 use labelgs_scene::{Camera, Error, Result, Setting};
-use labelgs_scenes::lens::{self, CameraModel, Lens, MODELS, Optics};
+use labelgs_scenes::lens::{self, CAMERA_MODELS, CameraModel, Lens, Optics};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 
 /// Typical lens coefficients for each of COLMAP's camera models, in COLMAP's order.
-const LENS_COEFFICIENTS: [&[f64]; MODELS.len()] = [
+const LENS_COEFFICIENTS: [&[f64]; CAMERA_MODELS.len()] = [
     &[],
     &[],
     &[-0.08],
@@ -42,8 +42,9 @@ impl FromStr for SynthLens {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let known = || format!("is not a camera model; expected one of {}", MODELS.map(|model| model.name).join(", "));
-        MODELS.iter().position(|model| model.name == name).map(Self).ok_or_else(known)
+        let known =
+            || format!("is not a camera model; expected one of {}", CAMERA_MODELS.map(|model| model.name).join(", "));
+        CAMERA_MODELS.iter().position(|model| model.name == name).map(Self).ok_or_else(known)
     }
 }
 
@@ -59,7 +60,7 @@ impl SynthLens {
 
     /// Returns all lenses.
     pub fn all() -> impl Iterator<Item = Self> {
-        (0..MODELS.len()).map(Self)
+        (0..CAMERA_MODELS.len()).map(Self)
     }
 
     /// Returns COLMAP's number of the camera model.
@@ -68,11 +69,11 @@ impl SynthLens {
     }
 
     fn model(self) -> &'static CameraModel {
-        lens::colmap_model(self.0).unwrap_or(&MODELS[0])
+        lens::colmap_model(self.0).unwrap_or(&CAMERA_MODELS[0])
     }
 
     fn lens(self) -> Lens {
-        (self.model().of_list)(LENS_COEFFICIENTS[self.0])
+        (self.model().from_list)(LENS_COEFFICIENTS[self.0])
     }
 
     /// Returns COLMAP's parameters for a camera with this lens.

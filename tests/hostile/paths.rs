@@ -118,7 +118,7 @@ fn names_that_are_no_files_are_refused() {
     for name in ["", ".", "./", "/", "..", "a\\u0000b"] {
         for allow in [false, true] {
             let text = refusal(refused(name, allow));
-            assert!(text.contains("no path of a file"), "`{name}`: {text}");
+            assert!(text.contains("not a file path"), "`{name}`: {text}");
         }
     }
 }

@@ -43,7 +43,7 @@ fn many_undecodable_photos_are_listed_up_to_twenty() {
     (25..30).for_each(|index| drop(scene.write(&format!("images/{index:02}.png"), b"no picture")));
     assert!(refusal(open(&scene, 1.0)).contains("30 of 30"), "none is left");
     for share in [-0.1, 1.5, f32::NAN] {
-        assert_eq!(exit_status(&open(&scene, share).expect_err("no share")), 2);
+        assert_eq!(exit_status(&open(&scene, share).expect_err("not a share")), 2);
     }
 }
 

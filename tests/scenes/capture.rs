@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use glam::DVec3;
 use labelgs::scene::{Dataset, Photo, Point};
-use labelgs::scenes::capture::{Fault, Report, scan};
+use labelgs::scenes::capture::{CaptureProblem, Report, scan};
 use labelgs::scenes::{LoadOptions, Lookup, open};
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ fn read(scene: &Path) -> Dataset {
 }
 
 /// Kinds and photos of the findings.
-fn found(report: &Report) -> Vec<(Fault, Option<&str>)> {
+fn found(report: &Report) -> Vec<(CaptureProblem, Option<&str>)> {
     report.findings.iter().map(|finding| (finding.fault, finding.view.as_deref())).collect()
 }
 
@@ -48,7 +48,7 @@ fn observations_are_those_of_the_list_that_was_read() {
     assert!(report(&scene).reprojection.is_some());
     let other = report(&list);
     assert_eq!(other.reprojection, None, "{other:?}");
-    assert!(other.findings.iter().all(|finding| finding.fault != Fault::Reprojection), "{other:?}");
+    assert!(other.findings.iter().all(|finding| finding.fault != CaptureProblem::Reprojection), "{other:?}");
 }
 
 #[test]
@@ -66,13 +66,13 @@ fn each_fault_is_found_in_its_photo() {
             .flat_map(|texel| &mut texel[..3])
             .for_each(|value| *value = (f32::from(*value) * 0.7) as u8);
     });
-    assert_eq!(found(&dark), [(Fault::Exposure, Some("003.png"))]);
+    assert_eq!(found(&dark), [(CaptureProblem::Exposure, Some("003.png"))]);
     assert!((dark.views[3].gain.expect("a gain") - 0.7).abs() < 0.05, "{:?}", dark.views[3]);
 
     let tinted = with_photo(&scene, 4, |photo| {
         photo.rgba.iter_mut().for_each(|texel| texel[2] = (f32::from(texel[2]) * 0.8) as u8);
     });
-    assert_eq!(found(&tinted), [(Fault::WhiteBalance, Some("004.png"))]);
+    assert_eq!(found(&tinted), [(CaptureProblem::WhiteBalance, Some("004.png"))]);
     let [red, green, blue] = tinted.views[4].channel_gains.expect("gains");
     assert!((blue / red - 0.8).abs() < 0.05 && (green / red - 1.0).abs() < 0.05, "{:?}", tinted.views[4]);
 
@@ -92,11 +92,11 @@ fn each_fault_is_found_in_its_photo() {
             }
         }
     });
-    assert_eq!(found(&blurred), [(Fault::Blur, Some("005.png"))]);
+    assert_eq!(found(&blurred), [(CaptureProblem::Blur, Some("005.png"))]);
 
     let mut stray = read(&scene);
     stray.points[7].position *= 1e5;
-    assert_eq!(found(&scan(&scene, &Lookup::default(), &stray).expect("a scan")), [(Fault::Scale, None)]);
+    assert_eq!(found(&scan(&scene, &Lookup::default(), &stray).expect("a scan")), [(CaptureProblem::Scale, None)]);
 }
 
 /// Places of the parts of `images.bin`: of each image its pose, and the number of its points with what follows them.
@@ -139,7 +139,7 @@ fn points_behind_the_cameras_are_a_finding_of_the_photo_or_of_the_scene() {
     turn(&scene, |index| index < 3);
     let few = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
     let photos = ["000.png", "001.png", "002.png"];
-    assert_eq!(found(&few), photos.map(|name| (Fault::Behind, Some(name))), "{:?}", few.findings);
+    assert_eq!(found(&few), photos.map(|name| (CaptureProblem::Behind, Some(name))), "{:?}", few.findings);
     let (view, points) = (&few.views[1], sound.views[1].points);
     // A few points lie at the edge of the photo.
     assert!(view.reprojection.is_none() && (points..points + 5).contains(&view.behind), "{view:?}");
@@ -148,7 +148,7 @@ fn points_behind_the_cameras_are_a_finding_of_the_photo_or_of_the_scene() {
 
     turn(&scene, |index| (3..15).contains(&index));
     let most = scan(&scene, &Lookup::default(), &read(&scene)).expect("a scan");
-    assert_eq!(found(&most), [(Fault::Behind, None)], "{:?}", most.findings);
+    assert_eq!(found(&most), [(CaptureProblem::Behind, None)], "{:?}", most.findings);
     let finding = &most.findings[0];
     assert!(finding.text.starts_with("15 of 16 photos, such as 000.png: "), "{finding:?}");
     assert!(finding.cure.contains("axes") && !finding.cure.contains("leave"), "{finding:?}");
@@ -169,7 +169,7 @@ fn photos_that_all_share_nothing_are_one_finding() {
         view.camera.translation.z = -view.camera.translation.z;
     }
     let report = scan(&scene, &Lookup::default(), &dataset).expect("a scan");
-    let alone: Vec<_> = report.findings.iter().filter(|finding| finding.fault == Fault::Alone).collect();
+    let alone: Vec<_> = report.findings.iter().filter(|finding| finding.fault == CaptureProblem::Alone).collect();
     assert!(matches!(alone[..], [one] if one.view.is_none() && one.text.starts_with("16 of 16 photos")), "{alone:?}");
     assert!(!alone[0].cure.contains("leave"), "{alone:?}");
 }
@@ -181,9 +181,13 @@ fn a_camera_far_away_does_not_hide_a_stray_point() {
     let scene = made(folder.path());
     let mut dataset = read(&scene);
     dataset.train[0].camera.translation.z += 2e4;
-    assert!(!found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
+    assert!(
+        !found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(CaptureProblem::Scale, None))
+    );
     dataset.points[7].position *= 1e5;
-    assert!(found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(Fault::Scale, None)));
+    assert!(
+        found(&scan(&scene, &Lookup::default(), &dataset).expect("a scan")).contains(&(CaptureProblem::Scale, None))
+    );
 }
 
 /// A laser scan has many points, and nothing says which photo shows which: a sample of them tells how bright photos are, and
@@ -212,7 +216,7 @@ fn dense_points_tell_the_exposure_by_a_sample() {
         })
         .expect("in memory");
     let report = scan(&scene, &Lookup::default(), &dataset).expect("a scan");
-    assert_eq!(found(&report), [(Fault::Exposure, Some("003.png"))], "{:?}", report.findings);
+    assert_eq!(found(&report), [(CaptureProblem::Exposure, Some("003.png"))], "{:?}", report.findings);
     let view = &report.views[3];
     assert!(view.points > 5000 && view.reprojection.is_none(), "{view:?}");
     assert!((view.gain.expect("a gain") - 0.7).abs() < 0.05, "{view:?}");
@@ -243,11 +247,11 @@ fn wrong_poses_and_lonely_photos_are_reported() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let finding = &report["report"]["findings"][0];
     assert_eq!((&finding["fault"], &finding["view"]), (&"reprojection".into(), &"000.png".into()), "{report}");
-    assert!(finding["cure"].as_str().is_some_and(|cure| cure.contains("leave the photo out")), "{finding}");
+    assert!(finding["cure"].as_str().is_some_and(|cure| cure.contains("remove the photo")), "{finding}");
 
     let mut alone = read(&scene);
     let camera = &mut alone.train[9].camera;
     camera.translation.z -= 50.0;
     let report = scan(&scene, &Lookup::default(), &alone).expect("a scan");
-    assert!(found(&report).contains(&(Fault::Alone, Some("009.png"))), "{:?}", report.findings);
+    assert!(found(&report).contains(&(CaptureProblem::Alone, Some("009.png"))), "{:?}", report.findings);
 }

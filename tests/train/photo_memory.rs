@@ -77,9 +77,9 @@ fn photos_without_a_place_are_decoded_again() {
         std::fs::remove_file(&second).expect("removed");
         let view = |name: &str| few.all().into_iter().find(|view| view.name.starts_with(name)).expect("a view").clone();
         let changed = view("000").photo().expect_err("it has changed").to_string();
-        assert!(changed.contains("images/000.png: has other pixels than when the scene was opened"), "{changed}");
+        assert!(changed.contains("images/000.png: has different pixels than when the scene was opened"), "{changed}");
         let gone = view("001").photo().expect_err("it is gone").to_string();
-        assert!(gone.contains("images/001.png") && gone.contains("bring it back"), "{gone}");
+        assert!(gone.contains("images/001.png") && gone.contains("restore it and resume"), "{gone}");
         assert!(view("001").mask().is_ok());
     }
 }

@@ -1,7 +1,7 @@
 //! `labelgs check`: faults of a capture before training.
 
 use crate::cli::support::{Context, ReadArgs};
-use crate::scenes::capture::{Fault, Finding, Report, scan};
+use crate::scenes::capture::{CaptureProblem, Finding, Report, scan};
 use crate::scenes::{self, LoadOptions};
 use crate::words::counted;
 use crate::{Error, Result};
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &CheckArgs, context: &Context) -> Result<()> {
     let is_found = |note: &&String| dataset.flaws.iter().any(|flaw| flaw.text() == *note);
     dataset.notes.iter().filter(|note| !is_found(note)).for_each(|note| tracing::warn!("{note}"));
     let report = scan(&args.scene, &args.read.lookup(), &dataset)?;
-    let mut counts: BTreeMap<Fault, usize> = BTreeMap::new();
+    let mut counts: BTreeMap<CaptureProblem, usize> = BTreeMap::new();
     report.findings.iter().for_each(|finding| *counts.entry(finding.fault).or_default() += 1);
     let scene = args.scene.display().to_string();
     let found = json!({ "schema_version": 1, "scene": scene, "counts": counts, "report": report });
@@ -75,7 +75,7 @@ fn table(report: &Report) -> String {
 /// Returns the command of a cure that is one.
 fn typed(finding: &Finding) -> &'static str {
     match finding.fault {
-        Fault::Surroundings => ": labelgs train SCENE --masks DIR --masked-only -o OUT",
+        CaptureProblem::Surroundings => ": labelgs train SCENE --masks DIR --masked-only -o OUT",
         _ => "",
     }
 }

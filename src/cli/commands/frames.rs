@@ -93,7 +93,7 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
         progress.set(index as u64 + 1, String::new);
     }
     drop(progress);
-    let path = args.output.join(frames::FILE);
+    let path = args.output.join(frames::FILE_NAME);
     // Written last: its presence means that the video is complete.
     Frames::new(written, lenses).write(&path)?;
     let (path, frames, photos) = (path.display().to_string(), stops.len(), views.len());

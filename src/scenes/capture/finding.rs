@@ -1,31 +1,31 @@
-//! What a scan finds: kinds, texts, cures.
+//! Findings of a scan: kinds, texts and cures.
 
 use labelgs_scene::SceneProblem;
 use labelgs_scene::words::name_of;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A kind of fault in a capture.
+/// A kind of problem in a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Fault {
-    /// Photos that the scene lists were left out.
+pub enum CaptureProblem {
+    /// Photos of the scene were omitted.
     LeftOut,
     /// Photos of the capture have no pose.
     Unposed,
-    /// Poses and points are not in one frame.
+    /// Poses and points do not share a frame.
     Frame,
-    /// Most points that the photo is said to show lie behind its camera.
+    /// Most points that the photo should show lie behind its camera.
     Behind,
     /// Points are far from where the photo shows them.
     Reprojection,
-    /// The photo is less sharp than those beside it.
+    /// The photo is less sharp than its neighbours.
     Blur,
-    /// The photo is brighter or darker than the mean photo, by the points that photos share.
+    /// The photo is brighter or darker than the mean photo, judged by shared points.
     Exposure,
-    /// The photo has another tint than the mean photo, by the points that photos share.
+    /// The photo's tint differs from the mean photo's, judged by shared points.
     WhiteBalance,
-    /// Hardly any point of the photo is seen by others.
+    /// Hardly any of the photo's points appears in other photos.
     Alone,
     /// The surroundings do not follow the poses, as around an object on a turntable.
     Surroundings,
@@ -33,30 +33,30 @@ pub enum Fault {
     Scale,
 }
 
-impl Fault {
+impl CaptureProblem {
     /// Returns the display name.
     pub fn text(self) -> String {
         name_of(&self).replace('-', " ")
     }
 
-    /// Returns what to do about it.
+    /// Returns what to do about the problem.
     pub fn cure(self) -> &'static str {
         match self {
-            Self::LeftOut => "bring them back or mend them, or take them off the list",
+            Self::LeftOut => "restore or repair them, or remove them from the list",
             Self::Unposed => "find the poses of all photos in one model, with more overlap, or take the larger model",
-            Self::Frame => "say what the poses mean, or export poses and points in the convention of their format",
-            Self::Behind | Self::Reprojection => "leave the photo out, or adjust the reconstruction again",
-            Self::Blur => "leave the photo out",
+            Self::Frame => "set the pose convention, or export poses and points in the convention of their format",
+            Self::Behind | Self::Reprojection => "remove the photo, or run the bundle adjustment again",
+            Self::Blur => "remove the photo",
             Self::Exposure | Self::WhiteBalance => {
                 "train gains of each photo (exposure), or take photos with fixed exposure and white balance"
             }
-            Self::Alone => "leave the photo out, or add photos between it and the others",
+            Self::Alone => "remove the photo, or add photos between it and the others",
             Self::Surroundings => "make masks of the object, and train it alone (masked_only)",
-            Self::Scale => "scale and centre the reconstruction, or remove stray points",
+            Self::Scale => "scale and centre the reconstruction, or remove outlier points",
         }
     }
 
-    /// Returns what to do about it where most photos have it: they cannot all be left out.
+    /// Returns the cure if most photos have the problem, so that removing them is no option.
     fn cure_of_most(self) -> &'static str {
         match self {
             Self::Behind => {
@@ -64,21 +64,21 @@ impl Fault {
                  says"
             }
             Self::Alone => {
-                "take poses and points from one reconstruction, with the axes that its format says; if they are, match the \
+                "take poses and points from the same reconstruction, with the axes of its format; if they are, match \
                  photos again with more overlap"
             }
-            Self::Reprojection => "adjust the reconstruction again",
+            Self::Reprojection => "run the bundle adjustment again",
             _ => self.cure(),
         }
     }
 }
 
-/// A fault of a capture.
+/// A problem of a capture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// Kind.
-    pub fault: Fault,
-    /// Name of the photo, if the fault is that of one.
+    pub fault: CaptureProblem,
+    /// Name of the photo, if the problem concerns one.
     pub view: Option<String>,
     /// Description with numbers.
     pub text: String,
@@ -87,27 +87,27 @@ pub struct Finding {
 }
 
 impl Finding {
-    pub(super) fn new(fault: Fault, view: Option<&str>, text: String) -> Self {
+    pub(super) fn new(fault: CaptureProblem, view: Option<&str>, text: String) -> Self {
         Self { fault, view: view.map(str::to_owned), text, cure: fault.cure() }
     }
 }
 
-/// Returns a flaw of the scene as a finding.
-pub(super) fn of_flaw(flaw: &SceneProblem) -> Finding {
+/// Converts a problem found while reading the scene to a finding.
+pub(super) fn from_scene_problem(flaw: &SceneProblem) -> Finding {
     let fault = match flaw {
-        SceneProblem::LeftOut(_) => Fault::LeftOut,
-        SceneProblem::Unposed(_) => Fault::Unposed,
-        SceneProblem::Frame(_) => Fault::Frame,
+        SceneProblem::LeftOut(_) => CaptureProblem::LeftOut,
+        SceneProblem::Unposed(_) => CaptureProblem::Unposed,
+        SceneProblem::Frame(_) => CaptureProblem::Frame,
     };
     Finding::new(fault, None, flaw.text().to_owned())
 }
 
-/// Returns findings by kind and photo. One for the scene replaces those of the same kind in most of its `views`: they have one
-/// cause.
+/// Sorts findings by kind and photo. A kind found in most of the `views` becomes a single finding about the scene,
+/// because it has a single cause.
 pub(super) fn joined(found: Vec<Finding>, views: usize) -> Vec<Finding> {
-    let mut kinds: BTreeMap<Fault, Vec<Finding>> = BTreeMap::new();
+    let mut kinds: BTreeMap<CaptureProblem, Vec<Finding>> = BTreeMap::new();
     found.into_iter().for_each(|finding| kinds.entry(finding.fault).or_default().push(finding));
-    let of_kind = |(fault, mut found): (Fault, Vec<Finding>)| {
+    let of_kind = |(fault, mut found): (CaptureProblem, Vec<Finding>)| {
         found.sort_by(|a, b| a.view.cmp(&b.view));
         let (of_views, of_scene): (Vec<_>, Vec<_>) = found.into_iter().partition(|of| of.view.is_some());
         match &of_views[..] {

@@ -1,25 +1,26 @@
-//! How bright photos are relative to each other, from the points that they share.
+//! The brightness of photos relative to each other, from shared points.
 //!
-//! A photo shows a point in the point's own colour times the photo's gain. Both are found together, with the least sum of
-//! absolute differences of logarithms: a photo is compared with the mean exposure of all, not with whatever exposure its
-//! neighbours have.
+//! A photo shows a point with the point's colour times the photo's gain. Both are found together by minimising the sum
+//! of absolute differences of logarithms. So a photo is compared with the mean exposure of all photos, whatever the
+//! exposure of its neighbours.
 
-use super::shown::{Mark, Shown};
+use super::shown_points::{Mark, ShownPoints};
 use labelgs_scene::stage::Stage;
 use labelgs_scene::{Result, View, parallel};
 use rayon::prelude::*;
 
 /// Fewest shared points for a gain.
 const POINTS_MIN: usize = 20;
-/// Pixels darker or brighter than these say nothing about exposure.
+/// Darker and brighter pixels carry no information about exposure.
 const BRIGHTNESS_MIN: f64 = 0.04;
 const BRIGHTNESS_MAX: f64 = 0.95;
-/// Rounds of reweighted least squares, and of conjugate gradients in each.
-const ROUNDS: usize = 15;
-const DESCENTS: usize = 60;
-/// Differences of logarithms below this have equal weight.
+/// Iterations of reweighted least squares, and of conjugate gradients in each.
+const REWEIGHTINGS: usize = 15;
+const GRADIENT_STEPS: usize = 60;
+/// Smaller differences of logarithms have equal weight.
 const DIFFERENCE_MIN: f64 = 0.02;
-/// Weight of a gain of 1, against 1 / |difference| for each point: a handful of points that disagree do not make a gain.
+/// Weight of a gain of 1, against 1 / |difference| per point, so that a few inconsistent points do not determine a
+/// gain.
 const PRIOR_WEIGHT: f64 = 100.0;
 
 /// Brightness of a photo relative to the mean of all photos.
@@ -47,8 +48,8 @@ fn samples(view: &View, marks: &[Mark]) -> Result<Vec<Sample>> {
     Ok(marks.iter().filter_map(sample).collect())
 }
 
-/// Returns the gains of each photo; none with too few points that another photo shows too. A sample of the points tells them.
-pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>> {
+/// Returns the gains of each photo, or `None` if it shares too few points. Uses a sample of the points.
+pub(super) fn gains(views: &[&View], shown: &ShownPoints) -> Result<Vec<Option<Gains>>> {
     let (points, marks) = shown.sample();
     let of_photo = |index: usize| samples(views[index], &marks[index]);
     let samples = parallel::map_bounded(
@@ -60,7 +61,7 @@ pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>
     let samples: Vec<Vec<Sample>> = samples.into_iter().collect::<Result<_>>()?;
     let _stage = Stage::new("finding the exposures of photos", 0);
     let channels: Vec<Vec<Option<f64>>> =
-        (0..4).into_par_iter().map(|channel| relative(&samples, points, channel)).collect();
+        (0..4).into_par_iter().map(|channel| relative_gains(&samples, points, channel)).collect();
     let of_view = |view: usize| {
         let [grey, red, green, blue] = [0, 1, 2, 3].map(|channel: usize| channels[channel][view]);
         Some(Gains { grey: grey?, channels: [red?, green?, blue?] })
@@ -68,7 +69,7 @@ pub(super) fn gains(views: &[&View], shown: &Shown) -> Result<Vec<Option<Gains>>
     Ok((0..views.len()).map(of_view).collect())
 }
 
-/// A point in a photo: logarithm of its brightness, and its weight.
+/// A point in a photo: the logarithm of its brightness, and its weight.
 struct Entry {
     view: usize,
     point: usize,
@@ -76,7 +77,7 @@ struct Entry {
     weight: f64,
 }
 
-/// Weighted means over the entries of each point.
+/// Returns the weighted mean over the entries of each point.
 fn point_means(entries: &[Entry], points: usize, of: impl Fn(&Entry) -> f64) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0); points];
     for entry in entries {
@@ -86,22 +87,22 @@ fn point_means(entries: &[Entry], points: usize, of: impl Fn(&Entry) -> f64) -> 
     sums.into_iter().map(|(sum, weight)| if weight > 0.0 { sum / weight } else { 0.0 }).collect()
 }
 
-/// Weighted sums over the entries of each view of the difference from their point's mean, and the prior's part.
-fn apart(entries: &[Entry], points: usize, logs: &[f64], of: impl Fn(&Entry) -> f64) -> Vec<f64> {
+/// Returns the weighted sum over each view's entries of the difference from their point's mean, plus the prior's term.
+fn residual_sums(entries: &[Entry], points: usize, logs: &[f64], of: impl Fn(&Entry) -> f64) -> Vec<f64> {
     let means = point_means(entries, points, &of);
     let mut sums: Vec<f64> = logs.iter().map(|log| PRIOR_WEIGHT * log).collect();
     entries.iter().for_each(|entry| sums[entry.view] += entry.weight * (of(entry) - means[entry.point]));
     sums
 }
 
-/// Minimises the weighted squares over the gains by conjugate gradients; the colours of points are eliminated.
+/// Minimises the weighted squares over the gains by conjugate gradients, with the points' colours eliminated.
 fn descend(entries: &[Entry], points: usize, logs: &mut [f64]) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let less: Vec<f64> = logs.iter().map(|log| -log).collect();
-    let mut residual = apart(entries, points, &less, |entry| entry.value + less[entry.view]);
+    let mut residual = residual_sums(entries, points, &less, |entry| entry.value + less[entry.view]);
     let (mut direction, mut square) = (residual.clone(), dot(&residual, &residual));
-    for _ in 0..DESCENTS {
-        let along = apart(entries, points, &direction, |entry| direction[entry.view]);
+    for _ in 0..GRADIENT_STEPS {
+        let along = residual_sums(entries, points, &direction, |entry| direction[entry.view]);
         let curvature = dot(&direction, &along);
         if square <= 1e-16 || curvature <= 0.0 {
             return;
@@ -115,8 +116,8 @@ fn descend(entries: &[Entry], points: usize, logs: &mut [f64]) {
     }
 }
 
-/// Returns the gain of each photo in one channel. Their geometric mean is 1.
-fn relative(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec<Option<f64>> {
+/// Returns the gain of each photo in a channel. The geometric mean of all gains is 1.
+fn relative_gains(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec<Option<f64>> {
     let mut shown_by = vec![0_u32; points];
     samples.iter().flatten().for_each(|&(point, _)| shown_by[point] += 1);
     let shared = |view: usize| samples[view].iter().filter(|&&(point, _)| shown_by[point] >= 2);
@@ -127,7 +128,7 @@ fn relative(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec<Optio
         .flat_map(|view| shared(view).map(move |sample| entry(view, sample)))
         .collect();
     let mut logs = vec![0.0; samples.len()];
-    for _ in 0..ROUNDS {
+    for _ in 0..REWEIGHTINGS {
         descend(&entries, points, &mut logs);
         let means = point_means(&entries, points, |entry| entry.value - logs[entry.view]);
         for entry in &mut entries {
@@ -141,7 +142,7 @@ fn relative(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec<Optio
 
 #[cfg(test)]
 mod tests {
-    use super::relative;
+    use super::relative_gains;
 
     /// Photos in a row, each of which shares points with the next two: gains are relative to all photos, not to neighbours.
     /// The pull to 1 does not count with as many points.
@@ -154,7 +155,7 @@ mod tests {
             shown.map(|point| (point, [(gains[view] * colour(point)).ln(); 4])).collect()
         };
         let samples: Vec<Vec<_>> = (0..gains.len()).map(photo).chain([Vec::new()]).collect();
-        let found = relative(&samples, 3000, 0);
+        let found = relative_gains(&samples, 3000, 0);
         let mean = gains.iter().map(|gain| gain.ln()).sum::<f64>() / gains.len() as f64;
         for (view, gain) in gains.iter().enumerate() {
             let expected = (gain.ln() - mean).exp();

@@ -1,26 +1,26 @@
-//! Sharpness of photos, and what is found of their brightness and white balance.
+//! Measures the sharpness of photos, and finds problems of sharpness, brightness and white balance.
 
-use super::{Fault, Finding, ViewReport};
+use super::{CaptureProblem, Finding, ViewReport};
 use labelgs_files::resize::{bounded_size, shrink_photo};
 use labelgs_scene::median::median;
 use labelgs_scene::{Photo, Pixels, Result, View, parallel};
 
-/// Longest side of the photos that are compared, px: noise of sensors is gone at this size.
+/// Longest side of the compared photos, px: sensor noise vanishes at this size.
 const SIDE_MAX: u32 = 800;
-/// Photos that a photo's sharpness is compared with, the nearest by place.
+/// Number of nearest photos, by position, with which a photo's sharpness is compared.
 const PHOTOS_BESIDE: usize = 6;
-/// Sharpness relative to theirs below which a photo is blurred.
+/// A photo is blurred if its sharpness relative to the others is below this value.
 const SHARPNESS_MIN: f64 = 0.4;
-/// Brightness relative to the others, up or down, from which a photo's exposure differs.
+/// A photo's exposure differs if its brightness relative to the others exceeds this factor, up or down.
 const GAIN_MAX: f64 = 1.15;
-/// Gain of a colour channel over that of another from which a photo's white balance differs.
+/// A photo's white balance differs if the gains of two channels differ by more than this factor.
 const TINT_MAX: f64 = 1.15;
 
 pub(super) fn grey([r, g, b, _]: [u8; 4]) -> f64 {
     (0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b)) / 255.0
 }
 
-/// Mean square of the Laplacian over that of the brightness: fine detail at any exposure.
+/// Returns the mean squared Laplacian divided by the mean squared brightness: fine detail at any exposure.
 fn detail(photo: &Photo) -> f64 {
     let (width, height) = bounded_size((photo.width, photo.height), Some(SIDE_MAX));
     let small = shrink_photo(photo, width, height);
@@ -38,7 +38,7 @@ fn detail(photo: &Photo) -> f64 {
     if count > 0.0 && light > 0.0 { sum / light } else { f64::NAN }
 }
 
-/// Returns the sharpness of each photo relative to the photos beside it.
+/// Returns the sharpness of each photo relative to its neighbours.
 pub(super) fn sharpness(views: &[&View]) -> Result<Vec<Option<f64>>> {
     let of_view = |view: &View| {
         let photo = view.photo.as_ref().map(Pixels::get).transpose()?;
@@ -56,30 +56,30 @@ pub(super) fn sharpness(views: &[&View]) -> Result<Vec<Option<f64>>> {
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
         let usual = median(near.iter().take(PHOTOS_BESIDE).map(|&(_, detail)| detail))?;
-        // The square root: half is half the contrast of fine detail.
+        // The square root makes half the contrast of fine detail a sharpness of one half.
         (usual > 0.0).then_some((details[index]? / usual).sqrt())
     };
     Ok(views.iter().enumerate().map(relative).collect())
 }
 
-/// Finds blurred photos, and photos with another exposure or white balance.
+/// Finds blurred photos, and photos with a different exposure or white balance.
 pub(super) fn findings(views: &[ViewReport]) -> Vec<Finding> {
     let mut found = Vec::new();
     for view in views {
         if let Some(sharpness) = view.sharpness.filter(|&sharpness| sharpness < SHARPNESS_MIN) {
-            let text = format!("has {:.0} % of the fine detail of the photos beside it", 100.0 * sharpness);
-            found.push(Finding::new(Fault::Blur, Some(&view.name), text));
+            let text = format!("has {:.0} % of the fine detail of its neighbours", 100.0 * sharpness);
+            found.push(Finding::new(CaptureProblem::Blur, Some(&view.name), text));
         }
         if let Some(gain) = view.gain.filter(|&gain| !(1.0 / GAIN_MAX..=GAIN_MAX).contains(&gain)) {
-            let text = format!("is {gain:.2} times as bright as the mean photo, by the points that photos share");
-            found.push(Finding::new(Fault::Exposure, Some(&view.name), text));
+            let text = format!("is {gain:.2} times as bright as the mean photo, judged by shared points");
+            found.push(Finding::new(CaptureProblem::Exposure, Some(&view.name), text));
         }
         if let Some([red, green, blue]) = view.channel_gains
             && red.max(green).max(blue) > TINT_MAX * red.min(green).min(blue)
         {
             let text =
                 format!("has {red:.2}, {green:.2} and {blue:.2} times the red, green and blue of the mean photo");
-            found.push(Finding::new(Fault::WhiteBalance, Some(&view.name), text));
+            found.push(Finding::new(CaptureProblem::WhiteBalance, Some(&view.name), text));
         }
     }
     found

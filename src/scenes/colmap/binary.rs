@@ -1,4 +1,4 @@
-//! The binary files: little-endian, fixed widths, a count in front. No memory is allocated by a count alone.
+//! The binary files: little-endian, fixed widths, counts first. No memory is allocated from a count alone.
 
 use super::model::{CameraRecord, ImageRecord, unknown_model};
 use crate::lens;
@@ -8,11 +8,11 @@ use labelgs_scene::{Error, Point, Result};
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// Most bytes in the file name of an image.
+/// Most bytes in an image's file name.
 const NAME_MAX: u64 = 4096;
 
-/// A file that is read front to back, with its position.
-struct Source {
+/// A file that is read sequentially, with its position.
+struct BinaryReader {
     path: PathBuf,
     file: BufReader<read::Source>,
     length: u64,
@@ -21,7 +21,7 @@ struct Source {
     record: (&'static str, u64, u64),
 }
 
-impl Source {
+impl BinaryReader {
     fn open(path: &Path) -> Result<Self> {
         let file = read::open(path)?;
         let length = file.get_ref().length().map_err(Error::read(path))?;
@@ -67,7 +67,7 @@ impl Source {
         let left = self.length - self.at.min(self.length);
         let bytes = u128::from(count) * u128::from(size);
         if bytes > u128::from(left) {
-            return Err(self.error(format!("{count} {what} take {bytes} bytes, {left} are left; the file is damaged")));
+            return Err(self.error(format!("{count} {what} take {bytes} bytes; only {left} are left: damaged file")));
         }
         self.file.seek_relative(bytes as i64).map_err(Error::read(&self.path))?;
         self.at += bytes as u64;
@@ -85,7 +85,7 @@ impl Source {
         Ok(name)
     }
 
-    /// Reads the count in front, then calls `record` for each record.
+    /// Reads the leading count, then calls `record` for each record.
     fn records<T>(mut self, kind: &'static str, mut record: impl FnMut(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let count = self.u64()?;
         let mut all = Vec::new();
@@ -98,7 +98,7 @@ impl Source {
 }
 
 pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
-    Source::open(path)?.records("camera", |source| {
+    BinaryReader::open(path)?.records("camera", |source| {
         let (id, number) = (source.u32()?, source.u32()?);
         let (width, height) = (source.u64()?, source.u64()?);
         let Some(model) = lens::colmap_model(number as usize) else {
@@ -111,12 +111,12 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
 
 /// Returns the number of records of a file.
 pub(super) fn count(path: &Path) -> Result<u64> {
-    Source::open(path)?.u64()
+    BinaryReader::open(path)?.u64()
 }
 
-/// Reads `images.bin`, with the observations of points if they are asked for.
+/// Reads `images.bin`, with the observations of points on request.
 pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRecord>> {
-    Source::open(path)?.records("image", |source| {
+    BinaryReader::open(path)?.records("image", |source| {
         let id = source.u32()?;
         let (quaternion, translation) = (source.f64s()?, source.f64s()?);
         let (camera, name) = (source.u32()?, source.name()?);
@@ -139,7 +139,7 @@ pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<ImageRe
 
 /// Reads `points3D.bin` with the ids, without the tracks.
 pub(super) fn points(path: &Path) -> Result<Vec<(u64, Point)>> {
-    Source::open(path)?.records("point", |source| {
+    BinaryReader::open(path)?.records("point", |source| {
         let id = source.u64()?;
         let position = DVec3::from_array(source.f64s()?);
         let colour = source.bytes()?;

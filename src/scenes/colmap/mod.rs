@@ -1,15 +1,15 @@
 //! COLMAP sparse models: `cameras`, `images` and `points3D`, binary or text.
 //!
-//! Poses are camera-from-world with OpenCV axes, and the centre of pixel (0, 0) is at (0.5, 0.5). Both conventions are
-//! ours, so nothing is converted. The `rigs` and `frames` files of newer versions are not read.
+//! Poses are camera-from-world with OpenCV axes, and the centre of pixel (0, 0) is at (0.5, 0.5). These are also the
+//! conventions of labelgs, so nothing is converted. The `rigs` and `frames` files of newer versions are ignored.
 
 mod binary;
 mod model;
 mod text;
 pub mod write;
 
-use super::listed_path::Place;
-use super::listing::{DISTANCE_MAX, Listed, Listing, check_camera, require_some};
+use super::listed_path::SceneFolder;
+use super::listing::{DISTANCE_MAX, ListedPhoto, Listing, check_camera, require_some};
 use super::pose_convention::Native;
 use crate::points;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -21,23 +21,23 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Folders below the scene that may hold the model, in order of preference.
-const FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
+/// Subfolders of the scene that may contain the model, in order of preference.
+const MODEL_FOLDERS: [&str; 4] = ["sparse/0", "sparse", "colmap/sparse/0", "."];
 
-/// The files of a model, each in its own form.
-struct Files {
+/// The files of a model, each binary or text.
+struct ModelFiles {
     folder: PathBuf,
 }
 
-impl Files {
+impl ModelFiles {
     /// Finds a model below `root`.
     fn find(root: &Path) -> Option<Self> {
-        let files = FOLDERS.iter().map(|folder| Self { folder: root.join(folder) });
+        let files = MODEL_FOLDERS.iter().map(|folder| Self { folder: root.join(folder) });
         files.into_iter().find(|files| files.path("cameras").is_some() && files.path("images").is_some())
     }
 
-    /// Returns a file and whether it is binary. Files of one form belong together: binary wins over text where cameras and
-    /// images have it.
+    /// Returns a file and whether it is binary. All files use the same form: binary if cameras and images have it,
+    /// otherwise text.
     fn path(&self, stem: &str) -> Option<(PathBuf, bool)> {
         let file = |stem: &str, extension: &str| Some(self.folder.join(stem).with_extension(extension));
         let is_there = |stem: &str, extension: &str| file(stem, extension).is_some_and(|path| path.is_file());
@@ -48,11 +48,11 @@ impl Files {
     }
 
     fn needed(&self, stem: &str) -> Result<(PathBuf, bool)> {
-        self.path(stem).ok_or_else(|| Error::data(self.folder.join(stem), "", "is gone"))
+        self.path(stem).ok_or_else(|| Error::data(self.folder.join(stem), "", "no longer exists"))
     }
 
     /// Reads the images, with the cameras that took them.
-    fn views(&self, scene: &Place, with_observations: bool) -> Result<Views> {
+    fn views(&self, scene: &SceneFolder, with_observations: bool) -> Result<ModelViews> {
         let (cameras_path, is_binary) = self.needed("cameras")?;
         let cameras = if is_binary { binary::cameras(&cameras_path) } else { text::cameras(&cameras_path) }?;
         let (source, is_binary) = self.needed("images")?;
@@ -63,7 +63,8 @@ impl Files {
         join(scene, (&cameras_path, &cameras), &source, images)
     }
 
-    /// Reads the points with their ids; `None` without a list. Notes rows that cannot be read; most of them must be.
+    /// Reads the points with their ids; `None` without a list. Notes unreadable rows; errors if most rows are
+    /// unreadable.
     fn points(&self, notes: &mut Vec<String>) -> Result<Option<Vec<(u64, Point)>>> {
         let Some((path, is_binary)) = self.path("points3D") else { return Ok(None) };
         if is_binary {
@@ -80,24 +81,24 @@ impl Files {
             return Err(refused.swap_remove(0));
         }
         if let Some(first) = refused.first() {
-            notes.push(format!("{} left out that cannot be read, the first: {first}", counted(refused.len(), "point")));
+            notes.push(format!("{} omitted as unreadable, the first: {first}", counted(refused.len(), "point")));
         }
         Ok(Some(points))
     }
 }
 
 /// The photos of a model.
-struct Views {
-    /// Each with its row.
-    views: Vec<(Listed, ImageRecord)>,
-    /// Photos whose poses cannot be used.
+struct ModelViews {
+    /// Each photo with its row.
+    views: Vec<(ListedPhoto, ImageRecord)>,
+    /// Photos with unusable poses.
     bad: Vec<Error>,
 }
 
 /// Reads the model of the scene, if there is one.
-pub fn list(scene: &Place) -> Result<Option<Listing>> {
-    let Some(files) = Files::find(scene.root) else { return Ok(None) };
-    let Views { views, bad } = files.views(scene, false)?;
+pub fn list(scene: &SceneFolder) -> Result<Option<Listing>> {
+    let Some(files) = ModelFiles::find(scene.root) else { return Ok(None) };
+    let ModelViews { views, bad } = files.views(scene, false)?;
     let mut notes = Vec::new();
     let points = match files.points(&mut notes)? {
         Some(points) => points.into_iter().map(|(_, point)| point).collect(),
@@ -113,7 +114,7 @@ pub fn list(scene: &Place) -> Result<Option<Listing>> {
     Ok(Some(Listing { views, points, notes, flaws, bad, ..Listing::new(&files.needed("images")?.0, Native::COLMAP) }))
 }
 
-/// Reads the points that a trainer wrote beside the model, where the model has none.
+/// Reads the points that a trainer wrote beside the model, if the model has none.
 fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
     let path = folder.join("points3D.ply");
     if !path.is_file() {
@@ -123,13 +124,13 @@ fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
     points::read_points(&path)
 }
 
-/// Says what other models lie beside that in `sparse/0`, which has `count` photos, and whether one of them is larger.
+/// Describes other models beside `sparse/0`, which has `count` photos, and returns whether one of them is larger.
 fn neighbours(folder: &Path, count: usize) -> Option<(bool, String)> {
     let siblings = folder.parent().filter(|_| folder.ends_with("sparse/0")).map(read::folder);
     let others = siblings.and_then(Result::ok).unwrap_or_default().into_iter().filter(|other| other != folder);
     let others = others.filter(|other| other.is_dir()).filter_map(|folder| {
-        let (path, is_binary) = Files { folder: folder.clone() }.path("images")?;
-        // A damaged neighbour is not this scene's concern.
+        let (path, is_binary) = ModelFiles { folder: folder.clone() }.path("images")?;
+        // A damaged neighbour does not affect this scene.
         let images =
             if is_binary { binary::count(&path) } else { text::images(&path, false).map(|all| all.len() as u64) };
         Some((folder, images.ok()?))
@@ -144,20 +145,20 @@ fn neighbours(folder: &Path, count: usize) -> Option<(bool, String)> {
     Some((images > count as u64, text))
 }
 
-/// A point in a photo, and the same point in the world.
-pub type Seen = (DVec2, DVec3);
+/// A point in a photo, and its world position.
+pub type Observation = (DVec2, DVec3);
 
-/// Reads which points each photo of the COLMAP model with the images `source` shows, by name of the view; none if that is
-/// no model.
-pub fn observations(scene: &Place, source: &Path) -> Result<BTreeMap<String, (Listed, Vec<Seen>)>> {
-    let files = Files { folder: source.parent().unwrap_or(scene.root).to_owned() };
+/// Reads the points that each photo of the COLMAP model with the images `source` shows, by view name. Returns nothing
+/// if `source` is not a COLMAP file.
+pub fn observations(scene: &SceneFolder, source: &Path) -> Result<BTreeMap<String, (ListedPhoto, Vec<Observation>)>> {
+    let files = ModelFiles { folder: source.parent().unwrap_or(scene.root).to_owned() };
     if files.path("images").is_none_or(|(path, _)| path != source) {
         return Ok(BTreeMap::new());
     }
-    // What is left out was told when the scene was read.
+    // Omitted photos were reported when the scene was read.
     let Some(points) = files.points(&mut Vec::new())? else { return Ok(BTreeMap::new()) };
     let places: HashMap<u64, DVec3> = points.into_iter().map(|(id, point)| (id, point.position)).collect();
-    let seen = |(listed, image): (Listed, ImageRecord)| {
+    let seen = |(listed, image): (ListedPhoto, ImageRecord)| {
         let points = image.observed.into_iter();
         let points = points.filter_map(|(pixel, id)| Some((pixel, *places.get(&id)?))).collect();
         (listed.name.clone(), (listed, points))
@@ -178,11 +179,11 @@ fn finite(mut points: Vec<Point>, notes: &mut Vec<String>) -> Vec<Point> {
 }
 
 fn join(
-    scene: &Place,
+    scene: &SceneFolder,
     (cameras_path, cameras): (&Path, &[CameraRecord]),
     images_path: &Path,
     images: Vec<Result<ImageRecord>>,
-) -> Result<Views> {
+) -> Result<ModelViews> {
     let mut by_id = HashMap::new();
     for camera in cameras {
         if by_id.insert(camera.id, camera).is_some() {
@@ -208,7 +209,7 @@ fn join(
         Ok((camera, lens, place, image))
     };
     let (mut ids, mut names) = (HashSet::new(), HashSet::new());
-    let mut found = Views { views: Vec::with_capacity(images.len()), bad: Vec::new() };
+    let mut found = ModelViews { views: Vec::with_capacity(images.len()), bad: Vec::new() };
     for image in images {
         let (camera, lens, place, image) = match image.and_then(camera) {
             Ok(posed) => posed,
@@ -222,7 +223,7 @@ fn join(
             return Err(Error::data(images_path, place, "has an id or a name that was listed before"));
         }
         let photo = scene.photos.find(&["images", "."], &file.path);
-        found.views.push((Listed { name: file.name, photo, camera, lens, test: None }, image));
+        found.views.push((ListedPhoto { name: file.name, photo, camera, lens, test: None }, image));
     }
     require_some(found.views.len(), &mut found.bad)?;
     Ok(found)

@@ -23,13 +23,13 @@ pub(super) struct ImageRecord {
     pub(super) translation: [f64; 3],
     pub(super) camera: u32,
     pub(super) name: String,
-    /// Places in the photo, px, and the points there by id; empty unless asked for.
+    /// Positions in the photo, px, with the ids of the points there; empty unless requested.
     pub(super) observed: Vec<(DVec2, u64)>,
 }
 
-/// Makes the error for a camera model that COLMAP has not.
+/// Creates the error for a camera model unknown to COLMAP.
 pub(super) fn unknown_model(path: &Path, place: String, name: &dyn Display) -> Error {
-    let known = lens::MODELS.map(|model| model.name).join(", ");
+    let known = lens::CAMERA_MODELS.map(|model| model.name).join(", ");
     Error::data(path, place, format!("the camera model {name} is unknown; expected one of {known}"))
 }
 
@@ -37,11 +37,11 @@ impl CameraRecord {
     /// Returns the intrinsics, with an identity pose, and the lens.
     pub(super) fn intrinsics(&self, path: &Path) -> Result<(Camera, Lens)> {
         let place = format!("camera {}", self.id);
-        let CameraModel { name, coefficients, of_list, .. } = *self.model;
+        let CameraModel { name, coefficients, from_list, .. } = *self.model;
         let (p, before) = (&self.parameters, self.model.before());
         let count = before + coefficients;
         if p.len() != count {
-            return Err(Error::data(path, place, format!("{name} has {count} parameters, {} are listed", p.len())));
+            return Err(Error::data(path, place, format!("{name} has {count} parameters, but {} are listed", p.len())));
         }
         let side = |side: u64| {
             let problem = || Error::data(path, place.as_str(), format!("image side of {side} px"));
@@ -49,9 +49,9 @@ impl CameraRecord {
         };
         let (width, height) = (side(self.width)?, side(self.height)?);
         if self.model.focals == 0 && p[..2] != [f64::from(width), f64::from(height)] {
-            let problem = format!("{name} of {width} x {height} px has the parameters {p:?}; expected its size again");
+            let problem = format!("{name} with {width} x {height} px has the parameters {p:?}; expected its size");
             return Err(Error::data(path, place, problem));
         }
-        Ok((Camera::at_origin(self.model.intrinsics(p), (width, height)), of_list(&p[before..])))
+        Ok((Camera::at_origin(self.model.intrinsics(p), (width, height)), from_list(&p[before..])))
     }
 }

@@ -9,7 +9,7 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::str::FromStr;
 
-/// Reads the lines with their numbers from 1.
+/// Reads the lines, numbered from 1.
 fn lines(path: &Path) -> Result<impl Iterator<Item = Result<(usize, String)>>> {
     let file = read::open(path)?;
     let path = path.to_owned();
@@ -33,14 +33,14 @@ fn is_record(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#')
 }
 
-/// The words of a line, read one by one.
-struct Words<'a> {
+/// The words of a line, read in order.
+struct LineWords<'a> {
     path: &'a Path,
     number: usize,
     rest: &'a str,
 }
 
-impl<'a> Words<'a> {
+impl<'a> LineWords<'a> {
     fn error(&self, problem: impl Into<String>) -> Error {
         Error::data(self.path, format!("line {}", self.number), problem)
     }
@@ -69,13 +69,13 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Reads a file with one record per line. A line that is no record is an error of its own.
-fn records<T>(path: &Path, read: impl Fn(Words) -> Result<T>) -> Result<Vec<Result<T>>> {
+/// Reads a file with one record per line. Each invalid line is a separate error.
+fn records<T>(path: &Path, read: impl Fn(LineWords) -> Result<T>) -> Result<Vec<Result<T>>> {
     let mut all = Vec::new();
     for line in lines(path)? {
         let (number, line) = line?;
         if is_record(&line) {
-            all.push(read(Words { path, number, rest: line.trim() }));
+            all.push(read(LineWords { path, number, rest: line.trim() }));
         }
     }
     Ok(all)
@@ -96,7 +96,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<CameraRecord>> {
     all.into_iter().collect()
 }
 
-/// True for the second line of an image: threes of numbers, or nothing.
+/// Returns true for the second line of an image: triples of numbers, or nothing.
 fn is_observations(line: &str) -> bool {
     let mut count = 0;
     let is_number = |word: &str| {
@@ -106,7 +106,7 @@ fn is_observations(line: &str) -> bool {
     line.split_ascii_whitespace().all(is_number) && count % 3 == 0
 }
 
-/// True if the last line of a file is ended as the others are.
+/// Returns true if the last line of a file has a line end.
 fn is_terminated(path: &Path) -> Result<bool> {
     let mut last = [0];
     let mut file = read::open(path)?;
@@ -114,9 +114,8 @@ fn is_terminated(path: &Path) -> Result<bool> {
     Ok(last == *b"\n")
 }
 
-/// Reads `images.txt`: two lines per image, the second with its observations, possibly empty. Programs that write poses
-/// alone leave the second one out. Rows that cannot be read are errors of their own, but for the last one
-/// of a file that was cut short.
+/// Reads `images.txt`: two lines per image, the second with its observations, possibly empty. Programs that write only
+/// poses omit the second line. Each unreadable row is a separate error, except for the last one of a truncated file.
 pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<ImageRecord>>> {
     let mut all = Vec::new();
     let mut lines = lines(path)?.peekable();
@@ -138,9 +137,9 @@ pub(super) fn images(path: &Path, with_observations: bool) -> Result<Vec<Result<
     Ok(all)
 }
 
-/// Reads the image in a line, and its observations in the next one.
+/// Reads the image in a line, and its observations from the next one.
 fn image(path: &Path, (number, line): (usize, String), observations: Option<(usize, String)>) -> Result<ImageRecord> {
-    let mut words = Words { path, number, rest: line.trim() };
+    let mut words = LineWords { path, number, rest: line.trim() };
     let id = words.number("image id")?;
     let (quaternion, translation) = (words.numbers("rotation")?, words.numbers("translation")?);
     let camera = words.number("camera id")?;
@@ -151,7 +150,7 @@ fn image(path: &Path, (number, line): (usize, String), observations: Option<(usi
     }
     let mut observed = Vec::new();
     if let Some((number, line)) = observations {
-        let mut words = Words { path, number, rest: line.trim() };
+        let mut words = LineWords { path, number, rest: line.trim() };
         while !words.rest.trim().is_empty() {
             let pixel = DVec2::from_array(words.numbers("position in the photo")?);
             let point: i64 = words.number("point id")?;

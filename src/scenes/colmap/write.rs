@@ -1,4 +1,4 @@
-//! Writes a reconstruction as COLMAP's text files, without the tracks of its points.
+//! Writes a reconstruction as COLMAP text files, without tracks.
 
 use glam::DQuat;
 use labelgs_files::atomic;
@@ -6,7 +6,7 @@ use labelgs_scene::{Camera, Error, Point, Result};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes `cameras.txt`, `images.txt` and `points3D.txt` into a folder; each view has a pinhole camera of its own.
+/// Writes `cameras.txt`, `images.txt` and `points3D.txt` to a folder. Each view gets its own pinhole camera.
 pub fn model(folder: &Path, views: &[(&str, &Camera)], points: &[Point]) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
     let (mut cameras, mut images, mut cloud) = (String::new(), String::new(), String::new());

@@ -1,8 +1,8 @@
-//! First points of objects alone: what no photo shows clear.
+//! First points for isolated objects: the volume that no photo shows as clear.
 //!
-//! A photo of objects alone (`matte`) says of a place in its picture whether something is there. Beyond its border it says what
-//! the nearest pixel says, because it was cut to the objects. What few photos show clear is the visual hull, in which
-//! [`sweep`](super::sweep) finds surfaces.
+//! A photo of isolated objects (`matte`) shows for each position inside its image whether something is there. Outside
+//! its image, its nearest pixel counts, because it was cropped to the objects. The volume that few photos show as clear
+//! is the visual hull, in which [`sweep`](super::sweep) finds surfaces.
 
 use super::sweep::Sweep;
 use glam::{DMat3, DVec2, DVec3};
@@ -13,23 +13,23 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-/// Share of the photos that may show a place of the hull clear: masks are off by pixels, and may miss a part.
+/// Share of the photos that may show a position of the hull as clear: masks are off by pixels, and may miss a part.
 const CLEAR_SHARE_MAX: f64 = 0.1;
-/// Share of the points that lie anywhere in the hull; photos place the others.
+/// Share of the points anywhere in the hull; the others are placed by photos.
 const ANYWHERE_SHARE: f64 = 0.2;
-/// Most rounds of candidates.
-const ROUNDS: usize = 32;
+/// Most batches of candidates.
+const CANDIDATE_BATCHES_MAX: usize = 32;
 
-/// What photos show at a place.
+/// What photos show at a position.
 #[derive(Clone, Copy, Default)]
-struct Shown {
+struct PositionEvidence {
     clear: u32,
-    /// Photos that show something, and the sum of its colours.
+    /// Number of photos that show something, and the sum of their colours.
     solid: u32,
     sum: [u32; 3],
 }
 
-impl Shown {
+impl PositionEvidence {
     fn look(&mut self, place: DVec3, camera: &Camera, photo: &Photo) {
         let at = camera.to_camera(place);
         if at.z <= 0.0 {
@@ -57,9 +57,9 @@ impl Shown {
     }
 }
 
-/// Looks at places in all photos, one after the other: not all of them may be in memory.
-fn shown(views: &[View], places: &[DVec3]) -> Result<Vec<Shown>> {
-    let mut found = vec![Shown::default(); places.len()];
+/// Projects positions into all photos, one photo at a time, because not all may be in memory.
+fn gather_evidence(views: &[View], places: &[DVec3]) -> Result<Vec<PositionEvidence>> {
+    let mut found = vec![PositionEvidence::default(); places.len()];
     for view in views {
         if let Some(photo) = view.photo.as_ref().map(Pixels::get).transpose()? {
             found.par_iter_mut().zip(places).for_each(|(shown, place)| shown.look(*place, &view.camera, &photo));
@@ -68,27 +68,27 @@ fn shown(views: &[View], places: &[DVec3]) -> Result<Vec<Shown>> {
     Ok(found)
 }
 
-/// Returns for each place whether it is inside of the objects of the training photos, as far as these tell.
+/// Returns for each position whether it is inside the objects of the training photos.
 pub fn inside(dataset: &Dataset, places: &[DVec3]) -> Result<Vec<bool>> {
-    Ok(shown(&dataset.train, places)?.iter().map(Shown::is_inside).collect())
+    Ok(gather_evidence(&dataset.train, places)?.iter().map(PositionEvidence::is_inside).collect())
 }
 
-/// Returns at most `count` points of the objects: the same for the same seed and scene.
+/// Returns at most `count` points of the objects, determined by seed and scene.
 pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<Point>> {
     let views = &dataset.train;
     let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let ball = Ball::of(views, dataset.extent());
+    let ball = Ball::around_objects(views, dataset.extent());
     let passing = |drawn: Vec<Point>| -> Result<Vec<Point>> {
         let places: Vec<DVec3> = drawn.iter().map(|point| point.position).collect();
-        let found = drawn.into_iter().zip(shown(views, &places)?).filter(|(_, shown)| shown.is_inside());
+        let found = drawn.into_iter().zip(gather_evidence(views, &places)?).filter(|(_, shown)| shown.is_inside());
         Ok(found.map(|(point, shown)| Point { colour: shown.colour(), ..point }).collect())
     };
-    let swept = Sweep::of_objects(views, ball.depths())?.points(&mut random, count);
+    let swept = Sweep::for_objects(views, ball.depths())?.points(&mut random, count);
     let places: Vec<DVec3> = swept.iter().map(|point| point.position).collect();
     let inside = inside(dataset, &places)?;
     let swept = swept.into_iter().zip(inside).filter(|(_, inside)| *inside).map(|(point, _)| point);
     let mut points: Vec<Point> = swept.take(((1.0 - ANYWHERE_SHARE) * count as f64) as usize).collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..CANDIDATE_BATCHES_MAX {
         if points.len() >= count {
             break;
         }
@@ -100,8 +100,8 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
     }
     points.truncate(count);
     if points.is_empty() {
-        let problem = "the masks of the photos leave no place for an object: no place is inside of most of them. Poses and \
-                       masks do not belong together, or the masks are inverted";
+        let problem = "the masks of the photos leave no space for an object: no position is inside most of them. Poses \
+                       and masks do not belong together, or the masks are inverted";
         return Err(Error::data(&dataset.root, "masks", problem));
     }
     Ok(points)
@@ -116,8 +116,8 @@ struct Ball {
 }
 
 impl Ball {
-    /// Returns the ball around the point nearest to the rays through the middles of the photos, which are those of the objects.
-    fn of(views: &[View], extent: f64) -> Self {
+    /// Returns a ball around the point nearest to the rays through the image centres, where the objects are.
+    fn around_objects(views: &[View], extent: f64) -> Self {
         let (mut matrix, mut right) = (DMat3::ZERO, DVec3::ZERO);
         for camera in views.iter().map(|view| &view.camera) {
             let ray = camera.unproject(middle(camera), 1.0) - camera.centre();
@@ -128,7 +128,7 @@ impl Ball {
         }
         let count = views.len().max(1) as f64;
         let (matrix, right) = (matrix * (1.0 / count), right / count);
-        // Parallel rays leave the distance open.
+        // Parallel rays leave the distance undetermined.
         let held = 1e-6;
         let mean = views.iter().map(|view| view.camera.centre() + view.camera.axis() * extent).sum::<DVec3>() / count;
         let centre = (matrix + DMat3::IDENTITY * held).inverse() * (right + mean * held);
@@ -145,7 +145,7 @@ impl Ball {
         (self.distance - self.radius, self.distance + self.radius)
     }
 
-    /// Draws a point in a random pixel of a camera, as deep as the ball.
+    /// Draws a point in a random pixel of a camera, within the depths of the ball.
     fn candidate(&self, random: &mut Pcg64Mcg, camera: &Camera) -> Point {
         let x = random.random_range(0.0..f64::from(camera.width));
         let y = random.random_range(0.0..f64::from(camera.height));

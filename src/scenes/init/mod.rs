@@ -21,30 +21,30 @@ pub use hull::inside;
 pub use thin::thinned;
 
 /// Opacity of a new Gaussian.
-const OPACITY: f64 = 0.1;
-/// Least mean squared distance to the neighbours (3DGS), world units squared; for scenes smaller than 1, squared scene
-/// extents.
+const INITIAL_OPACITY: f64 = 0.1;
+/// Smallest mean squared distance to the neighbours (3DGS), world units squared; in scenes smaller than 1, in squared
+/// scene extents.
 const DISTANCE2_MIN: f64 = 1e-7;
-/// Number of neighbours that decide the size of a Gaussian.
-const NEIGHBOURS: usize = 3;
+/// Number of neighbours that determine the size of a Gaussian.
+const NEIGHBOUR_COUNT: usize = 3;
 /// Largest standard deviation of a Gaussian at a random point, as a share of the longer image side in the nearest
-/// camera that sees it. Random points in wide gaps before the cameras would otherwise cover whole pictures and cost
-/// more than all others together. Half of this value lowers the early quality.
+/// camera that sees it. Otherwise, random points in wide gaps near cameras would cover whole images and cost more than
+/// all others together. Half of this value lowers the early quality.
 const SIZE_MAX: f64 = 0.02;
-/// Fewest points; a scene with fewer counts as one without points.
+/// A scene with fewer points counts as one without points.
 const POINTS_MIN: usize = 16;
 
-/// Makes the initial Gaussians: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, isotropic, no
-/// labels. The standard deviation is the root mean square distance to the three nearest neighbours.
+/// Creates the initial Gaussians: SH degree 3 with only the constant colour set, opacity 0.1, no rotation, isotropic,
+/// no labels. The standard deviation is the root mean square distance to the three nearest neighbours.
 ///
 /// There is one Gaussian per point of the scene. A scene with fewer than 16 points gets `count_if_no_points` Gaussians
-/// in the space that the training cameras see, if possible where the photos agree on a colour; none is then larger than
-/// a fiftieth of a picture.
+/// in the space that the training cameras see, if possible where the photos agree on a colour; none of these is larger
+/// than a fiftieth of an image.
 pub fn initial_gaussians(dataset: &Dataset, seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     first_gaussians(dataset, &dataset.points, seed, count_if_no_points)
 }
 
-/// Makes the initial Gaussians at some of the points of the scene, as [`initial_gaussians`] does at all of them.
+/// Creates the initial Gaussians at some of the scene's points, like [`initial_gaussians`] for all points.
 pub fn first_gaussians(dataset: &Dataset, points: &[Point], seed: u64, count_if_no_points: usize) -> Result<Gaussians> {
     if has_points(dataset) {
         check_seen(dataset)?;
@@ -64,13 +64,13 @@ pub fn first_gaussians(dataset: &Dataset, points: &[Point], seed: u64, count_if_
     Ok(from_points(&points, &distances2, dataset.extent()))
 }
 
-/// Returns true if the first Gaussians lie at the points of the scene, not at random places.
+/// Returns true if the first Gaussians are at the scene's points and not at random positions.
 pub fn has_points(dataset: &Dataset) -> bool {
     dataset.points.len() >= POINTS_MIN
 }
 
-/// Adds far Gaussians to the initial ones where photos look past all points of the scene, such as at the sky:
-/// `directions` are tried. A scene without points has none, because its random points lie at all depths.
+/// Adds far Gaussians to the initial ones where photos look past all points of the scene, for example at the sky. Tests
+/// `directions` directions. Adds none to a scene without points, because its random points lie at all depths.
 pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u32) -> Result<()> {
     if !has_points(dataset) {
         return Ok(());
@@ -85,7 +85,7 @@ pub fn add_far_gaussians(model: &mut Gaussians, dataset: &Dataset, directions: u
     Ok(())
 }
 
-/// Refuses a scene in which no camera sees a point: nothing would be drawn or learnt.
+/// Refuses a scene in which no camera sees a point: nothing would be rendered or trained.
 fn check_seen(dataset: &Dataset) -> Result<()> {
     let seen = |point: &Point| dataset.train.iter().any(|view| view.camera.sees(point.position).is_some());
     if dataset.train.is_empty() || dataset.points.par_iter().any(seen) {
@@ -101,10 +101,10 @@ fn check_seen(dataset: &Dataset) -> Result<()> {
     Err(Error::data(&dataset.root, "points", problem))
 }
 
-/// Makes one Gaussian per point, in order. `distances2` has the squared standard deviations.
+/// Creates one Gaussian per point, in order. `distances2` has the squared standard deviations.
 fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
     let least = DISTANCE2_MIN * extent.min(1.0).powi(2);
-    let logit = (OPACITY / (1.0 - OPACITY)).ln() as f32;
+    let logit = (INITIAL_OPACITY / (1.0 - INITIAL_OPACITY)).ln() as f32;
     let count = points.len();
     let scale = |&distance2: &f64| [(0.5 * distance2.max(least).ln()) as f32; 3];
     let constant = |value: u8| sh0_of(f64::from(value) / 255.0);
@@ -128,8 +128,8 @@ fn from_points(points: &[Point], distances2: &[f64], extent: f64) -> Gaussians {
 fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
     let _stage = Stage::new(format_args!("measuring the distances of {} points", points.len()), 0);
     let positions: Vec<[f64; 3]> = points.iter().map(|point| point.position.to_array()).collect();
-    let nearest = NEIGHBOURS.min(positions.len().saturating_sub(1));
-    // One more neighbour, because each point finds itself.
+    let nearest = NEIGHBOUR_COUNT.min(positions.len().saturating_sub(1));
+    // +1: the query returns the point itself.
     let Some(asked) = NonZero::new(nearest + 1).filter(|_| nearest > 0) else {
         return Ok(vec![(extent * 0.01).powi(2); positions.len()]);
     };
@@ -137,7 +137,7 @@ fn neighbour_distances2(points: &[Point], extent: f64) -> Result<Vec<f64>> {
         .map_err(|error| Error::Bug(format!("the k-d tree of the points failed: {error:?}")))?;
     let mean = |(index, position): (usize, &[f64; 3])| {
         let found = tree.query(position).nearest_n::<SquaredEuclidean<f64>>(asked).execute();
-        // With many points at one place, a point may not find itself.
+        // Among many coinciding points, the query may not return the point itself.
         let others = found.iter().filter(|item| item.item as usize != index).take(nearest);
         others.map(|item| item.distance).sum::<f64>() / nearest as f64
     };

@@ -1,12 +1,12 @@
 //! Points for a scene without points.
 //!
-//! Some scenes have photos with a border of one colour (synthetic scenes over a plain background). Candidates are then
-//! drawn evenly in the ball that all cameras see. A candidate that a photo shows in the background colour is in free
-//! space; the remaining ones fill the visual hull. The colour of a point is the mean over its pixels.
+//! Some scenes have photos with a border of a single colour (synthetic scenes over a plain background). Candidates are
+//! then drawn uniformly in the ball that all cameras see. A candidate that a photo shows in the background colour is in
+//! free space; the remaining ones fill the visual hull. The colour of a point is the mean over its pixels.
 //!
-//! In other scenes four of five points come from [`sweep`](super::sweep), which finds the depth of random pixels. The
-//! others lie anywhere before the cameras, evenly in inverse depth. Three training cameras see each point if possible.
-//! Without photos all places before the cameras are equal, and colours are random.
+//! In other scenes, four of five points come from [`sweep`](super::sweep), which finds the depth of random pixels. The
+//! others are anywhere in front of the cameras, uniform in inverse depth. Three training cameras see each point if
+//! possible. Without photos, all positions in front of the cameras are equal, and colours are random.
 
 use super::region::{self, Region};
 use super::sweep::Sweep;
@@ -17,24 +17,24 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-/// Number of batches of candidates without enough points before the tests are relaxed.
-const BATCHES: usize = 24;
-/// Share of the points that may lie anywhere before the cameras if photos place the others.
+/// Batches of candidates without enough points before the tests are relaxed.
+const BATCHES_MAX: usize = 24;
+/// Share of the points anywhere in front of the cameras if photos place the others.
 const ANYWHERE_SHARE: f64 = 0.2;
 /// Largest colour difference from the background for a background pixel.
 const BACKGROUND_TOLERANCE: u8 = 3;
 /// Number of views whose border is examined.
-const BORDER_VIEWS: usize = 40;
+const BORDER_VIEWS_MAX: usize = 40;
 
-struct Test<'a> {
+struct CandidateTest<'a> {
     views: &'a [View],
     /// Number of cameras that must see the candidate.
     seen_by: usize,
     /// Colour of the background.
-    backdrop: Option<[u8; 3]>,
+    background_colour: Option<[u8; 3]>,
 }
 
-/// Returns `count` points: the same for the same seed and scene.
+/// Returns `count` points, determined by seed and scene.
 pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<Point>> {
     let views = &dataset.train;
     if views.is_empty() {
@@ -45,39 +45,40 @@ pub(super) fn points(dataset: &Dataset, seed: u64, count: usize) -> Result<Vec<P
         ));
     }
     let region = region::find(views, dataset.extent());
-    let mut test = Test { views, seen_by: views.len().min(3), backdrop: backdrop(views)? };
+    let mut test = CandidateTest { views, seen_by: views.len().min(3), background_colour: background_colour(views)? };
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut points = Vec::with_capacity(count);
-    if test.backdrop.is_none() {
+    if test.background_colour.is_none() {
         let found = Sweep::new(views, region.depths())?.points(&mut random, count);
         points.extend(found.into_iter().take(((1.0 - ANYWHERE_SHARE) * count as f64) as usize));
     }
     // Relax the tests until enough points pass: first free space, then two cameras, one, none.
     loop {
-        for _ in 0..BATCHES {
+        for _ in 0..BATCHES_MAX {
             if points.len() >= count {
                 points.truncate(count);
                 return Ok(points);
             }
-            let plain = test.backdrop.is_some();
+            let plain = test.background_colour.is_some();
             let drawn: Vec<Point> =
                 (0..count.max(1024)).map(|_| candidate(&mut random, views, region, plain)).collect();
             points.extend(test.passing(drawn)?);
         }
-        if test.backdrop.take().is_none() {
+        if test.background_colour.take().is_none() {
             test.seen_by = test.seen_by.saturating_sub(1);
         }
     }
 }
 
-/// Draws a point with a random colour: in the ball if there is one over a plain background, else before some camera.
+/// Draws a point with a random colour: in the ball if there is one over a plain background, otherwise in front of a
+/// camera.
 fn candidate(random: &mut Pcg64Mcg, views: &[View], region: Region, plain: bool) -> Point {
     let colour = random.random::<[u8; 3]>();
     let position = match region {
         Region::Ball { centre, radius, .. } if plain => centre + radius * in_unit_ball(random),
         _ => {
             let camera = &views[random.random_range(0..views.len())].camera;
-            ahead(random, camera, region.depths())
+            in_front(random, camera, region.depths())
         }
     };
     Point { position, colour }
@@ -93,8 +94,8 @@ fn in_unit_ball(random: &mut Pcg64Mcg) -> DVec3 {
     }
 }
 
-/// Draws a point in a random pixel of `camera`, evenly in inverse depth between two depths.
-fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVec3 {
+/// Draws a point in a random pixel of `camera`, uniform in inverse depth between two depths.
+fn in_front(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVec3 {
     let pixel = DVec2::new(
         random.random_range(0.0..f64::from(camera.width)),
         random.random_range(0.0..f64::from(camera.height)),
@@ -105,20 +106,20 @@ fn ahead(random: &mut Pcg64Mcg, camera: &Camera, (near, far): (f64, f64)) -> DVe
 
 /// What the views show at a candidate.
 #[derive(Clone, Copy, Default)]
-struct Shown {
-    /// Views that see it.
+struct CandidateEvidence {
+    /// Views that see the candidate.
     seen: usize,
-    /// Photos with a colour there, the sum of these colours, and those that have the background's.
+    /// Number of photos with a colour there, the sum of these colours, and how many have the background colour.
     coloured: u32,
     sum: [u32; 3],
     free: u32,
 }
 
-impl Test<'_> {
-    /// Returns the points that pass the test, with their colours. The photos come one after the other, because not all of
-    /// them may be in memory.
+impl CandidateTest<'_> {
+    /// Returns the points that pass the test, with their colours. Loads one photo at a time, because not all may be in
+    /// memory.
     fn passing(&self, drawn: Vec<Point>) -> Result<Vec<Point>> {
-        let mut shown = vec![Shown::default(); drawn.len()];
+        let mut shown = vec![CandidateEvidence::default(); drawn.len()];
         for view in self.views {
             let photo = view.photo.as_ref().map(Pixels::get).transpose()?;
             shown.par_iter_mut().zip(&drawn).for_each(|(shown, point)| self.look(shown, point, view, photo.as_deref()));
@@ -126,18 +127,18 @@ impl Test<'_> {
         Ok(drawn.into_iter().zip(shown).filter_map(|(point, shown)| self.judge(point, shown)).collect())
     }
 
-    fn look(&self, shown: &mut Shown, point: &Point, view: &View, photo: Option<&Photo>) {
+    fn look(&self, shown: &mut CandidateEvidence, point: &Point, view: &View, photo: Option<&Photo>) {
         let Some(pixel) = view.camera.sees(point.position) else { return };
         shown.seen += 1;
         let Some(texel) = photo.and_then(|photo| texel(photo, pixel)) else { return };
         shown.coloured += 1;
         (0..3).for_each(|channel| shown.sum[channel] += u32::from(texel[channel]));
-        shown.free += u32::from(self.backdrop.is_some_and(|backdrop| near(texel, backdrop)));
+        shown.free += u32::from(self.background_colour.is_some_and(|background_colour| near(texel, background_colour)));
     }
 
     /// Returns the point with its colour if it passes the test.
-    fn judge(&self, point: Point, Shown { seen, coloured, sum, free }: Shown) -> Option<Point> {
-        // Some pixels of a dark subject may have the colour of the background, so a few are accepted.
+    fn judge(&self, point: Point, CandidateEvidence { seen, coloured, sum, free }: CandidateEvidence) -> Option<Point> {
+        // Some pixels of a dark subject may have the background colour, so accept a few.
         if seen < self.seen_by || free * 10 > coloured {
             return None;
         }
@@ -151,10 +152,10 @@ fn near(a: [u8; 3], b: [u8; 3]) -> bool {
     a.iter().zip(b).all(|(&a, b)| a.abs_diff(b) <= BACKGROUND_TOLERANCE)
 }
 
-/// Returns the colour of nine tenths of the border pixels of some views, if there is one.
-fn backdrop(views: &[View]) -> Result<Option<[u8; 3]>> {
+/// Returns the colour of nine tenths of the border pixels of some views, if there is such a colour.
+fn background_colour(views: &[View]) -> Result<Option<[u8; 3]>> {
     let mut border: Vec<[u8; 3]> = Vec::new();
-    for photo in views.iter().step_by(views.len() / BORDER_VIEWS + 1).filter_map(|view| view.photo.as_ref()) {
+    for photo in views.iter().step_by(views.len() / BORDER_VIEWS_MAX + 1).filter_map(|view| view.photo.as_ref()) {
         let photo = photo.get()?;
         let (width, height) = (photo.width as usize, photo.height as usize);
         let rows = [0, height - 1].into_iter().flat_map(|y| (0..width).map(move |x| (x, y)));

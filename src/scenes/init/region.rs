@@ -17,7 +17,7 @@ pub(super) enum Region {
         /// Typical distance of a camera from the centre, world units.
         distance: f64,
     },
-    /// For cameras with parallel or outward axes: the space before them between two depths.
+    /// For cameras with parallel or outward axes: the space in front of them between two depths.
     Frusta {
         /// Smallest depth, world units.
         near: f64,
@@ -27,7 +27,7 @@ pub(super) enum Region {
 }
 
 impl Region {
-    /// Returns the range of depths of the scene before a camera.
+    /// Returns the depth range of the scene in front of a camera.
     pub(super) fn depths(&self) -> (f64, f64) {
         match *self {
             Self::Ball { radius, distance, .. } => (0.4 * distance, 5.0 * (distance + radius)),
@@ -60,17 +60,17 @@ pub(super) fn find(views: &[View], extent: f64) -> Region {
         let inward = cameras.iter().filter(|camera| camera.sees(centre).is_some()).count();
         let radius = median(cameras.iter().map(|c| c.centre().distance(centre) * narrow_sine(c))).unwrap_or(0.0);
         let distance = median(cameras.iter().map(|c| c.centre().distance(centre))).unwrap_or(0.0);
-        // Rotating cameras at one place differ only by rounding errors, which give no distance.
+        // Cameras that rotate in one place differ only by rounding errors, which give no distance.
         if inward * 4 >= cameras.len() * 3 && radius > 1e-6 * extent {
             return Region::Ball { centre, radius, distance };
         }
     }
-    // Only the spread of the cameras gives a scale. Depths are 1 to 50 times that, evenly in inverse depth, so that the
-    // parallax grows evenly too.
+    // Only the spread of the cameras gives a scale. Depths are 1 to 50 times that, uniform in inverse depth, so that
+    // parallax is uniform too.
     Region::Frusta { near: extent, far: 50.0 * extent }
 }
 
-/// Returns the point with the least sum of squared distances to the optical axes, if it is well determined.
+/// Returns the point with the smallest sum of squared distances to the optical axes, if it is well determined.
 fn nearest_to_axes(cameras: &[&Camera]) -> Option<DVec3> {
     let (mut matrix, mut right) = overview::nearest_to_axes(cameras.iter().copied());
     matrix *= 1.0 / cameras.len().max(1) as f64;

@@ -1,6 +1,6 @@
-//! Far points where photos look past all others, such as at the sky.
+//! Far points where photos look past all others, for example at the sky.
 //!
-//! Without them nothing stands for what is far away, and training puts Gaussians right before the cameras instead.
+//! Without them nothing represents distant content, and training puts Gaussians right in front of the cameras instead.
 
 use super::texel::texel;
 use glam::{DVec2, DVec3};
@@ -11,29 +11,29 @@ use labelgs_scene::{Camera, Dataset, Point, Result, View};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Radius of the sphere, in scene extents, and in distances of the points: at least this much of this quantile.
+/// Radius of the sphere: at least this many scene extents, and this multiple of the given quantile of point distances.
 const RADIUS_EXTENTS: f64 = 2.5;
 const RADIUS_DISTANCES: f64 = 1.0;
 const DISTANCE_QUANTILE: f64 = 0.99;
-/// A photo is divided into cells with this many along its longer side. It looks past the points in cells without one.
-const CELLS: u32 = 16;
-/// Fewest views that see a point of the sphere.
+/// Number of cells along a photo's longer side. The photo looks past the points in cells without any.
+const CELLS_PER_SIDE: u32 = 16;
+/// Fewest views that must see a point of the sphere.
 const VIEWS_MIN: usize = 2;
 
-/// The cells of a photo with points.
-struct Covered {
+/// The cells of a photo that contain points.
+struct CoveredCells {
     columns: u32,
     rows: u32,
     cells: Vec<bool>,
 }
 
-impl Covered {
+impl CoveredCells {
     fn new(camera: &Camera, points: &[Point], views: usize) -> Self {
         let longest = camera.width.max(camera.height);
-        let count = |side: u32| (side * CELLS).div_ceil(longest).max(1);
+        let count = |side: u32| (side * CELLS_PER_SIDE).div_ceil(longest).max(1);
         let (columns, rows) = (count(camera.width), count(camera.height));
         let mut covered = Self { columns, rows, cells: vec![false; (columns * rows) as usize] };
-        // Every n-th point tells as much where points and photos are very many.
+        // With very many points and photos, every n-th point suffices.
         for pixel in points.iter().step_by(stride(points.len(), views)).filter_map(|point| camera.sees(point.position))
         {
             let (x, y) = covered.cell(camera, pixel);
@@ -54,8 +54,8 @@ impl Covered {
     }
 }
 
-/// Returns the points of a sphere of `count` directions around the cameras at which most of the views that see them look
-/// past the points of the scene, in the median colour of the pixels there; and half their spacing, world units.
+/// Returns those points of a sphere of `count` directions around the cameras where most views that see them look past
+/// the scene's points, with the median colour of their pixels; also returns half their spacing, world units.
 pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64)> {
     let _stage = Stage::new("looking for what lies behind all points", 0);
     let points = &dataset.points;
@@ -68,9 +68,10 @@ pub(super) fn points(dataset: &Dataset, count: usize) -> Result<(Vec<Point>, f64
     let at = (DISTANCE_QUANTILE * distances.len() as f64) as usize;
     let far = if at < distances.len() { *distances.select_nth_unstable_by(at, f64::total_cmp).1 } else { 0.0 };
     let radius = (RADIUS_EXTENTS * dataset.extent()).max(RADIUS_DISTANCES * far);
-    let covered: Vec<Covered> = views.par_iter().map(|view| Covered::new(&view.camera, points, views.len())).collect();
+    let covered: Vec<CoveredCells> =
+        views.par_iter().map(|view| CoveredCells::new(&view.camera, points, views.len())).collect();
     let place = |index: usize| centre + radius * even_direction(index, count);
-    // The photos come one after the other, because not all of them may be in memory.
+    // Load one photo at a time, because not all may be in memory.
     let mut shown: Vec<(usize, Vec<[u8; 3]>)> = vec![(0, Vec::new()); count];
     for (view, covered) in views.iter().zip(&covered) {
         let photo = view.photo()?;

@@ -1,6 +1,6 @@
 //! Depths of random pixels: the depth at which other photos show the same colour.
 //!
-//! It is a plane sweep without windows or smoothing. Most points end up near a surface, which is enough for the first
+//! A plane sweep without windows or smoothing. Most points end up near a surface, which is enough for the first
 //! Gaussians: training moves or removes the others.
 
 use super::texel::texel;
@@ -13,27 +13,27 @@ use rayon::prelude::*;
 
 /// Longest side of the compared photos, px: neighbouring depths are about a pixel apart.
 const SIDE_MAX: u32 = 160;
-/// Number of depths per pixel, even in inverse depth.
-const DEPTHS: u32 = 48;
-/// Colour difference of a pixel that counts as unrelated: hidden, or of another surface.
+/// Number of depths per pixel, uniform in inverse depth.
+const DEPTH_COUNT: u32 = 48;
+/// Colour differences are clamped to this value, beyond which a pixel is unrelated: hidden, or on another surface.
 const DIFFERENCE_MAX: u32 = 48 * 3;
-/// Most photos to compare a pixel with.
+/// Most photos that a pixel is compared with.
 const COMPARED_MAX: usize = 24;
-/// Opacity, as the alpha of a photo, up to which a small pixel shows nothing of the objects.
-const NEARLY_CLEAR: u8 = 192;
-/// Most tries per point.
+/// A pixel of a small photo with at most this opacity, encoded as in a photo's alpha, shows no object.
+const CLEAR_ALPHA_MAX: u8 = 192;
+/// Most attempts per point.
 const TRIES_MAX: usize = 3;
 
 /// Small photos with their cameras.
 pub(super) struct Sweep {
     photos: Vec<(Camera, Photo)>,
     depths: (f64, f64),
-    /// What is clear in a photo is nothing, and unlike anything.
+    /// Whether clear pixels are empty space, which matches nothing.
     objects_only: bool,
 }
 
 impl Sweep {
-    /// Makes the sweep; `depths` are the smallest and the largest depth.
+    /// Creates the sweep; `depths` are the smallest and the largest depth.
     pub(super) fn new(views: &[View], depths: (f64, f64)) -> Result<Self> {
         let small = |photo: &Pixels<Photo>, camera: &Camera| {
             let photo = photo.get()?;
@@ -44,12 +44,12 @@ impl Sweep {
         Ok(Self { photos: photos.collect::<Result<_>>()?, depths, objects_only: false })
     }
 
-    /// Makes the sweep of photos of objects alone.
-    pub(super) fn of_objects(views: &[View], depths: (f64, f64)) -> Result<Self> {
+    /// Creates the sweep for photos of isolated objects.
+    pub(super) fn for_objects(views: &[View], depths: (f64, f64)) -> Result<Self> {
         Ok(Self { objects_only: true, ..Self::new(views, depths)? })
     }
 
-    /// Returns at most `count` points: one behind each random pixel that three photos agree on.
+    /// Returns at most `count` points, each behind a random pixel, on which three photos agree.
     pub(super) fn points(&self, random: &mut Pcg64Mcg, count: usize) -> Vec<Point> {
         let mut points = Vec::new();
         if self.photos.len() < 2 {
@@ -80,11 +80,11 @@ impl Sweep {
         let colour = texel(photo, pixel).filter(|_| !self.is_nothing(photo, pixel))?;
         let (near, far) = self.depths;
         let depth = |step: u32| {
-            let part = (f64::from(step) + phase) / f64::from(DEPTHS);
+            let part = (f64::from(step) + phase) / f64::from(DEPTH_COUNT);
             1.0 / (part / near + (1.0 - part) / far)
         };
         let others = (self.photos.len() - 2).min(1) + 1;
-        let costs = (0..DEPTHS).filter_map(|step| {
+        let costs = (0..DEPTH_COUNT).filter_map(|step| {
             let position = camera.unproject(pixel, depth(step));
             let point = Point { position, colour };
             self.difference(index, &point, others).map(|cost| (cost, point))
@@ -92,7 +92,7 @@ impl Sweep {
         costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, point)| point)
     }
 
-    /// Returns the mean difference to the photos that see the point, if they are at least `others`.
+    /// Returns the mean difference to the photos that see the point, if there are at least `others`.
     fn difference(&self, own: usize, point: &Point, others: usize) -> Option<f64> {
         let (mut sum, mut seen) = (0, 0);
         let step = self.photos.len().div_ceil(COMPARED_MAX);
@@ -109,6 +109,7 @@ impl Sweep {
     }
 
     fn is_nothing(&self, photo: &Photo, pixel: DVec2) -> bool {
-        self.objects_only && photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize][3] <= NEARLY_CLEAR
+        self.objects_only
+            && photo.rgba[pixel.y as usize * photo.width as usize + pixel.x as usize][3] <= CLEAR_ALPHA_MAX
     }
 }

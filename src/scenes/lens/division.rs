@@ -1,10 +1,10 @@
-//! The division model of COLMAP.
+//! COLMAP's division model.
 
 use super::Projection;
 use glam::{DVec2, DVec3};
 
-/// A place p of the image is the direction (p, 1 + k |p|^2). Fitzgibbon, *Simultaneous linear estimation of multiple view
-/// geometry and lens distortion* (2001).
+/// An image point p corresponds to the direction (p, 1 + k |p|^2). Fitzgibbon, *Simultaneous linear estimation of
+/// multiple view geometry and lens distortion* (2001).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Division {
     /// The coefficient k.
@@ -12,7 +12,7 @@ pub struct Division {
 }
 
 impl Division {
-    /// Returns the factor of the part of a direction across the axis, whose length is `across`.
+    /// Returns the scale of a direction's lateral part, whose length is `across`.
     fn factor(&self, across: f64, along: f64) -> f64 {
         2.0 / (along + (along * along - 4.0 * self.k * across * across).sqrt())
     }

@@ -4,13 +4,13 @@ use super::Projection;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Longitude to the right and latitude downwards, radians: the axis is in the middle of the photo, whose width is 360 and
-/// whose height 180 degrees.
+/// Longitude to the right and latitude downwards, radians. The axis is at the centre of the photo, which spans 360
+/// degrees horizontally and 180 vertically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equirectangular;
 
 impl Equirectangular {
-    /// Returns fx, fy, cx and cy of a panorama, which follow from its width and height, px.
+    /// Returns fx, fy, cx and cy of a panorama, computed from its width and height, px.
     pub fn intrinsics(width: f64, height: f64) -> [f64; 4] {
         [width / (2.0 * PI), height / PI, width / 2.0, height / 2.0]
     }

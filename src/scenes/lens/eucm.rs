@@ -1,4 +1,4 @@
-//! The enhanced unified camera model of COLMAP.
+//! COLMAP's enhanced unified camera model.
 
 use super::Projection;
 use glam::{DVec2, DVec3};

@@ -1,9 +1,9 @@
-//! The FOV lens of COLMAP.
+//! COLMAP's FOV lens.
 
 use super::Projection;
 use glam::{DVec2, DVec3};
 
-/// A point of the plane z = 1 at the distance r from the axis moves to atan(2 r tan(w / 2)) / w. Devernay and Faugeras,
+/// A point of the plane z = 1 at distance r from the axis moves to atan(2 r tan(w / 2)) / w. Devernay and Faugeras,
 /// *Straight lines have to be straight* (2001).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fov {
@@ -25,7 +25,7 @@ impl Projection for Fov {
     fn project(&self, direction: DVec3) -> DVec2 {
         let ideal = direction.truncate() / direction.z;
         let radius = ideal.length();
-        // At the axis, the slope of the arc tangent.
+        // At the axis, use the slope of the arc tangent.
         let factor =
             if radius > 1e-9 { self.bend(radius) / radius } else { 2.0 * (self.angle / 2.0).tan() / self.angle };
         ideal * factor

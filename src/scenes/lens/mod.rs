@@ -1,7 +1,7 @@
-//! Lenses: where a photo shows a direction.
+//! Lenses: the image position of a direction.
 //!
 //! A lens maps a direction to a point of the image plane at focal length 1; [`Optics`] adds focal lengths and principal
-//! point. Sources of the formulas: COLMAP's camera models, and those that their files name.
+//! point. Sources of the formulas: COLMAP's camera models, and the papers cited in each file.
 //!
 //! To add a lens, add a file with its coefficients and its [`Projection`], a variant of [`Lens`], and its names in
 //! `models.rs`.
@@ -22,7 +22,7 @@ pub use equirectangular::Equirectangular;
 pub use eucm::Eucm;
 pub use fisheye::Fisheye;
 pub use fov::Fov;
-pub use models::{CameraModel, MODELS, colmap_model, model};
+pub use models::{CAMERA_MODELS, CameraModel, colmap_model, model};
 pub use optics::Optics;
 pub use polynomial::Polynomial;
 pub use projection::Projection;
@@ -34,13 +34,13 @@ pub enum Lens {
     /// No distortion.
     #[default]
     Pinhole,
-    /// Radial and tangential distortion of OpenCV.
+    /// OpenCV's radial and tangential distortion.
     Polynomial(Polynomial),
-    /// Angles in place of tangents, with a polynomial.
+    /// Angles instead of tangents, with a polynomial.
     Fisheye(Fisheye),
-    /// The fisheye of Project Aria.
+    /// Project Aria's fisheye.
     RadTan(RadTan),
-    /// The arc tangent of one angle.
+    /// The arc tangent of a single angle.
     Fov(Fov),
     /// The division model.
     Division(Division),
@@ -51,7 +51,7 @@ pub enum Lens {
 }
 
 impl Lens {
-    /// Returns the projection; none for a pinhole.
+    /// Returns the projection; `None` for a pinhole.
     pub fn projection(&self) -> Option<&dyn Projection> {
         match self {
             Self::Pinhole => None,

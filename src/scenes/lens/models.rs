@@ -1,26 +1,26 @@
-//! The camera models that files name, with the order of their parameters.
+//! The camera models named in files, with the order of their parameters.
 
 use super::{Division, Equirectangular, Eucm, Fisheye, Fov, Lens, Polynomial, RadTan};
 
-/// A camera model as files name it, with its parameters.
+/// A camera model with its parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraModel {
     /// Name in COLMAP.
     pub name: &'static str,
-    /// Number of focal lengths in COLMAP's list: 1, or 2 for x and y, and the principal point follows; 0 where the list
+    /// Number of focal lengths in COLMAP's list: 1, or 2 for x and y, followed by the principal point; 0 if the list
     /// starts with the size of the photo instead.
     pub focals: usize,
     /// Number of lens coefficients after them.
     pub coefficients: usize,
-    /// Makes the lens from these.
-    pub of_list: fn(&[f64]) -> Lens,
-    /// Makes the lens from the named coefficients of `transforms.json`, 0 for missing ones; `None` if that format lacks
-    /// the model.
-    pub of_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
+    /// Creates the lens from the coefficients.
+    pub from_list: fn(&[f64]) -> Lens,
+    /// Creates the lens from the named coefficients of `transforms.json`, 0 for missing ones; `None` if that format
+    /// does not have the model.
+    pub from_names: Option<fn(&dyn Fn(&str) -> f64) -> Lens>,
 }
 
 impl CameraModel {
-    /// Returns fx, fy, cx and cy of a list with the right number of parameters. Those of a panorama follow from its
+    /// Returns fx, fy, cx and cy of a list with the right number of parameters. For a panorama, computes them from its
     /// size.
     pub fn intrinsics(&self, list: &[f64]) -> [f64; 4] {
         match self.focals {
@@ -36,23 +36,29 @@ impl CameraModel {
 }
 
 const fn pinhole(name: &'static str, focals: usize) -> CameraModel {
-    CameraModel { name, focals, coefficients: 0, of_list: |_| Lens::Pinhole, of_names: Some(|_| Lens::Pinhole) }
+    CameraModel { name, focals, coefficients: 0, from_list: |_| Lens::Pinhole, from_names: Some(|_| Lens::Pinhole) }
 }
 
 const fn polynomial(name: &'static str, focals: usize, coefficients: usize) -> CameraModel {
-    let of_list = |list: &[f64]| Polynomial::of_list(list).into();
-    CameraModel { name, focals, coefficients, of_list, of_names: Some(|value| Polynomial::of_names(value).into()) }
+    let from_list = |list: &[f64]| Polynomial::from_list(list).into();
+    CameraModel {
+        name,
+        focals,
+        coefficients,
+        from_list,
+        from_names: Some(|value| Polynomial::from_names(value).into()),
+    }
 }
 
 const fn fisheye(name: &'static str, focals: usize, coefficients: usize) -> CameraModel {
-    let of_list = |list: &[f64]| Lens::Fisheye(Fisheye::of_radial(list));
-    let of_names: fn(&dyn Fn(&str) -> f64) -> Lens =
-        |value| Lens::Fisheye(Fisheye::of_radial(&["k1", "k2", "k3", "k4"].map(value)));
-    CameraModel { name, focals, coefficients, of_list, of_names: Some(of_names) }
+    let from_list = |list: &[f64]| Lens::Fisheye(Fisheye::from_radial(list));
+    let from_names: fn(&dyn Fn(&str) -> f64) -> Lens =
+        |value| Lens::Fisheye(Fisheye::from_radial(&["k1", "k2", "k3", "k4"].map(value)));
+    CameraModel { name, focals, coefficients, from_list, from_names: Some(from_names) }
 }
 
-const fn other(name: &'static str, focals: usize, coefficients: usize, of_list: fn(&[f64]) -> Lens) -> CameraModel {
-    CameraModel { name, focals, coefficients, of_list, of_names: None }
+const fn other(name: &'static str, focals: usize, coefficients: usize, from_list: fn(&[f64]) -> Lens) -> CameraModel {
+    CameraModel { name, focals, coefficients, from_list, from_names: None }
 }
 
 const fn division(name: &'static str, focals: usize) -> CameraModel {
@@ -60,35 +66,35 @@ const fn division(name: &'static str, focals: usize) -> CameraModel {
 }
 
 /// COLMAP's camera models; the index is COLMAP's number.
-pub const MODELS: [CameraModel; 18] = [
+pub const CAMERA_MODELS: [CameraModel; 18] = [
     pinhole("SIMPLE_PINHOLE", 1),
     pinhole("PINHOLE", 2),
     polynomial("SIMPLE_RADIAL", 1, 1),
     polynomial("RADIAL", 1, 2),
     polynomial("OPENCV", 2, 4),
     fisheye("OPENCV_FISHEYE", 2, 4),
-    CameraModel { of_names: Some(full), ..polynomial("FULL_OPENCV", 2, 8) },
+    CameraModel { from_names: Some(full), ..polynomial("FULL_OPENCV", 2, 8) },
     other("FOV", 2, 1, |list| Lens::Fov(Fov { angle: list[0] })),
     fisheye("SIMPLE_RADIAL_FISHEYE", 1, 1),
     fisheye("RADIAL_FISHEYE", 1, 2),
     CameraModel {
-        of_names: Some(thin_prism),
-        ..other("THIN_PRISM_FISHEYE", 2, 8, |list| Lens::Fisheye(Fisheye::of_thin_prism(list)))
+        from_names: Some(thin_prism),
+        ..other("THIN_PRISM_FISHEYE", 2, 8, |list| Lens::Fisheye(Fisheye::from_thin_prism(list)))
     },
-    other("RAD_TAN_THIN_PRISM_FISHEYE", 2, 12, |list| Lens::RadTan(RadTan::of_list(list))),
+    other("RAD_TAN_THIN_PRISM_FISHEYE", 2, 12, |list| Lens::RadTan(RadTan::from_list(list))),
     division("SIMPLE_DIVISION", 1),
     division("DIVISION", 2),
     fisheye("SIMPLE_FISHEYE", 1, 0),
     fisheye("FISHEYE", 2, 0),
     other("EUCM", 2, 2, |list| Lens::Eucm(Eucm { alpha: list[0], beta: list[1] })),
     CameraModel {
-        of_names: Some(|_| Lens::Equirectangular),
+        from_names: Some(|_| Lens::Equirectangular),
         ..other("EQUIRECTANGULAR", 0, 0, |_| Lens::Equirectangular)
     },
 ];
 
 fn full(value: &dyn Fn(&str) -> f64) -> Lens {
-    Polynomial::of_list(&["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(value)).into()
+    Polynomial::from_list(&["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(value)).into()
 }
 
 fn thin_prism(value: &dyn Fn(&str) -> f64) -> Lens {
@@ -96,17 +102,17 @@ fn thin_prism(value: &dyn Fn(&str) -> f64) -> Lens {
     Lens::Fisheye(Fisheye { radial, tangential, prism: ["sx1", "sy1"].map(value), skew: 0.0 })
 }
 
-/// Returns the model of a name.
+/// Returns the model with a name.
 pub fn model(name: &str) -> Option<&'static CameraModel> {
     all().iter().find(|model| model.name == name)
 }
 
-/// Returns the model of COLMAP's number.
+/// Returns the model with COLMAP's number.
 pub fn colmap_model(number: usize) -> Option<&'static CameraModel> {
     all().get(number)
 }
 
 fn all() -> &'static [CameraModel] {
-    const ALL: &[CameraModel] = &MODELS;
+    const ALL: &[CameraModel] = &CAMERA_MODELS;
     ALL
 }

@@ -1,4 +1,4 @@
-//! A lens with its focal lengths, principal point and picture size.
+//! A lens with its focal lengths, principal point and image size.
 
 use super::Lens;
 use glam::{DVec2, DVec3};
@@ -12,25 +12,25 @@ pub struct Optics {
     pub camera: Camera,
     /// The lens.
     pub lens: Lens,
-    /// Largest angle from the axis that the lens shows, radians, and its cosine.
+    /// Largest angle from the axis that the lens covers, radians, and its cosine.
     reach: f64,
     cos_reach: f64,
 }
 
 impl Optics {
-    /// Joins a camera and its lens.
+    /// Combines a camera and its lens.
     pub fn new(camera: Camera, lens: Lens) -> Self {
         let reach = lens.projection().map_or(FRAC_PI_2, |lens| lens.reach());
         Self { camera, lens, reach, cos_reach: reach.cos() }
     }
 
-    /// Returns the largest angle from the axis that the lens shows, radians.
+    /// Returns the largest angle from the axis that the lens covers, radians.
     pub fn reach(&self) -> f64 {
         self.reach
     }
 
-    /// Returns the place in the photo, px, of a direction in camera axes; `None` if the lens does not show it. The place
-    /// may lie outside of the photo.
+    /// Returns the position in the photo, px, of a direction in camera axes; `None` if the lens does not cover it. The
+    /// position may lie outside the photo.
     pub fn pixel(&self, direction: DVec3) -> Option<DVec2> {
         let Camera { fx, fy, cx, cy, .. } = self.camera;
         let Some(lens) = self.lens.projection() else {
@@ -43,7 +43,7 @@ impl Optics {
         Some(DVec2::new(fx * at.x + cx, fy * at.y + cy)).filter(|at| at.is_finite())
     }
 
-    /// Returns the unit direction in camera axes of a place in the photo, px; `None` if the lens shows nothing there.
+    /// Returns the unit direction in camera axes of a position in the photo, px; `None` outside the lens.
     pub fn direction(&self, pixel: DVec2) -> Option<DVec3> {
         let Camera { fx, fy, cx, cy, .. } = self.camera;
         let point = DVec2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy);
@@ -53,9 +53,9 @@ impl Optics {
         }
     }
 
-    /// Returns true if a place, px, is in the photo.
+    /// Returns true if a position, px, is inside the photo.
     pub fn holds(&self, pixel: DVec2) -> bool {
-        // The seam of a panorama is its last or its first pixel, by rounding.
+        // By rounding, the seam of a panorama is its last or its first pixel.
         let inside = |at: f64, side: u32| (-1e-9..f64::from(side) + 1e-9).contains(&at);
         inside(pixel.x, self.camera.width) && inside(pixel.y, self.camera.height)
     }

@@ -1,9 +1,9 @@
-//! The lens model of OpenCV.
+//! OpenCV's lens model.
 
 use super::Projection;
 use glam::{DVec2, DVec3};
 
-/// Radial and tangential distortion of OpenCV; with all coefficients 0 a pinhole.
+/// OpenCV's radial and tangential distortion; a pinhole if all coefficients are 0.
 ///
 /// A point (x, y) on the plane z = 1 with distance r from the axis moves to (x, y) (1 + n1 r^2 + n2 r^4 + n3 r^6 + n4
 /// r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6) plus the tangential part.
@@ -15,20 +15,20 @@ pub struct Polynomial {
     pub denominator: [f64; 3],
     /// Tangential part: p1 and p2.
     pub tangential: [f64; 2],
-    /// Part of y that adds to x: Metashape's b2 over the focal length.
+    /// Contribution of y to x: Metashape's b2 over the focal length.
     pub skew: f64,
 }
 
 impl Polynomial {
     /// Reads COLMAP's list: k1 k2 p1 p2 k3 k4 k5 k6, or the first of them.
-    pub(super) fn of_list(list: &[f64]) -> Self {
+    pub(super) fn from_list(list: &[f64]) -> Self {
         let at = |index: usize| list.get(index).copied().unwrap_or(0.0);
         let (numerator, denominator) = ([at(0), at(1), at(4), 0.0], [at(5), at(6), at(7)]);
         Self { numerator, denominator, tangential: [at(2), at(3)], skew: 0.0 }
     }
 
     /// Reads the names of `transforms.json`.
-    pub(super) fn of_names(value: &dyn Fn(&str) -> f64) -> Self {
+    pub(super) fn from_names(value: &dyn Fn(&str) -> f64) -> Self {
         let numerator = ["k1", "k2", "k3", "k4"].map(value);
         Self { numerator, tangential: ["p1", "p2"].map(value), ..Self::default() }
     }
@@ -45,7 +45,7 @@ impl Polynomial {
     }
 }
 
-/// The tangential part of OpenCV's models.
+/// The tangential term of OpenCV's models.
 pub(super) fn tangential(at: DVec2, [p1, p2]: [f64; 2]) -> DVec2 {
     let (x, y, r2) = (at.x, at.y, at.length_squared());
     DVec2::new(2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)

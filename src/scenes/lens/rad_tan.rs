@@ -1,18 +1,18 @@
-//! The fisheye of Project Aria, COLMAP's RAD_TAN_THIN_PRISM_FISHEYE.
+//! Project Aria's fisheye, COLMAP's RAD_TAN_THIN_PRISM_FISHEYE.
 
 use super::Projection;
 use super::polynomial::tangential;
 use super::projection::angle_of;
 use glam::{DVec2, DVec3};
 
-/// A direction at the angle a from the axis is at the distance r = a (1 + k0 a^2 + ... + k5 a^12); tangential and thin
-/// prism parts follow from that place, the latter as s0 r^2 + s1 r^4 in x and s2 r^2 + s3 r^4 in y. Project Aria calls it
-/// Fisheye624.
+/// A direction at angle a from the axis is at distance r = a (1 + k0 a^2 + ... + k5 a^12). Tangential and thin prism
+/// terms depend on that position, the latter as s0 r^2 + s1 r^4 in x and s2 r^2 + s3 r^4 in y. Project Aria calls the
+/// model Fisheye624.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RadTan {
     /// k0 to k5.
     pub radial: [f64; 6],
-    /// p0 and p1; p0 belongs to x, the other way round than in OpenCV.
+    /// p0 and p1; p0 belongs to x, unlike in OpenCV.
     pub tangential: [f64; 2],
     /// s0 to s3.
     pub prism: [f64; 4],
@@ -20,7 +20,7 @@ pub struct RadTan {
 
 impl RadTan {
     /// Reads COLMAP's list: k0 to k5, p0 p1, s0 to s3.
-    pub(super) fn of_list(list: &[f64]) -> Self {
+    pub(super) fn from_list(list: &[f64]) -> Self {
         let at = |index: usize| list.get(index).copied().unwrap_or(0.0);
         Self {
             radial: std::array::from_fn(at),

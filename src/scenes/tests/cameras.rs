@@ -1,4 +1,4 @@
-//! A camera from a JSON file, a path of one, and the list of all cameras.
+//! A camera and a camera path from JSON files, and the list of all cameras.
 
 use super::fixtures::{Scene, refusal};
 use glam::{DMat3, DVec3};
@@ -36,7 +36,7 @@ fn cameras_are_read_and_listed() {
         serde_json::from_slice(&fs::read(scene.at("cameras.json")).expect("bytes")).expect("JSON");
     assert_eq!(list[1]["id"], 1);
     assert_eq!(list[1]["img_name"], "b.png");
-    // World-from-camera is the transpose: its first row is (0, -1, 0); the centre is minus that times (1, 2, 3).
+    // World-from-camera is the transpose: its first row is (0, -1, 0); the centre is its negative times (1, 2, 3).
     assert_eq!(list[0]["rotation"][0], serde_json::json!([0.0, -1.0, 0.0]));
     assert_eq!(list[0]["position"], serde_json::json!([2.0, -1.0, -3.0]));
     assert_eq!(list[0]["cx"], 3.0);

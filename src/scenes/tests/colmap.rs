@@ -1,4 +1,4 @@
-//! COLMAP models, binary and text, whole and damaged.
+//! COLMAP models: binary and text, intact and damaged.
 
 use super::fixtures::*;
 use super::{names, noted, open};
@@ -93,7 +93,7 @@ fn every_camera_model_has_its_parameters_in_its_order() {
             let dataset = open(&scene).expect("a scene");
             assert_eq!(dataset.train.len(), if model == 17 { 6 } else { 1 }, "{name}");
             assert_eq!(dataset.notes.iter().any(|note| note.contains("undistorted")), model > 1);
-            // Polynomials keep the intrinsics; the others keep the scale of the middle.
+            // Polynomials keep the intrinsics; the others keep the scale at the centre.
             let read = &dataset.train[0].camera;
             if matches!(model, 0..=4 | 6) {
                 assert_eq!((read.fx, read.cx, read.cy), (10.0, 6.0, 4.0));
@@ -259,7 +259,7 @@ fn broken_text_names_the_line() {
         scene.write(&format!("sparse/{file}"), text);
         refusal(open(&scene))
     };
-    assert!(broken("cameras.txt", "# c\n1 PINHOLE 12 8 10 11 5").contains("4 parameters, 3"));
+    assert!(broken("cameras.txt", "# c\n1 PINHOLE 12 8 10 11 5").contains("4 parameters, but 3"));
     assert!(broken("cameras.txt", "# c\n1 PINHOLE twelve 8").contains("line 2"));
     assert!(broken("cameras.txt", "1 MAGIC 12 8 1").contains("MAGIC"));
     assert!(broken("images.txt", "1 1 0 0 0 0 0 0 1\n\n").contains("name"));
@@ -305,7 +305,7 @@ fn files_of_a_model_may_have_different_forms() {
     }
     let dataset = open(&scene).expect("a scene");
     assert_eq!((dataset.train.len(), dataset.points.len()), (2, POINTS.len()));
-    // Points of a trainer, if the model has none.
+    // The points file of a trainer is used if the model has none.
     fs::remove_file(binary.join("points3D.txt")).expect("removed");
     scene.write("sparse/0/points3D.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
                  property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n1 2 3 4 5 6\n");
@@ -346,7 +346,7 @@ fn one_broken_row_leaves_its_photo_or_point_out() {
         assert_eq!(dataset.all().len(), 11, "{row}");
         noted(&dataset.notes, &["1 of 12"]);
     }
-    // A file that ends within a row was cut short, and more may be lost than that row.
+    // A file that ends within a row was truncated, and may have lost more than that row.
     fs::write(&path, of_last("12 0.9 0 0 0 1 2").trim_end()).expect("written");
     assert!(refusal(open(&scene)).contains("the line ends where"));
     fs::write(&path, &text).expect("written");
@@ -355,7 +355,7 @@ fn one_broken_row_leaves_its_photo_or_point_out() {
     fs::write(&path, format!("{text}9 1 2 x 0 0 0\n")).expect("written");
     let dataset = open(&scene).expect("a scene");
     assert_eq!(dataset.points.len(), POINTS.len());
-    noted(&dataset.notes, &["1 point left out", "`x`"]);
+    noted(&dataset.notes, &["1 point omitted", "`x`"]);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Depth maps from every kind of file, brought to their photos.
+//! Depth maps from all supported file types, matched to their photos.
 
 use super::all;
 use super::fixtures::{ColmapCamera, Scene, refusal, simple};
@@ -7,9 +7,9 @@ use labelgs_scene::{Dataset, DepthMap, View};
 use labelgs_scenes::{self as scenes, DepthFolder, LoadOptions, Lookup};
 use std::path::Path;
 
-const SIZE: (u32, u32) = (12, 8);
+const PHOTO_SIZE: (u32, u32) = (12, 8);
 
-/// A number per pixel that 16 bits, a float16 and a float32 hold exactly.
+/// A number per pixel that 16-bit integers, float16 and float32 all represent exactly.
 fn value(index: usize) -> f32 {
     (index * 3 + 1) as f32
 }
@@ -54,7 +54,7 @@ fn pfm(scale: &str, float: fn(f32) -> [u8; 4]) -> Vec<u8> {
 }
 
 fn png(path: &Path, depth: png::BitDepth, colour: png::ColorType, bytes: &[u8]) {
-    let mut encoder = png::Encoder::new(std::fs::File::create(path).expect("a file"), SIZE.0, SIZE.1);
+    let mut encoder = png::Encoder::new(std::fs::File::create(path).expect("a file"), PHOTO_SIZE.0, PHOTO_SIZE.1);
     encoder.set_color(colour);
     encoder.set_depth(depth);
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");
@@ -64,7 +64,7 @@ fn words() -> Vec<u8> {
     values().iter().flat_map(|&v| (v as u16).to_be_bytes()).collect()
 }
 
-/// One file of depths, to be read back bit by bit.
+/// A depth file to be read back bit by bit.
 #[track_caller]
 fn comes_back(name: &str, write: impl FnOnce(&Path)) {
     let scene = simple(1);
@@ -88,7 +88,7 @@ fn every_kind_of_file_comes_back_exactly() {
     let grey: Vec<[f32; 3]> = values().iter().map(|&v| [v, 0.0, -v]).collect();
     comes_back("00.exr", |path| files::image::write_exr_rgb(path, 12, 8, &grey).expect("written"));
     comes_back("00.png", |path| png(path, png::BitDepth::Sixteen, png::ColorType::Grayscale, &words()));
-    // A picture of the depth beside the depth is not read.
+    // An image of the depth beside the depth is not read.
     comes_back("00.exr", |path| {
         files::image::write_exr_y(path, 12, 8, &values()).expect("written");
         std::fs::write(path.with_extension("png"), b"a picture").expect("written");
@@ -149,18 +149,18 @@ fn a_folder_must_have_all_maps() {
 #[test]
 fn maps_follow_the_size_of_the_view() {
     let scene = simple(1);
-    // Twice as large as the photo, each photo pixel's own four pixels equal.
+    // Twice as large as the photo; the four pixels of each photo pixel are equal.
     let large: Vec<f32> = (0..24 * 16).map(|i| value(i / 48 * 12 + i % 24 / 2)).collect();
     files::image::write_exr_y(scene.at("depths/00.exr"), 24, 16, &large).expect("written");
     assert_eq!(read(&scene).expect("a map").values, values());
     let dataset = open(&scene, Some(6));
     let half = folder(&scene).expect("a folder").read(&dataset.train[0]).expect("a map");
-    // The centre of a pixel of half size is a corner of four; the lower right one of them is taken.
+    // The centre of a half-size pixel is a corner of four; the lower right one is used.
     let expected: Vec<f32> = (0..24).map(|i| value((i / 6 * 2 + 1) * 12 + i % 6 * 2 + 1)).collect();
     assert_eq!((half.width, half.height, half.values), (6, 4, expected));
 }
 
-/// Ids and depths that hold the same numbers must go the same way through a lens.
+/// Ids and depths with the same numbers are resampled alike through a lens.
 #[test]
 fn maps_are_undistorted_as_masks_are() {
     let scene = Scene::new();

@@ -1,4 +1,4 @@
-//! Photos at other places than the scene lists, photos that are missing, and files that are no photos.
+//! Photos that are not at their listed paths, missing photos, and files that are not photos.
 
 use super::fixtures::*;
 use super::{all, names, open};
@@ -45,7 +45,7 @@ fn photos_are_found_where_programs_put_them() {
 
 #[test]
 fn a_match_that_is_not_the_only_one_does_not_count() {
-    // Of a photo that others lie beside, a smaller copy elsewhere is not taken.
+    // If other photos are in the listed folder, a smaller copy elsewhere is not used.
     let scene = moved(&["a.png", "b.png", "c.png", "d.png"], &["images/a.png", "images/b.png", "images/c.png"]);
     scene.photo("images_8/d.png", 12, 8);
     let dataset = open(&scene).expect("a scene");
@@ -54,7 +54,7 @@ fn a_match_that_is_not_the_only_one_does_not_count() {
     two.photo("images/a.png", 12, 8);
     two.photo("images/a.jpg", 12, 8);
     assert_eq!(open(&two).expect("a scene").train.len(), 3);
-    // Two listed photos with one file.
+    // Two listed photos with the same file.
     let one = moved(&["a.png", "a.jpg"], &["images/A.jpeg"]);
     let text = refusal(open(&one));
     assert!(text.contains("only file") && text.contains("`images`"), "{text}");
@@ -70,7 +70,7 @@ fn the_folder_of_photos_can_be_named() {
     }
     let error = open_with(&scene, "nowhere").expect_err("no folder");
     assert!(matches!(error, Error::Usage { .. }));
-    assert!(error.to_string().contains("nowhere is no folder"), "{error}");
+    assert!(error.to_string().contains("nowhere is not a folder"), "{error}");
 }
 
 #[test]

@@ -23,7 +23,7 @@ pub fn pinhole() -> ColmapCamera {
     ColmapCamera { model: 1, name: "PINHOLE", size: (12, 8), parameters: vec![10.0, 11.0, 5.5, 4.5] }
 }
 
-/// Pose of image `index` of the fixtures.
+/// Pose of image `index` in the fixtures.
 pub fn pose(index: usize) -> ([f64; 4], [f64; 3]) {
     ([0.9, 0.1 * index as f64, -0.2, 0.3], [index as f64, 0.5, 4.0])
 }
@@ -132,7 +132,7 @@ pub fn simple(count: usize) -> Scene {
     scene
 }
 
-/// The text of an error, which must be one of bad input.
+/// The text of an error, which must be an input error.
 #[track_caller]
 pub fn refusal<T>(result: labelgs_scene::Result<T>) -> String {
     match result {

@@ -1,4 +1,4 @@
-//! Poses and points of one frame: stray poses, other conventions, points of something else.
+//! Poses and points that share a frame, outlier poses, other conventions, and points of something else.
 
 use super::fixtures::Scene;
 use super::{all, noted};
@@ -7,15 +7,15 @@ use image::{Rgb, RgbImage};
 use labelgs_scene::{Camera, Dataset, SceneProblem};
 use labelgs_scenes::{self as scenes, LoadOptions, Lookup};
 
-const SIZE: u32 = 64;
-const VIEWS: usize = 10;
-const POINTS: usize = 400;
+const PHOTO_SIZE: u32 = 64;
+const VIEW_COUNT: usize = 10;
+const POINT_COUNT: usize = 400;
 
-/// Points on a ball, each of its own colour.
+/// Points on a ball, each with a different colour.
 fn points() -> Vec<(DVec3, [u8; 3])> {
-    (0..POINTS)
+    (0..POINT_COUNT)
         .map(|index| {
-            let height = 1.0 - 2.0 * (index as f64 + 0.5) / POINTS as f64;
+            let height = 1.0 - 2.0 * (index as f64 + 0.5) / POINT_COUNT as f64;
             let (angle, radius) = (index as f64 * 2.4, (1.0 - height * height).sqrt());
             let at = DVec3::new(radius * angle.cos(), radius * angle.sin(), height);
             (at, [0, 1, 2].map(|axis| (127.0 + 120.0 * at[axis]) as u8))
@@ -25,7 +25,7 @@ fn points() -> Vec<(DVec3, [u8; 3])> {
 
 /// World-to-camera pose of a view that looks at the ball.
 fn pose(view: usize) -> (DMat3, DVec3) {
-    let angle = std::f64::consts::TAU * view as f64 / VIEWS as f64;
+    let angle = std::f64::consts::TAU * view as f64 / VIEW_COUNT as f64;
     let centre = 4.0 * DVec3::new(angle.cos(), angle.sin(), 0.3);
     let forward = -centre.normalize();
     let right = forward.cross(DVec3::Z).normalize();
@@ -34,24 +34,33 @@ fn pose(view: usize) -> (DMat3, DVec3) {
 }
 
 fn camera((rotation, translation): (DMat3, DVec3)) -> Camera {
-    let side = f64::from(SIZE);
-    Camera { rotation, translation, fx: side, fy: side, cx: side / 2.0, cy: side / 2.0, width: SIZE, height: SIZE }
+    let side = f64::from(PHOTO_SIZE);
+    Camera {
+        rotation,
+        translation,
+        fx: side,
+        fy: side,
+        cx: side / 2.0,
+        cy: side / 2.0,
+        width: PHOTO_SIZE,
+        height: PHOTO_SIZE,
+    }
 }
 
-/// Writes a COLMAP scene of the ball. `stored` changes what is written of the pose of a view.
+/// Writes a COLMAP scene of the ball. `stored` changes the written pose of a view.
 fn ball(stored: impl Fn(usize, (DMat3, DVec3)) -> (DQuat, DVec3)) -> Scene {
     let scene = Scene::new();
-    let side = f64::from(SIZE);
+    let side = f64::from(PHOTO_SIZE);
     scene.write(
         "sparse/0/cameras.txt",
-        format!("1 PINHOLE {SIZE} {SIZE} {side} {side} {} {}\n", side / 2.0, side / 2.0),
+        format!("1 PINHOLE {PHOTO_SIZE} {PHOTO_SIZE} {side} {side} {} {}\n", side / 2.0, side / 2.0),
     );
     let mut images = String::new();
-    for view in 0..VIEWS {
+    for view in 0..VIEW_COUNT {
         let (q, t) = stored(view, pose(view));
         images += &format!("{} {} {} {} {} {} {} {} 1 {view:02}.png\n\n", view + 1, q.w, q.x, q.y, q.z, t.x, t.y, t.z);
         let seen = camera(pose(view));
-        let mut photo = RgbImage::from_pixel(SIZE, SIZE, Rgb([90; 3]));
+        let mut photo = RgbImage::from_pixel(PHOTO_SIZE, PHOTO_SIZE, Rgb([90; 3]));
         let mut near: Vec<(f64, u32, u32, [u8; 3])> = Vec::new();
         for (at, colour) in points() {
             let pixel = seen.sees(at).expect("in the picture");
@@ -60,7 +69,7 @@ fn ball(stored: impl Fn(usize, (DMat3, DVec3)) -> (DQuat, DVec3)) -> Scene {
         near.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, x, y, colour) in near {
             for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                photo.put_pixel((x + dx).min(SIZE - 1), (y + dy).min(SIZE - 1), Rgb(colour));
+                photo.put_pixel((x + dx).min(PHOTO_SIZE - 1), (y + dy).min(PHOTO_SIZE - 1), Rgb(colour));
             }
         }
         photo.save(scene.at(&format!("images/{view:02}.png"))).expect("a photo");
@@ -126,10 +135,10 @@ fn points_of_something_else_are_noticed() {
         "{:?}",
         dataset.flaws
     );
-    // The right places with the colours of others.
+    // The right positions with the colours of others.
     let turned: String = points()
         .iter()
-        .zip(points().iter().cycle().skip(POINTS / 3))
+        .zip(points().iter().cycle().skip(POINT_COUNT / 3))
         .enumerate()
         .map(|(id, ((at, _), (_, [r, g, b])))| format!("{id} {} {} {} {b} {r} {g} 0\n", at.x, at.y, at.z))
         .collect();
@@ -157,13 +166,13 @@ fn one_camera_far_away_moves_nothing() {
             (DQuat::from_mat3(&r), if view == 7 { t + DVec3::new(0.0, 0.0, distance) } else { t })
         }
     };
-    // Beyond everything: it is left out. Nearer: it stays, and the extent does not follow it.
-    for (distance, count) in [(38_000.0, VIEWS - 1), (60.0, VIEWS)] {
+    // A very distant photo is omitted. A nearer one stays, and the extent ignores it.
+    for (distance, count) in [(38_000.0, VIEW_COUNT - 1), (60.0, VIEW_COUNT)] {
         let dataset = open(&ball(stray(distance)), "");
         assert_eq!(dataset.train.len(), count, "{distance}");
         let left_out =
             dataset.flaws.iter().any(|flaw| matches!(flaw, SceneProblem::LeftOut(text) if text.contains("07.png")));
-        assert_eq!(left_out, count < VIEWS, "{:?}", dataset.flaws);
+        assert_eq!(left_out, count < VIEW_COUNT, "{:?}", dataset.flaws);
         assert!((dataset.extent() / usual - 1.0).abs() < 0.2, "{distance}: {} {usual}", dataset.extent());
     }
 }

@@ -22,7 +22,7 @@ fn gaussians_stand_on_the_points() {
     // Neighbours of 9 among the squares: 4, 16 and 1 or 0.
     let expected = 0.5 * f64::ln((25.0 + 49.0 + 64.0) / 3.0);
     assert!(g.scales[3].iter().all(|&s| (f64::from(s) - expected).abs() < 1e-6));
-    // Points at one place get the smallest allowed size.
+    // Coinciding points get the smallest allowed size.
     assert!((f64::from(g.scales[22][0]) - 0.5 * f64::ln(1e-7)).abs() < 1e-5);
 }
 
@@ -55,7 +55,7 @@ fn over_a_plain_background_the_visual_hull_remains() {
 
 #[test]
 fn in_a_room_points_are_swept_onto_the_surfaces() {
-    // A textured wall at z = 6 before cameras in a row.
+    // A textured wall at z = 6 in front of cameras in a row.
     let shade = |camera: &Camera, ray: DVec3| {
         let at = camera.centre() + ray * ((6.0 - camera.centre().z) / ray.z);
         let wave = |value: f64| (128.0 + 100.0 * (value * 2.1).sin()) as u8;
@@ -114,8 +114,8 @@ fn no_gaussian_of_a_made_up_point_covers_a_picture() {
     assert!(bounded > 20, "the bound was reached {bounded} times only");
 }
 
-/// Cameras on a ring look over a ground with points at a blue sky. Only directions above all points get far Gaussians,
-/// in the colour of the sky.
+/// Cameras on a ring look across a ground with points at a blue sky. Only directions above all points get far
+/// Gaussians, in the colour of the sky.
 #[test]
 fn far_gaussians_stand_where_photos_look_past_the_points() {
     let cameras = (0..12).map(|index| {

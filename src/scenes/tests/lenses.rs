@@ -1,4 +1,4 @@
-//! Lenses: their formulas, and a made scene photographed through each of them.
+//! Lenses: their formulas, and a synthetic scene photographed through each of them.
 
 use glam::{DVec2, DVec3};
 use labelgs_scene::{Camera, Dataset, LabelMap, View};
@@ -83,7 +83,7 @@ fn every_lens_is_undone_and_grows_with_the_angle() {
 
 #[test]
 fn a_lens_ends_where_it_would_show_things_twice() {
-    // a - a^3 turns round at 1 / sqrt 3.
+    // a - a^3 has its maximum at 1 / sqrt 3.
     let folded = Fisheye { radial: [-1.0, 0.0, 0.0, 0.0], ..Fisheye::default() };
     assert!((folded.reach() - 3f64.powf(-0.5)).abs() < 1e-3);
     assert_eq!(Fisheye::default().reach(), FRAC_PI_2);
@@ -125,8 +125,8 @@ fn read(folder: &Path, options: &SynthOptions) -> Dataset {
     labelgs_scenes::open(folder, &load).expect("read")
 }
 
-/// PSNR of a view against the picture of a pinhole camera in its place, over the covered pixels; the share of equal
-/// ids; the number of covered pixels.
+/// PSNR of a view against a pinhole render at its pose, over the covered pixels; the share of equal ids; the number of
+/// covered pixels.
 fn compared(world: &World, view: &View) -> (f64, f64, usize) {
     let (photo, mask) = (view.photo().expect("a photo"), view.mask().expect("read").expect("a mask"));
     let made = trace_view(world, &view.camera, 0);
@@ -143,8 +143,8 @@ fn compared(world: &World, view: &View) -> (f64, f64, usize) {
     (-10.0 * (error / (3 * count.max(1)) as f64).log10(), same as f64 / count as f64, count)
 }
 
-/// Bilinear interpolation and the two sets of samples in a pixel cost what they cost OPENCV, 42 dB, and a few dB more where
-/// faces enlarge the photo. A lens that is a pixel off would be below 30 dB at the edges of this scene.
+/// Bilinear interpolation and resampling within pixels limit OPENCV to 42 dB, and views enlarged from faces to a few dB
+/// less. A lens that is off by a pixel would be below 30 dB at the edges of this scene.
 #[test]
 fn a_scene_through_every_lens_is_that_of_a_pinhole() {
     let world = World::new(Preset::Simple, 0);
@@ -185,7 +185,7 @@ fn a_wide_photo_becomes_the_faces_that_it_covers() {
     assert!(split.test.len() == 5 && split.test.iter().all(|view| view.name.starts_with("000.")));
 }
 
-/// A pinhole view with the focal lengths of the photo would end at 51 degrees from the axis.
+/// A pinhole view with the photo's focal lengths would end at 51 degrees from the axis.
 #[test]
 fn a_wide_polynomial_shows_all_that_the_photo_has() {
     let world = World::new(Preset::Simple, 0);
@@ -204,7 +204,7 @@ fn a_wide_polynomial_shows_all_that_the_photo_has() {
     }
 }
 
-/// Masks that were made for views go back to the photos that they came from.
+/// Masks made for views are mapped back to their photos.
 #[test]
 fn ids_return_to_the_photo() {
     for (name, fov) in [("OPENCV_FISHEYE", 170), ("FOV", 80), ("EQUIRECTANGULAR", 90)] {
@@ -225,7 +225,7 @@ fn ids_return_to_the_photo() {
     }
 }
 
-/// The observations of a made scene fit its lens, as `labelgs check` finds.
+/// The observations of a synthetic scene fit its lens, as `labelgs check` finds.
 #[test]
 fn observed_points_are_where_the_lens_shows_them() {
     for name in ["THIN_PRISM_FISHEYE", "EQUIRECTANGULAR", "OPENCV"] {

@@ -1,4 +1,4 @@
-//! Readers of scenes, on files that the tests write.
+//! Scene readers, on files that the tests write.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,
@@ -25,12 +25,12 @@ mod transforms; // transforms.json and its dialects
 use labelgs_scene::{Dataset, Result, View};
 use labelgs_scenes::LoadOptions;
 
-/// Options with which nothing is held out.
+/// Options without held-out views.
 fn all() -> LoadOptions {
     LoadOptions { test_every: None, ..LoadOptions::default() }
 }
 
-/// Opens a scene of which nothing is held out.
+/// Opens a scene without held-out views.
 fn open(scene: &fixtures::Scene) -> Result<Dataset> {
     labelgs_scenes::open(scene.path(), &all())
 }
@@ -39,7 +39,7 @@ fn names(views: &[View]) -> Vec<&str> {
     views.iter().map(|view| view.name.as_str()).collect()
 }
 
-/// Requires a note with all of `parts`.
+/// Requires a note that contains all `parts`.
 #[track_caller]
 fn noted(notes: &[String], parts: &[&str]) {
     let has = |note: &String| parts.iter().all(|part| note.contains(part));

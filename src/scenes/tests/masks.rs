@@ -13,7 +13,7 @@ fn png(path: &Path, size: (u32, u32), colour: png::ColorType, depth: png::BitDep
     encoder.set_color(colour);
     encoder.set_depth(depth);
     if colour == png::ColorType::Indexed {
-        // All entries have one colour, so a reader of colours loses the ids.
+        // All entries have the same colour, so a reader of colours loses the ids.
         encoder.set_palette(vec![9u8; 3 * (1 << (depth as usize).min(8))]);
     }
     encoder.write_header().expect("a header").write_image_data(bytes).expect("pixels");
@@ -91,13 +91,13 @@ fn equal_channels_are_ids_where_opacity_says_nothing() {
         png(&path, (2, 2), png::ColorType::GrayscaleAlpha, png::BitDepth::Eight, bytes);
         read_mask(&path)
     };
-    // Nothing is behind a transparent background.
+    // A transparent background shows nothing behind it.
     assert_eq!(with_alpha(&[0, 0, 7, 255, 0, 9, 0, 255]).expect("a mask").ids, [0, 7, 0, 0]);
     assert!(refusal(with_alpha(&[7, 254, 7, 255, 0, 0, 0, 0])).contains("transparent pixels that are not black"));
     assert!(refusal(with_alpha(&[0, 0, 0, 255, 0, 255, 0, 0])).contains("only its opacity differs"));
 }
 
-/// Writes a mask of one id.
+/// Writes a mask with a single id.
 fn flat(scene: &Scene, file: &str, id: u8) {
     png(&scene.at(file), (12, 8), png::ColorType::Grayscale, png::BitDepth::Eight, &[id; 96]);
 }
@@ -116,7 +116,7 @@ fn masks_are_found_across_case_and_composition() {
         let view = dataset.train.iter().find(|view| view.name == name).expect("a view");
         view.mask().expect("read").map(|mask| mask.ids[0])
     };
-    // Two photos match d.PNG, which is spelt as one of them; two files match f.jpg, and one is spelt as it.
+    // Two photos match d.PNG, and one is spelt exactly so; two files match f.jpg, and one is spelt exactly so.
     assert_eq!(names.map(id), [Some(1), Some(2), Some(3), Some(4), None, Some(6)]);
 }
 
@@ -253,18 +253,18 @@ fn ignored_pixels_have_no_weight() {
     assert!(alphas(0).iter().enumerate().all(|(at, &alpha)| alpha == if at % 12 < 6 { 0 } else { 255 }));
     assert!(alphas(1).iter().all(|&alpha| alpha == 255), "a photo without a picture counts as a whole");
     noted(&dataset.notes, &["1 of 2 photos have no picture of what to ignore: 01.png"]);
-    // Colours serve too; opacity says nothing.
+    // Colours are accepted too; opacity is ignored.
     let colours: Vec<u8> = half.iter().flat_map(|&value| [0, value, 0, 255]).collect();
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Rgba, png::BitDepth::Eight, &colours);
     let photo = |dataset: &Dataset| dataset.train[0].photo().expect("a photo");
     assert_eq!(*photo(&open(&scene).expect("a scene")), *photo(&dataset));
-    // Nothing is left of a photo, or of all.
+    // Nothing remains of one photo, or of all.
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[255; 24]);
     let rest = open(&scene).expect("a scene");
     assert_eq!(rest.train.iter().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["01.png"]);
-    noted(&rest.notes, &["1 views are skipped, because 00.png have no pixel"]);
+    noted(&rest.notes, &["1 views are skipped, because 00.png have no valid pixel"]);
     png(&scene.at("ignore/01.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &[1; 24]);
-    assert!(refusal(open(&scene)).contains("no pixel that counts"));
+    assert!(refusal(open(&scene)).contains("no valid pixel"));
     fs::remove_file(scene.at("ignore/01.png")).expect("removed");
     png(&scene.at("ignore/00.png"), (6, 4), png::ColorType::Grayscale, png::BitDepth::Eight, &half);
     // The same through a lens: no colour of an ignored pixel is mixed in.

@@ -1,4 +1,4 @@
-//! Photos of objects alone: their opacity, the colours of their edges, what is read and what is left out.
+//! Photos of isolated objects: opacity, edge colours, and what is read or omitted.
 
 use super::fixtures::{Scene, simple};
 use super::{noted, open as open_plain};
@@ -7,29 +7,32 @@ use labelgs_scene::{Dataset, LabelMap, Photo, Result};
 use labelgs_scenes::LoadOptions;
 use labelgs_scenes::matte::cut_out;
 
-const WIDTH: usize = 480;
-const HEIGHT: usize = 60;
-const WALL: [f64; 3] = [250.0, 245.0, 240.0];
+const PHOTO_WIDTH: usize = 480;
+const PHOTO_HEIGHT: usize = 60;
+const WALL_COLOUR: [f64; 3] = [250.0, 245.0, 240.0];
 
-/// A photo with an upright edge: an object of a colour on the left of column `edge`, a wall on the right, both mixed as the
-/// edge shares a pixel. The mask ends at column `contour`.
+/// A photo with a vertical edge: an object colour to the left of column `edge`, a wall to the right, mixed in
+/// proportion within the edge's pixel. The mask ends at column `contour`.
 fn upright(object: [f64; 3], edge: f64, contour: usize) -> (Photo, LabelMap) {
     let texel = |at: usize| {
-        let share = (edge - (at % WIDTH) as f64).clamp(0.0, 1.0);
-        let [r, g, b] = [0, 1, 2].map(|c| (object[c] * share + WALL[c] * (1.0 - share)).round() as u8);
+        let share = (edge - (at % PHOTO_WIDTH) as f64).clamp(0.0, 1.0);
+        let [r, g, b] = [0, 1, 2].map(|c| (object[c] * share + WALL_COLOUR[c] * (1.0 - share)).round() as u8);
         [r, g, b, 255]
     };
-    let (width, height) = (WIDTH as u32, HEIGHT as u32);
-    let ids = (0..WIDTH * HEIGHT).map(|at| u16::from(at % WIDTH < contour) * 3).collect();
-    (Photo { width, height, rgba: (0..WIDTH * HEIGHT).map(texel).collect() }, LabelMap { width, height, ids })
+    let (width, height) = (PHOTO_WIDTH as u32, PHOTO_HEIGHT as u32);
+    let ids = (0..PHOTO_WIDTH * PHOTO_HEIGHT).map(|at| u16::from(at % PHOTO_WIDTH < contour) * 3).collect();
+    (
+        Photo { width, height, rgba: (0..PHOTO_WIDTH * PHOTO_HEIGHT).map(texel).collect() },
+        LabelMap { width, height, ids },
+    )
 }
 
 fn column(photo: &Photo, x: usize) -> [u8; 4] {
-    photo.rgba[HEIGHT / 2 * WIDTH + x]
+    photo.rgba[PHOTO_HEIGHT / 2 * PHOTO_WIDTH + x]
 }
 
-/// A contour a pixel too far out: the wall there is none of the object's, and the mixed pixel has the share and the colour of
-/// the object.
+/// The contour is one pixel too far out: the wall there does not belong to the object, and the mixed pixel gets the
+/// opacity and colour of the object.
 #[test]
 fn an_edge_has_the_colour_of_its_object_alone() {
     let object = [120.0, 60.0, 20.0];
@@ -38,7 +41,7 @@ fn an_edge_has_the_colour_of_its_object_alone() {
     assert_eq!(column(&photo, 90), [120, 60, 20, 255]);
     assert_eq!(column(&photo, 110), [0, 0, 0, ALPHA_CLEAR]);
     let [r, g, b, alpha] = column(&photo, 100);
-    // Half of the trust that the colours do not have goes to the distance from the contour.
+    // The weight that the colours lack goes to the distance from the contour.
     assert!(alpha.abs_diff(alpha_of(0.4)) <= 8, "{alpha}");
     let opacity = f64::from(alpha - ALPHA_CLEAR) / 127.0;
     for (own, of) in [r, g, b].into_iter().zip(object) {
@@ -51,28 +54,28 @@ fn an_edge_has_the_colour_of_its_object_alone() {
     );
 }
 
-/// An object as bright as its wall: only the contour tells, and opacity falls from one side of it to the other.
+/// An object as bright as its wall: only the contour decides, and opacity falls off across it.
 #[test]
 fn alike_colours_leave_the_edge_to_the_contour() {
-    let (mut photo, mask) = upright(WALL, 100.0, 100);
+    let (mut photo, mask) = upright(WALL_COLOUR, 100.0, 100);
     cut_out(&mut photo, &mask);
     let shares: Vec<u8> = (96..104).map(|x| column(&photo, x)[3]).collect();
     assert!(shares.is_sorted_by(|a, b| a >= b) && shares[0] == 255 && shares[7] == ALPHA_CLEAR, "{shares:?}");
     assert!(shares.iter().any(|&share| (140..240).contains(&share)), "no soft edge: {shares:?}");
     for x in 96..104 {
         let [r, .., alpha] = column(&photo, x);
-        let expected = WALL[0] * f64::from(alpha - ALPHA_CLEAR) / 127.0;
+        let expected = WALL_COLOUR[0] * f64::from(alpha - ALPHA_CLEAR) / 127.0;
         assert!((f64::from(r) - expected).abs() <= 2.0, "{r} at {x}, not {expected}");
     }
 }
 
-/// Pixels without weight and pixels that were transparent before stay so; a mask of another size is scaled.
+/// Invalid and previously transparent pixels stay so; a mask of another size is scaled.
 #[test]
 fn what_was_clear_before_stays_clear() {
     let (mut photo, mask) = upright([10.0; 3], 100.0, 100);
     photo.rgba[0] = [0; 4];
     photo.rgba[1] = [5, 5, 5, alpha_of(0.5)];
-    let small = mask.resized(WIDTH as u32 / 2, HEIGHT as u32 / 2);
+    let small = mask.resized(PHOTO_WIDTH as u32 / 2, PHOTO_HEIGHT as u32 / 2);
     cut_out(&mut photo, &small);
     assert_eq!(photo.rgba[..2], [[0; 4], [5, 5, 5, alpha_of(0.5)]]);
     assert_eq!((column(&photo, 50), column(&photo, 200)), ([10, 10, 10, 255], [0, 0, 0, ALPHA_CLEAR]));
@@ -83,8 +86,8 @@ fn open(scene: &Scene, options: LoadOptions) -> Result<Dataset> {
     labelgs_scenes::open(scene.path(), &LoadOptions { masks, masked_only: true, ..options })
 }
 
-/// Photos to train on are cut to their objects with the camera, held-out ones are whole, and those without an object are left
-/// out, with a line that says so. Photos that memory cannot hold have the same pixels.
+/// Training photos are cropped to their objects together with their cameras, held-out ones stay whole, and those
+/// without an object are omitted with a note. Photos that do not fit into memory have the same pixels.
 #[test]
 fn photos_are_cut_to_their_objects() {
     let scene = simple(0);

@@ -130,12 +130,12 @@ fn distortion_equals_opencv() {
     assert!(lens.distort(at).distance(expected) < 1e-15);
     assert_eq!(Polynomial::default().distort(at), at);
     assert!(Lens::from(Polynomial::default()).is_pinhole() && !Lens::from(lens).is_pinhole());
-    // r (1 - r^2) turns round at r = 1 / sqrt 3.
+    // r (1 - r^2) has its maximum at r = 1 / sqrt 3.
     let folded = Polynomial { numerator: [-1.0, 0.0, 0.0, 0.0], ..Polynomial::default() };
     assert!((folded.reach().tan() - 3f64.powf(-0.5)).abs() < 2e-3);
 }
 
-/// A scene photographed through an OPENCV lens: the photo holds its own pixel coordinates as colours.
+/// A scene photographed through an OPENCV lens; the photo's colours encode its own pixel coordinates.
 fn distorted(k: [f64; 4], size: (u32, u32)) -> Scene {
     let scene = Scene::new();
     let (w, h) = (f64::from(size.0), f64::from(size.1));
@@ -183,7 +183,7 @@ fn undistortion_samples_where_the_model_says() {
                 }
                 inside += 1;
                 assert_eq!(texel[3], 255);
-                // A colour of n is the pixel whose centre lies at n + 0.5; the border pixels have no neighbour.
+                // A colour of n is the pixel with its centre at n + 0.5; border pixels have no neighbour.
                 let expected = (at - 0.5).clamp(DVec2::ZERO, DVec2::new(f64::from(size.0 - 1), f64::from(size.1 - 1)));
                 assert!((f64::from(texel[0]) - expected.x).abs() <= 0.51, "{x} {y}: {texel:?} {expected}");
                 assert!((f64::from(texel[1]) - expected.y).abs() <= 0.51, "{x} {y}: {texel:?} {expected}");
@@ -201,6 +201,6 @@ fn pixels_without_source_stay_out_when_shrunk() {
     let photo = dataset.train[0].photo().expect("a photo");
     let alphas: Vec<u8> = photo.rgba.iter().map(|texel| texel[3]).collect();
     assert_eq!((alphas[0], alphas[25 * 50 / 2 + 18 * 50]), (0, 255));
-    // No black of missing sources is mixed into the colours: blue is 200 wherever there is any.
+    // No black from missing sources is mixed into the colours: blue is 200 wherever it is non-zero.
     assert!(photo.rgba.iter().all(|texel| texel[3] == 0 || texel[2] == 200));
 }

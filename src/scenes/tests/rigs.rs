@@ -1,4 +1,4 @@
-//! Small scenes in memory: cameras around a place, photos by a rule.
+//! Small scenes in memory: cameras around a position, photos by a rule.
 
 use glam::{DMat3, DVec3};
 use labelgs_scene::{Camera, Dataset, Photo, Point, View};

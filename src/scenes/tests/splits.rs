@@ -1,4 +1,4 @@
-//! Splits that a data set brings.
+//! Splits that come with a data set.
 
 use super::fixtures::*;
 use super::{names, noted};
@@ -19,7 +19,7 @@ fn frames(range: std::ops::Range<usize>) -> String {
     range.map(frame).collect::<Vec<_>>().join(",")
 }
 
-/// Photos `00.png` and on, posed by transforms with `more` keys.
+/// Photos `00.png` and following, posed by transforms with `more` keys.
 fn transforms(count: usize, more: &str) -> Scene {
     let scene = Scene::new();
     (0..count).for_each(|index| scene.photo(&format!("images/{index:02}.png"), 12, 8));
@@ -39,7 +39,7 @@ fn lists_of_file_names_hold_out_and_leave_out() {
         "{note}"
     );
     assert!(note.contains("1 more in the list") && note.contains("test_every"), "{note}");
-    // Only what is held out is listed: the others are trained on.
+    // Only held-out photos are listed: the others are for training.
     let dataset = open(&transforms(3, r#""test_filenames": ["images/02.png"],"#));
     assert_eq!((dataset.train.len(), names(&dataset.test)), (2, vec!["02.png"]));
     let dataset = super::open(&transforms(3, r#""test_filenames": ["images/02.png"],"#)).expect("a scene");

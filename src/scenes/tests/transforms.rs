@@ -6,14 +6,14 @@ use glam::DVec3;
 use labelgs_scene::Dataset;
 use labelgs_scenes::{self as scenes, LoadOptions};
 
-const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+const IDENTITY_MATRIX: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
 fn open(scene: &Scene) -> labelgs_scene::Result<Dataset> {
     scenes::open(scene.path(), &LoadOptions::default())
 }
 
 fn frame(name: &str, more: &str) -> String {
-    format!(r#"{{"file_path": "{name}", "transform_matrix": {IDENTITY}{more}}}"#)
+    format!(r#"{{"file_path": "{name}", "transform_matrix": {IDENTITY_MATRIX}{more}}}"#)
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn poses_turn_from_opengl_to_opencv() {
     let dataset = open(&scene).expect("a scene");
     let camera = &dataset.train[0].camera;
     assert!(camera.centre().distance(DVec3::new(5.0, 6.0, 7.0)) < 1e-12);
-    // The third column is the axis that points backwards: the camera looks along -x of the world here.
+    // The third column is the axis that points backwards: here the camera looks along -x of the world.
     assert!(camera.to_camera(DVec3::new(3.0, 6.0, 7.0)).distance(DVec3::new(0.0, 0.0, 2.0)) < 1e-12);
     // The second column points up in the image, where y is negative.
     assert!(camera.to_camera(DVec3::new(5.0, 6.0, 8.0)).distance(DVec3::new(0.0, -1.0, 0.0)) < 1e-12);
@@ -125,7 +125,7 @@ fn lenses_have_the_names_of_nerfstudio_and_instant_ngp() {
         scene.write("transforms.json", format!(r#"{{{more} "frames": [{}]}}"#, frame("images/a.png", "")));
         open(&scene).expect("a scene").train
     };
-    // The edges are 6 px from the middle, at 10 px a radian.
+    // The edges are 6 px from the centre, at 10 px per radian.
     let half = 6.0 / 10.0;
     for text in [r#""camera_model": "OPENCV_FISHEYE","#, r#""is_fisheye": true,"#, r#""camera_model": "FISHEYE","#] {
         let all = views(&format!(r#""fl_x": 10, {text}"#));
@@ -161,11 +161,11 @@ fn invalid_values_are_refused_with_their_place() {
         let text = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {matrix}}}"#);
         broken(format!(r#"{{{more} "frames": [{text}]}}"#))
     };
-    assert!(one("", IDENTITY).contains("camera_angle_x"));
-    assert!(one(r#""fl_x": -1,"#, IDENTITY).contains("frame 0"));
-    assert!(one(r#""camera_angle_x": 3.2,"#, IDENTITY).contains("focal"));
-    assert!(one(r#""fl_x": 9, "camera_model": "ORTHOPHOTO","#, IDENTITY).contains("ORTHOPHOTO"));
-    assert!(one(r#""fl_x": 9, "w": 11.5, "h": 8,"#, IDENTITY).contains("11.5"));
+    assert!(one("", IDENTITY_MATRIX).contains("camera_angle_x"));
+    assert!(one(r#""fl_x": -1,"#, IDENTITY_MATRIX).contains("frame 0"));
+    assert!(one(r#""camera_angle_x": 3.2,"#, IDENTITY_MATRIX).contains("focal"));
+    assert!(one(r#""fl_x": 9, "camera_model": "ORTHOPHOTO","#, IDENTITY_MATRIX).contains("ORTHOPHOTO"));
+    assert!(one(r#""fl_x": 9, "w": 11.5, "h": 8,"#, IDENTITY_MATRIX).contains("11.5"));
     assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]").contains("rotation"));
     assert!(one(r#""fl_x": 9,"#, "[[1,0,0,0],[0,1,0,0]]").contains("4 x 4"));
     assert!(one(r#""fl_x": 9,"#, "[[1,1,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]").contains("rotation"));
@@ -179,11 +179,14 @@ fn invalid_values_are_refused_with_their_place() {
     assert!(broken(r#"{"frames": [{"file_path": "a"}]}"#.into()).contains("transform_matrix"));
     let without = broken(r#"{"fl_x": 9}"#.into());
     assert!(without.contains("missing field \"frames\"; expected an object"), "{without}");
-    assert!(one(r#""fl_x": 9, "is_fisheye": true, "camera_model": "OPENCV","#, IDENTITY).contains("is_fisheye true"));
-    assert!(one(r#""fl_x": 9, "distortion_params": [0.1],"#, IDENTITY).contains("1 numbers"));
+    assert!(
+        one(r#""fl_x": 9, "is_fisheye": true, "camera_model": "OPENCV","#, IDENTITY_MATRIX)
+            .contains("is_fisheye is true")
+    );
+    assert!(one(r#""fl_x": 9, "distortion_params": [0.1],"#, IDENTITY_MATRIX).contains("1 numbers"));
 }
 
-/// One frame of many that cannot be used is a photo less; what is wrong with all of them is an error.
+/// One unusable frame of many only costs its photo; a problem of all frames is an error.
 #[test]
 fn a_broken_frame_leaves_its_photo_out() {
     let open = |broken: &str| {
@@ -223,7 +226,7 @@ fn keys_of_other_programs_are_used_or_named() {
     // Columns instead of rows.
     let usual = r#"[[0,0,1,5],[1,0,0,6],[0,1,0,7],[0,0,0,1]]"#;
     let turned = r#"[[0,1,0,0],[0,0,1,0],[1,0,0,0],[5,6,7,1]]"#;
-    let of = |matrix: &str| open(r#""fl_x": 10,"#, &a("").replace(IDENTITY, matrix));
+    let of = |matrix: &str| open(r#""fl_x": 10,"#, &a("").replace(IDENTITY_MATRIX, matrix));
     let transposed = of(turned);
     noted(&transposed.notes, &["transposed"]);
     assert_eq!(camera(transposed), camera(of(usual)));

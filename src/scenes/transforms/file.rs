@@ -1,4 +1,4 @@
-//! What a file of transforms holds.
+//! The content of a transforms file.
 
 use labelgs_files::read;
 use labelgs_scene::{Error, Result, Setting};
@@ -7,10 +7,10 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-const EXPECTED: &str = "expected an object with \"frames\", each with \"file_path\" and \"transform_matrix\", as Blender, \
+const EXPECTED_FORM: &str = "expected an object with \"frames\", each with \"file_path\" and \"transform_matrix\", as Blender, \
                         instant-ngp and nerfstudio write it";
 
-/// Intrinsics of the whole file or of one frame.
+/// Intrinsics of the whole file or of a frame.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub(super) struct Intrinsics {
     pub(super) camera_angle_x: Option<f64>,
@@ -31,7 +31,7 @@ pub(super) struct Intrinsics {
     pub(super) p2: Option<f64>,
     pub(super) sx1: Option<f64>,
     pub(super) sy1: Option<f64>,
-    /// k1, k2, k3, k4, p1 and p2, which nerfstudio reads before those of their names.
+    /// k1, k2, k3, k4, p1 and p2, which take precedence over the named coefficients in nerfstudio.
     pub(super) distortion_params: Option<Vec<f64>>,
     pub(super) camera_model: Option<String>,
     pub(super) is_fisheye: Option<bool>,
@@ -44,14 +44,14 @@ pub(super) struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// Returns the values of the frame, completed by those of the file.
+    /// Returns the values of the frame, completed by the file's.
     pub(super) fn or(&self, file: &Self) -> Self {
         macro_rules! merged {
             ($($field:ident)*) => { Self { $($field: self.$field.clone().or(file.$field.clone())),* } };
         }
         let mut all = merged!(camera_angle_x camera_angle_y fl_x fl_y cx cy w h k1 k2 k3 k4 k5 k6 p1 p2 sx1 sy1
             distortion_params camera_model is_fisheye latlong ftheta_p0 from_mitsuba);
-        // An angle of the frame itself counts more than a length of the file.
+        // An angle of the frame takes precedence over a length of the file.
         if self.fl_x.or(self.fl_y).is_none() && self.camera_angle_x.or(self.camera_angle_y).is_some() {
             (all.fl_x, all.fl_y) = (None, None);
             (all.camera_angle_x, all.camera_angle_y) = (self.camera_angle_x, self.camera_angle_y);
@@ -65,7 +65,7 @@ pub(super) struct Frame {
     pub(super) file_path: String,
     /// `None` stands for NaN and infinity.
     pub(super) transform_matrix: Vec<Vec<Option<f64>>>,
-    /// ScanNet++ marks blurred photos so.
+    /// ScanNet++'s mark for blurred photos.
     pub(super) is_bad: Option<bool>,
     #[serde(flatten)]
     pub(super) intrinsics: Intrinsics,
@@ -76,7 +76,7 @@ pub(super) struct Frame {
 #[derive(Debug, Deserialize)]
 #[serde(expecting = "an object")]
 pub(super) struct Transforms {
-    /// Each a [`Frame`], read one by one: a bad one is a photo less.
+    /// Each is a [`Frame`], parsed separately: a bad one only costs its photo.
     pub(super) frames: Vec<Value>,
     /// The held-out frames of ScanNet++.
     pub(super) test_frames: Option<Vec<Value>>,
@@ -93,15 +93,15 @@ pub(super) struct Transforms {
 
 pub(super) fn read(path: &Path) -> Result<Transforms> {
     let text = read::text(path)?;
-    read::parse_json(path, &without_non_finite(text.as_bytes()), EXPECTED)
+    read::parse_json(path, &without_non_finite(text.as_bytes()), EXPECTED_FORM)
 }
 
-/// Reads a part of the file; `place` names it.
+/// Parses a part of the file; `place` names it.
 pub(super) fn part<T: DeserializeOwned>(path: &Path, place: &str, value: &Value) -> Result<T> {
     T::deserialize(value).map_err(|error| Error::data(path, place, error.to_string().replace('`', "\"")))
 }
 
-/// Replaces NaN and infinities, which Python writes and JSON lacks, by null.
+/// Replaces NaN and infinities, which Python writes and JSON does not have, by null.
 fn without_non_finite(text: &[u8]) -> Vec<u8> {
     let (mut out, mut rest, mut is_string) = (Vec::with_capacity(text.len()), text, false);
     while let Some((&byte, behind)) = rest.split_first() {
@@ -122,7 +122,7 @@ fn without_non_finite(text: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Notes the keys that change what a view is and are not used.
+/// Notes unused keys that would change a view.
 pub(super) fn note_unused(transforms: &Transforms, frames: &[Frame], notes: &mut Vec<String>) {
     let is_set = |value: &&Value| match value {
         Value::Null | Value::Bool(false) => false,
@@ -133,11 +133,11 @@ pub(super) fn note_unused(transforms: &Transforms, frames: &[Frame], notes: &mut
     let unused = [
         (
             "mask_path",
-            format!("id masks come from the folder {}, what to leave out from {}", Setting("masks"), Setting("ignore")),
+            format!("id masks come from the folder {}, ignore masks from {}", Setting("masks"), Setting("ignore")),
         ),
         ("depth_file_path", format!("known depths come from the folder {}", Setting("depths"))),
-        ("time", "the scene is taken as one in which nothing moves".to_owned()),
-        ("rolling_shutter", "a photo is taken as of one moment".to_owned()),
+        ("time", "the scene is assumed to be static".to_owned()),
+        ("rolling_shutter", "photos are assumed to be taken at a single moment".to_owned()),
         ("white_transparent", "store the photos with their opacity".to_owned()),
         ("mask_color", "store the photos with their opacity".to_owned()),
     ];

@@ -1,19 +1,20 @@
-//! The view of a frame: photo, lens, intrinsics, pose.
+//! Converts a frame to a view: photo, lens, intrinsics, pose.
 
 use super::file::{Frame, Intrinsics};
 use crate::lens::{self, Equirectangular, Lens};
-use crate::listing::{Listed, check_camera, invert_pose, rotation_of, side, with_extension};
+use crate::listing::{ListedPhoto, check_camera, invert_pose, rotation_of, side, with_extension};
 use glam::{DAffine3, DMat3, DVec3};
 use labelgs_files::image;
 use labelgs_scene::{Camera, Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Makes the view of a frame, whose photo has `name` below the scene; `None` if it does not exist and its size is unknown.
+/// Creates the view of a frame whose photo has `name` below the scene; `None` if the photo does not exist and its size
+/// is unknown.
 pub(super) fn listed(
     (path, place): (&Path, &str),
     (frame, file): (&Frame, &Intrinsics),
     (name, photo): (String, Option<PathBuf>),
-) -> Result<Option<Listed>> {
+) -> Result<Option<ListedPhoto>> {
     let intrinsics = frame.intrinsics.or(file);
     let lens = lens(path, place, &intrinsics)?;
     let size = match (intrinsics.w, intrinsics.h, &photo) {
@@ -31,7 +32,7 @@ pub(super) fn listed(
     (camera.rotation, camera.translation) = (rotation, translation);
     check_camera(path, place, &camera, &lens)?;
     let name = with_extension(name, photo.as_deref());
-    Ok(Some(Listed { name, photo, camera, lens, test: None }))
+    Ok(Some(ListedPhoto { name, photo, camera, lens, test: None }))
 }
 
 fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
@@ -39,18 +40,18 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
         // instant-ngp's flag.
         (Some(true), None) => "OPENCV_FISHEYE",
         (Some(true), Some(other)) if !other.contains("FISHEYE") => {
-            let problem = format!("camera_model is {other} and is_fisheye true; remove the one that is wrong");
+            let problem = format!("camera_model is {other}, but is_fisheye is true; remove the wrong one");
             return Err(Error::data(path, place, problem));
         }
         (_, Some("PERSPECTIVE")) => "PINHOLE",
         (_, None) if i.latlong == Some(true) => "EQUIRECTANGULAR",
         (_, None) if i.ftheta_p0.is_some_and(|value| value != 0.0) => "ftheta",
-        // Only OpenCV's full model has these two.
+        // Only OpenCV's full model has these two coefficients.
         (_, None | Some("OPENCV")) if [i.k5, i.k6].iter().flatten().any(|&value| value != 0.0) => "FULL_OPENCV",
         (_, named) => named.unwrap_or("OPENCV"),
     };
-    let Some(of_names) = lens::model(named).and_then(|model| model.of_names) else {
-        let known = lens::MODELS.iter().filter(|model| model.of_names.is_some()).map(|model| model.name);
+    let Some(from_names) = lens::model(named).and_then(|model| model.from_names) else {
+        let known = lens::CAMERA_MODELS.iter().filter(|model| model.from_names.is_some()).map(|model| model.name);
         let problem = format!(
             "camera model {named} is not supported (supported: {}); undistort the photos first, or pose them with COLMAP",
             known.collect::<Vec<_>>().join(", ")
@@ -76,29 +77,29 @@ fn lens(path: &Path, place: &str, i: &Intrinsics) -> Result<Lens> {
         }
         all.iter_mut().zip(listed).for_each(|(known, &value)| known.1 = Some(value));
     }
-    Ok(of_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
+    Ok(from_names(&|name| all.iter().find(|known| known.0 == name).and_then(|known| known.1).unwrap_or(0.0)))
 }
 
-/// Makes the intrinsics, at an identity pose. Focal lengths come from `fl_x`, `fl_y` or the fields of view; a missing
+/// Creates the intrinsics, at an identity pose. Focal lengths come from `fl_x`, `fl_y` or the fields of view; a missing
 /// one equals the other. The default principal point is the image centre.
 fn camera(path: &Path, place: &str, i: &Intrinsics, size: (u32, u32)) -> Result<Camera> {
     let (w, h) = (f64::from(size.0), f64::from(size.1));
-    // The tangent is periodic: degrees, for example, would pass as some angle in radians.
+    // The tangent is periodic: degrees, for example, would be accepted as an angle in radians.
     for (name, angle) in [("camera_angle_x", i.camera_angle_x), ("camera_angle_y", i.camera_angle_y)] {
         if let Some(angle) = angle.filter(|angle| !(*angle > 0.0 && *angle < std::f64::consts::PI)) {
-            let problem = format!("{name} is {angle}, which gives no focal length; expected radians between 0 and pi");
+            let problem = format!("{name} is {angle} and gives no focal length; expected radians between 0 and pi");
             return Err(Error::data(path, place, problem));
         }
     }
     let from_angle = |side: f64, angle: f64| side / 2.0 / (angle / 2.0).tan();
     let fx = i.fl_x.or(i.camera_angle_x.map(|angle| from_angle(w, angle)));
-    // If only fl_x is given, fy equals it. An angle counts only if its side has no length.
+    // If only fl_x is given, fy equals it. An angle only counts if its side has no length.
     let fy = i.fl_y.or(if i.fl_x.is_none() { i.camera_angle_y.map(|angle| from_angle(h, angle)) } else { None });
     let (fx, fy) = match (fx, fy) {
         (Some(fx), Some(fy)) => (fx, fy),
         (Some(f), None) | (None, Some(f)) => (f, f),
         (None, None) => {
-            let problem = "no focal length: neither `fl_x` nor `camera_angle_x` is given";
+            let problem = "has no focal length: neither `fl_x` nor `camera_angle_x` is given";
             return Err(Error::data(path, place, problem));
         }
     };
@@ -114,7 +115,7 @@ pub fn affine(rows: &[Vec<f64>]) -> Option<DAffine3> {
     Some(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) })
 }
 
-/// True for a 4 x 4 matrix that is written column by column: the position is in the last row.
+/// Returns true for a 4 x 4 matrix in column-major order: the position is in the last row.
 pub(super) fn is_transposed(rows: &[Vec<Option<f64>>]) -> bool {
     let at = |row: usize, column: usize| rows.get(row).and_then(|row| row.get(column).copied().flatten());
     let is_zero = |value: Option<f64>| value == Some(0.0);

@@ -1,16 +1,16 @@
 //! `transforms.json` in the styles of Blender, instant-ngp and nerfstudio.
 //!
 //! Poses are camera-to-world with OpenGL axes (y up, looking along -z) and become camera-from-world with OpenCV axes.
-//! The world is that of `transform_matrix`, which already includes nerfstudio's `applied_transform`.
+//! The world is the one of `transform_matrix`, which already includes nerfstudio's `applied_transform`.
 
 mod file;
 mod frame;
 mod points;
 
-use super::listed_path::Place;
-use super::listing::{Listed, Listing};
+use super::listed_path::SceneFolder;
+use super::listing::{ListedPhoto, Listing};
 use super::pose_convention::Native;
-use super::split::Split;
+use super::split::SceneSplit;
 use file::{Frame, Transforms};
 use labelgs_scene::{Error, Result};
 use serde_json::Value;
@@ -19,9 +19,9 @@ use std::path::{Path, PathBuf};
 
 pub(super) use frame::affine;
 
-/// Reads the scene, if it has transforms: `transforms_train.json` with `transforms_test.json` or, without that,
-/// `transforms_val.json` held out, else `transforms.json`, else `transforms_train.json` alone.
-pub fn list(scene: &Place) -> Result<Option<Listing>> {
+/// Reads the scene if it has transforms: `transforms_train.json` with `transforms_test.json` or, without that,
+/// `transforms_val.json` held out; otherwise `transforms.json`; otherwise `transforms_train.json` alone.
+pub fn list(scene: &SceneFolder) -> Result<Option<Listing>> {
     let file = |name: &str| Some(scene.root.join(name)).filter(|path| path.is_file());
     let (train, val, test) = (file("transforms_train.json"), file("transforms_val.json"), file("transforms_test.json"));
     let unused = val.clone().filter(|_| test.is_some());
@@ -33,7 +33,7 @@ pub fn list(scene: &Place) -> Result<Option<Listing>> {
     };
     let mut listing = Listing::new(&files[0].0, Native::TRANSFORMS);
     if let (Some(val), 2) = (unused, files.len()) {
-        listing.notes.push(format!("{} is not used: the test views are held out", val.display()));
+        listing.notes.push(format!("{} is ignored, because the test views are held out", val.display()));
     }
     for (path, test) in files {
         read(scene, &path, test, &mut listing)?;
@@ -42,20 +42,20 @@ pub fn list(scene: &Place) -> Result<Option<Listing>> {
     Ok(Some(listing))
 }
 
-/// Returns the number of photos that a file lists; `None` if it cannot be read.
+/// Returns the number of photos that a file lists; `None` if the file cannot be read.
 pub fn count(path: &Path) -> Option<usize> {
     let transforms = file::read(path).ok()?;
     Some(transforms.frames.len() + transforms.test_frames.map_or(0, |frames| frames.len()))
 }
 
-pub fn list_file(scene: &Place, path: &Path) -> Result<Listing> {
+pub fn list_file(scene: &SceneFolder, path: &Path) -> Result<Listing> {
     let mut listing = Listing::new(path, Native::TRANSFORMS);
     read(scene, path, None, &mut listing)?;
     strip_folder(&mut listing);
     Ok(listing)
 }
 
-fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
+fn read(scene: &SceneFolder, path: &Path, test: Option<bool>, listing: &mut Listing) -> Result<()> {
     let transforms = file::read(path)?;
     let first = listing.views.len();
     let frames = read_frames(scene, (path, &transforms), test, listing)?;
@@ -66,20 +66,20 @@ fn read(scene: &Place, path: &Path, test: Option<bool>, listing: &mut Listing) -
     let held_out: Vec<String> = val_filenames.into_iter().chain(test_filenames).flatten().collect();
     if train_filenames.is_some() || !held_out.is_empty() {
         let source = format!("the lists of file names in {}", path.display());
-        Split { source, train: train_filenames, test: held_out }.apply(listing);
+        SceneSplit { source, train: train_filenames, test: held_out }.apply(listing);
     }
     Ok(())
 }
 
-/// Reads the frames to the views of `listing`. A frame that cannot be used is a photo less, unless none can.
+/// Adds the frames to the views of `listing`. An unusable frame only costs its photo, unless all are unusable.
 fn read_frames(
-    scene: &Place,
+    scene: &SceneFolder,
     (path, transforms): (&Path, &Transforms),
     test: Option<bool>,
     listing: &mut Listing,
 ) -> Result<Vec<Frame>> {
     let mut reader =
-        Frames { scene, path, transforms, listing, seen: HashMap::new(), repeated: 0, refused: Vec::new() };
+        FrameReader { scene, path, transforms, listing, seen: HashMap::new(), repeated: 0, refused: Vec::new() };
     let has_test = transforms.test_frames.is_some();
     let train = transforms.frames.iter().map(|value| (value, test.or(has_test.then_some(false))));
     let test = transforms.test_frames.iter().flatten().map(|value| (value, Some(true)));
@@ -87,7 +87,7 @@ fn read_frames(
     for (index, (value, test)) in train.chain(test).enumerate() {
         frames.extend(reader.read(index, value, test)?);
     }
-    let Frames { repeated, mut refused, .. } = reader;
+    let FrameReader { repeated, mut refused, .. } = reader;
     let total = transforms.frames.len() + transforms.test_frames.as_ref().map_or(0, Vec::len);
     let is_of_frame = |error: &Error| matches!(error, Error::Data { path: of, .. } if of == path);
     if !refused.is_empty() && refused.len() == total && refused.iter().all(is_of_frame) {
@@ -98,28 +98,28 @@ fn read_frames(
     let transposed = frames.iter().filter(|frame| frame::is_transposed(&frame.transform_matrix)).count();
     let counts = [
         (repeated, "that list a photo a second time are skipped"),
-        (bad, "marked \"is_bad\" are left out"),
+        (bad, "marked \"is_bad\" are omitted"),
         (transposed, "with the position in the last row of the matrix: transposed"),
     ];
     listing.note_counts(path, "frame", &counts);
     Ok(frames)
 }
 
-/// The frames of a file while they are read.
-struct Frames<'a> {
-    scene: &'a Place<'a>,
+/// The frames of a file while they are being read.
+struct FrameReader<'a> {
+    scene: &'a SceneFolder<'a>,
     path: &'a Path,
     transforms: &'a Transforms,
     listing: &'a mut Listing,
     /// Photo of each name.
     seen: HashMap<String, Option<PathBuf>>,
     repeated: usize,
-    /// What is wrong with frames that cannot be used.
+    /// Errors of unusable frames.
     refused: Vec<Error>,
 }
 
-impl Frames<'_> {
-    /// Reads a frame; `None` if it cannot be used.
+impl FrameReader<'_> {
+    /// Reads a frame; `None` if it is unusable.
     fn read(&mut self, index: usize, value: &Value, test: Option<bool>) -> Result<Option<Frame>> {
         let path = self.path;
         let name = value.get("file_path").and_then(Value::as_str).unwrap_or_default();
@@ -138,16 +138,16 @@ impl Frames<'_> {
         let photo = self.scene.photos.find(&[".", "images"], &resolved.path);
         let of = (&frame, &self.transforms.intrinsics);
         match frame::listed((path, &place), of, (resolved.name, photo)) {
-            Ok(Some(view)) => self.add(&place, Listed { test, ..view })?,
+            Ok(Some(view)) => self.add(&place, ListedPhoto { test, ..view })?,
             Ok(None) => self.listing.missing.push(frame.file_path.clone()),
-            // A damaged photo or frame is a photo less; a disk that fails is not.
+            // A damaged photo or frame only costs that photo; a failing disk is an error.
             Err(error @ Error::Data { .. }) => self.refused.push(error),
             Err(error) => return Err(error),
         }
         Ok(Some(frame))
     }
 
-    fn add(&mut self, place: &str, view: Listed) -> Result<()> {
+    fn add(&mut self, place: &str, view: ListedPhoto) -> Result<()> {
         match self.seen.get(&view.name) {
             None => {
                 self.seen.insert(view.name.clone(), view.photo.clone());
@@ -155,7 +155,7 @@ impl Frames<'_> {
             }
             Some(photo) if *photo == view.photo => self.repeated += 1,
             Some(_) => {
-                let problem = format!("another photo is called `{}` too; rename one of them", view.name);
+                let problem = format!("another photo is also called `{}`; rename one of them", view.name);
                 return Err(Error::data(self.path, place, problem));
             }
         }
@@ -163,7 +163,7 @@ impl Frames<'_> {
     }
 }
 
-/// Removes a leading `images/` if all names have it, so that names are the same as in a COLMAP scene.
+/// Removes a leading `images/` if all names have it, so that names match those of a COLMAP scene.
 fn strip_folder(listing: &mut Listing) {
     let stripped = listing.views.iter().map(|view| view.name.strip_prefix("images/").map(str::to_owned));
     if let Some(names) = stripped.collect::<Option<Vec<String>>>() {

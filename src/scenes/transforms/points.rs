@@ -1,22 +1,22 @@
-//! The points of a scene of transforms.
+//! Reads the points of a scene of transforms.
 
 use super::file::Transforms;
 use super::frame::affine;
-use crate::listed_path::Place;
-use crate::listing::{DISTANCE_MAX, Listed};
+use crate::listed_path::SceneFolder;
+use crate::listing::{DISTANCE_MAX, ListedPhoto};
 use crate::points;
 use labelgs_scene::{Camera, Error, Point, Result};
 use std::path::Path;
 
-/// Files in which nerfstudio and trainers put points that no key names.
-const UNNAMED: [&str; 2] = ["sparse_pc.ply", "points3D.ply"];
+/// Files in which nerfstudio and trainers store points without naming them in a key.
+const UNNAMED_FILES: [&str; 2] = ["sparse_pc.ply", "points3D.ply"];
 
 /// Reads the points that belong to `views`.
 pub(super) fn read(
-    scene: &Place,
+    scene: &SceneFolder,
     path: &Path,
     transforms: &Transforms,
-    views: &[Listed],
+    views: &[ListedPhoto],
     notes: &mut Vec<String>,
 ) -> Result<Vec<Point>> {
     let points = match &transforms.ply_file_path {
@@ -29,7 +29,7 @@ pub(super) fn read(
             points
         }
         None => {
-            let mut files = UNNAMED.iter().map(|name| scene.root.join(name));
+            let mut files = UNNAMED_FILES.iter().map(|name| scene.root.join(name));
             let Some(points) = files.find(|path| path.is_file()) else { return Ok(Vec::new()) };
             notes.push(format!("the points come from {}, which no ply_file_path names", points.display()));
             points
@@ -38,10 +38,10 @@ pub(super) fn read(
     in_the_frame_of(views, points::read_points(&points)?, path, transforms.applied_transform.as_deref(), notes)
 }
 
-/// Returns the points in the world of the poses. nerfstudio writes them there, but its early versions wrote them before
-/// `applied_transform`. The variant in which the cameras see more points is right.
+/// Returns the points in the world of the poses. Early versions of nerfstudio wrote points before `applied_transform`,
+/// later ones in the world. The variant with more points in the cameras' images is right.
 fn in_the_frame_of(
-    views: &[Listed],
+    views: &[ListedPhoto],
     points: Vec<Point>,
     path: &Path,
     applied: Option<&[Vec<f64>]>,
@@ -64,8 +64,8 @@ fn in_the_frame_of(
     Ok(points)
 }
 
-/// Counts the points in the views, over samples of both.
-fn seen(views: &[Listed], points: &[Point]) -> usize {
+/// Counts the points inside the views, over samples of both.
+fn seen(views: &[ListedPhoto], points: &[Point]) -> usize {
     let some_views: Vec<&Camera> = views.iter().step_by(views.len() / 50 + 1).map(|view| &view.camera).collect();
     let some_points = points.iter().step_by(points.len() / 2000 + 1);
     let count = |point: &Point| some_views.iter().filter(|camera| camera.sees(point.position).is_some()).count();

@@ -1,4 +1,4 @@
-//! Arrays of one kind for all views, such as depth maps, within a budget of memory.
+//! Stores arrays of the same kind for all views, such as depth maps, within a memory budget.
 
 use super::PHOTO_MEMORY;
 use labelgs_files::scratch::{Scratch, ScratchOffset, system_folder};
@@ -6,28 +6,28 @@ use labelgs_scene::pixels::PixelSource;
 use labelgs_scene::{Error, Pixels, Result};
 use std::sync::Arc;
 
-/// Memory of a shelf, bytes. Photos have their own.
-const MEMORY: u64 = PHOTO_MEMORY / 4;
+/// Memory of a store, bytes. Photos have a separate budget.
+const MEMORY_BYTES: u64 = PHOTO_MEMORY / 4;
 
-/// Takes arrays; from the first one on that does not fit, they wait in a temporary file.
+/// Stores arrays in memory up to the budget. From the first one that does not fit, they go to a temporary file.
 #[derive(Debug)]
-pub struct Shelf {
+pub struct ArrayStore {
     left: u64,
     scratch: Arc<Scratch>,
 }
 
-impl Default for Shelf {
+impl Default for ArrayStore {
     fn default() -> Self {
-        Self::of(MEMORY)
+        Self::with_memory(MEMORY_BYTES)
     }
 }
 
-impl Shelf {
-    fn of(memory: u64) -> Self {
+impl ArrayStore {
+    fn with_memory(memory: u64) -> Self {
         Self { left: memory, scratch: Arc::new(Scratch::new(&system_folder())) }
     }
 
-    /// Takes an array. Without space for the file it stays in memory.
+    /// Stores an array. Without space for the file, it stays in memory.
     pub fn put(&mut self, values: Vec<f32>) -> Pixels<Vec<f32>> {
         let bytes = size_of_val(values.as_slice()) as u64;
         self.left = self.left.saturating_sub(bytes);
@@ -38,7 +38,7 @@ impl Shelf {
         };
         match place {
             Some(place) => {
-                let waiting = Waiting { scratch: Arc::clone(&self.scratch), place, count: values.len() };
+                let waiting = StoredArray { scratch: Arc::clone(&self.scratch), place, count: values.len() };
                 Pixels::from_source(Arc::new(waiting), Default::default())
             }
             None => values.into(),
@@ -47,13 +47,13 @@ impl Shelf {
 }
 
 #[derive(Debug)]
-struct Waiting {
+struct StoredArray {
     scratch: Arc<Scratch>,
     place: ScratchOffset,
     count: usize,
 }
 
-impl PixelSource<Vec<f32>> for Waiting {
+impl PixelSource<Vec<f32>> for StoredArray {
     fn make(&self) -> Result<Arc<Vec<f32>>> {
         let mut values = vec![0.0; self.count];
         let read = self.scratch.read(self.place, bytemuck::cast_slice_mut(&mut values));
@@ -68,11 +68,11 @@ impl PixelSource<Vec<f32>> for Waiting {
 
 #[cfg(test)]
 mod tests {
-    use super::Shelf;
+    use super::ArrayStore;
 
     #[test]
     fn arrays_that_do_not_fit_come_back_from_a_file() {
-        let mut shelf = Shelf::of(100);
+        let mut shelf = ArrayStore::with_memory(100);
         let arrays: Vec<Vec<f32>> = (0..4).map(|index| vec![index as f32; 10 + index]).collect();
         let kept: Vec<_> = arrays.iter().map(|array| shelf.put(array.clone())).collect();
         assert_eq!(kept.iter().map(|array| array.is_held()).collect::<Vec<_>>(), [true, true, false, false]);

@@ -1,6 +1,6 @@
-//! Which points of the reconstruction each photo shows.
+//! The points of the reconstruction that each photo shows.
 
-use super::Observed;
+use super::Observations;
 use glam::{DVec2, DVec3};
 use labelgs_scene::sampling::{TESTS_MAX, spread_order, stride};
 use labelgs_scene::stage::Stage;
@@ -8,25 +8,25 @@ use labelgs_scene::{Point, View};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Points of a photo that another one shows too, from which on more tell nothing new of its brightness.
-const SHARED_ENOUGH: usize = 2000;
-/// Points that are tested at once for a sample.
-const CHUNK: usize = 4096;
+/// Shared points per photo after which more add no information about its brightness.
+const SHARED_POINTS_MAX: usize = 2000;
+/// Number of points tested at once for a sample.
+const CHUNK_POINTS: usize = 4096;
 
 /// A point in a photo: its index, and its pixel.
 pub(super) type Mark = (usize, DVec2);
 
-/// The points of a scene in its photos. What the reconstruction says of a photo decides; without it, a photo shows all points
-/// in its picture, which are not listed: they may be very many.
-pub(super) struct Shown<'a> {
+/// The points of a scene in its photos. The reconstruction decides if it assigns points to a photo. Otherwise a photo
+/// shows all points inside its image; these are not listed, because they may be very many.
+pub(super) struct ShownPoints<'a> {
     views: Vec<&'a View>,
     points: &'a [Point],
     listed: Vec<Option<Vec<Mark>>>,
 }
 
-impl<'a> Shown<'a> {
-    pub(super) fn new(views: Vec<&'a View>, points: &'a [Point], looked: &Observed) -> Self {
-        let of = |view: &&View| looked.of(view).map(|(_, seen)| seen).filter(|seen| !seen.is_empty());
+impl<'a> ShownPoints<'a> {
+    pub(super) fn new(views: Vec<&'a View>, points: &'a [Point], looked: &Observations) -> Self {
+        let of = |view: &&View| looked.for_view(view).map(|(_, seen)| seen).filter(|seen| !seen.is_empty());
         let observed: Vec<_> = views.iter().map(of).collect();
         let key = |place: DVec3| place.to_array().map(f64::to_bits);
         let is_listed = observed.iter().any(Option::is_some);
@@ -43,12 +43,12 @@ impl<'a> Shown<'a> {
         Self { views, points, listed }
     }
 
-    /// Returns the points that the reconstruction says each view shows; `None` where it says nothing.
+    /// Returns the points that the reconstruction assigns to each view, or `None` if it assigns none.
     pub(super) fn listed(&self) -> &[Option<Vec<Mark>>] {
         &self.listed
     }
 
-    /// Returns the views of which the reconstruction says nothing.
+    /// Returns the views without assigned points.
     fn unlisted(&self) -> Vec<usize> {
         (0..self.views.len()).filter(|&view| self.listed[view].is_none()).collect()
     }
@@ -57,8 +57,8 @@ impl<'a> Shown<'a> {
         self.views[view].camera.sees(self.points[point].position)
     }
 
-    /// Returns how many points each view shows, and how many of these at least two others show too. Every n-th point is
-    /// counted, n times, where points and views are very many.
+    /// Returns how many points each view shows, and how many of these at least two others also show. With very many
+    /// points and views, counts every n-th point n times.
     pub(super) fn counts(&self) -> Vec<(usize, usize)> {
         let _stage = Stage::new("counting the points of photos", 0);
         let unlisted = self.unlisted();
@@ -89,8 +89,8 @@ impl<'a> Shown<'a> {
         (0..self.views.len()).into_par_iter().map(of_view).collect()
     }
 
-    /// Returns a sample of the points that several views show, and which of them each view shows: of every view all, or
-    /// [`SHARED_ENOUGH`].
+    /// Returns a sample of points that several views show, and which of them each view shows: all of them, or
+    /// [`SHARED_POINTS_MAX`] per view.
     pub(super) fn sample(&self) -> (usize, Vec<Vec<Mark>>) {
         let _stage = Stage::new("choosing points that photos share", 0);
         let kept = self.shared();
@@ -106,7 +106,7 @@ impl<'a> Shown<'a> {
         (kept.len(), (0..self.views.len()).into_par_iter().map(of_view).collect())
     }
 
-    /// Draws points that several views show until each view shows enough of them. Those of a view with few come last.
+    /// Draws shared points until each view shows enough of them. The points of views with few come last.
     fn shared(&self) -> Vec<usize> {
         let unlisted = self.unlisted();
         let mut listed: Vec<(usize, usize)> = Vec::new();
@@ -117,8 +117,8 @@ impl<'a> Shown<'a> {
         let order = spread_order(self.points.len());
         let most = if unlisted.is_empty() { usize::MAX } else { TESTS_MAX / unlisted.len() };
         let (mut kept, mut shows) = (Vec::new(), vec![0; self.views.len()]);
-        for first in (0..self.points.len().min(most)).step_by(CHUNK) {
-            let wants: Vec<bool> = shows.iter().map(|&shows| shows < SHARED_ENOUGH).collect();
+        for first in (0..self.points.len().min(most)).step_by(CHUNK_POINTS) {
+            let wants: Vec<bool> = shows.iter().map(|&shows| shows < SHARED_POINTS_MAX).collect();
             if !wants.contains(&true) {
                 break;
             }
@@ -132,9 +132,9 @@ impl<'a> Shown<'a> {
                 let by: Vec<usize> = said.chain(seen).collect();
                 (is_wanted && by.len() >= 2).then_some((point, by))
             };
-            let chunk = first..(first + CHUNK).min(self.points.len());
+            let chunk = first..(first + CHUNK_POINTS).min(self.points.len());
             for (point, by) in chunk.into_par_iter().filter_map(drawn).collect::<Vec<_>>() {
-                if by.iter().any(|&view| shows[view] < SHARED_ENOUGH) {
+                if by.iter().any(|&view| shows[view] < SHARED_POINTS_MAX) {
                     by.iter().for_each(|&view| shows[view] += 1);
                     kept.push(point);
                 }
@@ -147,20 +147,20 @@ impl<'a> Shown<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Observed, SHARED_ENOUGH, Shown};
+    use super::{Observations, SHARED_POINTS_MAX, ShownPoints};
     use glam::{DMat3, DVec3};
     use labelgs_scene::{Camera, Point, View};
     use std::collections::BTreeMap;
 
-    /// A camera at a place, which looks along z.
+    /// A camera at a position, looking along z.
     fn view(name: &str, at: DVec3) -> View {
         let (fx, fy, cx, cy) = (50.0, 50.0, 50.0, 50.0);
         let camera = Camera { rotation: DMat3::IDENTITY, translation: -at, fx, fy, cx, cy, width: 100, height: 100 };
         View { name: name.to_owned(), camera, photo: None, mask: None }
     }
 
-    /// Two photos of a dense wall, two of a sparse one far away, and one beside all: the dense ones share a sample, the sparse
-    /// ones all they have.
+    /// Two photos of a dense wall, two of a sparse one far away, and an isolated one: the dense ones share a sample,
+    /// the sparse ones everything they have.
     #[test]
     fn a_sample_is_large_enough_for_each_view() {
         let wall = |x: f64, side: usize| {
@@ -171,11 +171,11 @@ mod tests {
         let points: Vec<Point> = positions.map(|position| Point { position, colour: [9; 3] }).collect();
         let views = [view("a", DVec3::ZERO), view("b", DVec3::X * 0.1), view("c", DVec3::X * 100.0)];
         let views = [&views[..], &[view("d", DVec3::X * 100.1), view("e", DVec3::X * 1e4)]].concat();
-        let looked = Observed { photos: BTreeMap::new(), faces: BTreeMap::new() };
-        let shown = Shown::new(views.iter().collect(), &points, &looked);
+        let looked = Observations { photos: BTreeMap::new(), faces: BTreeMap::new() };
+        let shown = ShownPoints::new(views.iter().collect(), &points, &looked);
         let (count, marks) = shown.sample();
         let of: Vec<usize> = marks.iter().map(Vec::len).collect();
-        assert!((SHARED_ENOUGH..SHARED_ENOUGH + 100).contains(&of[0]) && of[1] == of[0], "{of:?}");
+        assert!((SHARED_POINTS_MAX..SHARED_POINTS_MAX + 100).contains(&of[0]) && of[1] == of[0], "{of:?}");
         assert_eq!((of[2], of[3], of[4], count), (81, 81, 0, of[0] + 81));
         // They are spread over the wall.
         let left = marks[0].iter().filter(|(_, pixel)| pixel.x < 50.0).count();
@@ -191,8 +191,8 @@ mod tests {
             .map(|at| Point { position: DVec3::new(f64::from(at) * 0.01 - 3.0, 0.0, 2.0), colour: [9; 3] })
             .collect();
         let views = [view("a", DVec3::ZERO), view("b", DVec3::X)];
-        let looked = Observed { photos: BTreeMap::new(), faces: BTreeMap::new() };
-        let shown = Shown::new(views.iter().collect(), &points, &looked);
+        let looked = Observations { photos: BTreeMap::new(), faces: BTreeMap::new() };
+        let shown = ShownPoints::new(views.iter().collect(), &points, &looked);
         let both = |point: &&Point| views.iter().all(|view| view.camera.sees(point.position).is_some());
         let expected = points.iter().filter(both).count();
         let (count, marks) = shown.sample();

@@ -1,8 +1,8 @@
-//! The views of one photo, made from its files: decoded, without ignored pixels, undistorted, resized.
+//! Creates the views of a photo from its files: decodes, removes ignored pixels, undistorts, resizes.
 
 use super::LoadOptions;
 use super::lens::Lens;
-use super::listing::{Listed, check_camera};
+use super::listing::{ListedPhoto, check_camera};
 use super::matte::cut_out;
 use super::resample::{resample_ids, undistort_photo};
 use super::window::Window;
@@ -12,10 +12,10 @@ use labelgs_masks::mask::{read_checked, read_ignored};
 use labelgs_scene::{Camera, Error, LabelMap, Photo, Result};
 use std::path::{Path, PathBuf};
 
-/// The files of a photo and how its views are made of them.
+/// The files of a photo, and how its views are made from them.
 #[derive(Clone, Debug)]
-pub struct Recipe {
-    pub listed: Listed,
+pub struct PhotoRecipe {
+    pub listed: ListedPhoto,
     /// The file that lists the photo, for messages.
     pub source: PathBuf,
     pub mask: Option<PathBuf>,
@@ -26,15 +26,17 @@ pub struct Recipe {
     pub background: Option<[f32; 3]>,
     pub max_resolution: Option<u32>,
     pub undistort: bool,
-    /// The photo shows the objects of the mask alone.
+    /// Whether the photo is reduced to the objects of the mask.
     pub masked_only: bool,
-    /// It is cut to them.
+    /// Whether it is also cropped to them.
     pub cut: bool,
 }
 
-/// Pixels around the objects that a photo to train on keeps, as a share of its longest side, and least, px: the windows of the loss
-/// reach so far, and what is wrong there must be seen.
-const MARGIN: (f64, u32) = (0.02, 8);
+/// Margin of pixels around the objects that a cropped training photo keeps, as a share of its longest side: the windows
+/// of the loss reach this far, and errors there must be visible.
+const MARGIN_SHARE: f64 = 0.02;
+/// Smallest margin, px.
+const MARGIN_MIN: u32 = 8;
 
 /// A view with its pixels.
 pub struct MadeView {
@@ -47,14 +49,14 @@ pub struct MadeView {
 /// All views of a photo.
 pub struct MadeViews {
     pub views: Vec<MadeView>,
-    /// Number of masks with another size than the photo.
+    /// Number of masks whose size differs from the photo's.
     pub resampled: usize,
 }
 
-impl Recipe {
-    /// `source` lists the photo. `[mask, ignore]` are files of the photo.
+impl PhotoRecipe {
+    /// `source` lists the photo. `[mask, ignore]` are the photo's files.
     pub fn new(
-        (listed, source): (Listed, PathBuf),
+        (listed, source): (ListedPhoto, PathBuf),
         [mask, ignore]: [Option<PathBuf>; 2],
         options: &LoadOptions,
     ) -> Self {
@@ -70,10 +72,10 @@ impl Recipe {
         self.listed.photo.as_deref().map(stored_size).transpose()
     }
 
-    /// Decodes the photo, if photos are wanted. `stored` is the size in its file.
+    /// Decodes the photo if photos are requested. `stored` is the size of its file.
     pub fn decode(&self, stored: Option<(u32, u32)>) -> Result<Option<Photo>> {
         let camera = &self.listed.camera;
-        // Check the shape before the pixels take memory; the error comes later.
+        // Check the aspect ratio before allocating memory for the pixels; the error is reported later.
         match (&self.listed.photo, stored) {
             (Some(path), Some(size)) if self.photos && same_aspect(size, camera.size()) => {
                 let read = |colour| read_photo(path, colour);
@@ -83,7 +85,7 @@ impl Recipe {
         }
     }
 
-    /// Makes the views, one or several, of the decoded photo.
+    /// Creates the view or views of the decoded photo.
     pub fn views(&self, stored: Option<(u32, u32)>, mut photo: Option<Photo>) -> Result<MadeViews> {
         let original = at_size(&self.listed, stored)?;
         let size = original.size();
@@ -94,7 +96,7 @@ impl Recipe {
         if let (Some(path), Some(photo)) = (&self.ignore, &mut photo) {
             let ignored = read_ignored(path, |found| fits_photo(path, found, size))?;
             resampled += is_other(&ignored);
-            leave_out(photo, &ignored);
+            invalidate(photo, &ignored);
         }
         if let (true, Some(photo), Some(mask)) = (self.masked_only, &mut photo, &mask) {
             cut_out(photo, mask);
@@ -107,7 +109,7 @@ impl Recipe {
         if windows.is_empty() {
             return Err(Error::data(path, place, NO_WINDOW));
         }
-        // A lens of odd coefficients may have no scale at its axis.
+        // A lens with unusual coefficients may have no scale at its axis.
         for window in windows.iter().filter(|window| !window.is_photo()) {
             check_camera(path, &format!("view {}", window.name), &window.camera, &Lens::Pinhole)?;
         }
@@ -119,13 +121,13 @@ impl Recipe {
                 mask: mask.as_ref().map(|mask| resample_ids(mask, &window, size)),
                 name: window.name,
             };
-            if self.masked_only { self.of_objects(made) } else { made }
+            if self.masked_only { self.isolate_objects(made) } else { made }
         };
         Ok(MadeViews { views: windows.into_iter().map(view).collect(), resampled })
     }
 
-    /// Takes the weight of a photo without an object, and cuts others to their objects.
-    fn of_objects(&self, made: MadeView) -> MadeView {
+    /// Invalidates a photo without an object, and crops others to their objects.
+    fn isolate_objects(&self, made: MadeView) -> MadeView {
         let found = made.mask.as_ref().and_then(LabelMap::bounds);
         let Some([left, top, right, bottom]) = found else {
             let blank = |photo: Photo| Photo { rgba: vec![[0; 4]; photo.rgba.len()], ..photo };
@@ -135,7 +137,7 @@ impl Recipe {
             return made;
         }
         let (width, height) = made.camera.size();
-        let margin = ((MARGIN.0 * f64::from(width.max(height))).ceil() as u32).max(MARGIN.1);
+        let margin = ((MARGIN_SHARE * f64::from(width.max(height))).ceil() as u32).max(MARGIN_MIN);
         let (left, top) = (left.saturating_sub(margin), top.saturating_sub(margin));
         let size = ((right + margin).min(width) - left, (bottom + margin).min(height) - top);
         let part = |at: usize| {
@@ -161,7 +163,7 @@ impl Recipe {
 
     /// Returns the number of pixels of all views.
     pub fn pixels(&self, stored: Option<(u32, u32)>) -> u64 {
-        // The error comes when the views are made.
+        // The error is reported when the views are made.
         let Ok(original) = at_size(&self.listed, stored) else { return 0 };
         let sizes = self.windows(&original).into_iter().map(|window| self.size_of(&window));
         sizes.map(|(width, height)| u64::from(width) * u64::from(height)).sum()
@@ -179,8 +181,8 @@ impl Recipe {
     }
 }
 
-/// Takes the weight of the pixels where `ignored`, of any scale, is not 0.
-fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
+/// Invalidates the pixels where `ignored`, of any scale, is not 0.
+fn invalidate(photo: &mut Photo, ignored: &LabelMap) {
     let nearest = |at: u32, side: u32, from: u32| {
         (((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as u32).min(from - 1)
     };
@@ -193,10 +195,10 @@ fn leave_out(photo: &mut Photo, ignored: &LabelMap) {
     }
 }
 
-const NO_WINDOW: &str = "the lens of its camera shows nothing of the photo; check focal lengths and coefficients";
+const NO_WINDOW: &str = "the lens of its camera covers nothing of the photo; check focal lengths and coefficients";
 
 /// Returns the camera at the size of the photo's file, which may be a scaled version of the size in the data set.
-pub fn at_photo_size(listed: &Listed) -> Result<Camera> {
+pub fn at_photo_size(listed: &ListedPhoto) -> Result<Camera> {
     at_size(listed, listed.photo.as_deref().map(stored_size).transpose()?)
 }
 
@@ -206,7 +208,7 @@ fn stored_size(path: &Path) -> Result<(u32, u32)> {
     Ok(size)
 }
 
-fn at_size(listed: &Listed, stored: Option<(u32, u32)>) -> Result<Camera> {
+fn at_size(listed: &ListedPhoto, stored: Option<(u32, u32)>) -> Result<Camera> {
     let (Some(path), Some(size)) = (&listed.photo, stored) else { return Ok(listed.camera.clone()) };
     let camera = &listed.camera;
     if let Some(problem) = aspect_problem(("the photo", size), ("its camera", camera.size())) {
