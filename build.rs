@@ -8,15 +8,15 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-const PICTURES: &str = "src/guide/pictures";
+const PICTURES_FOLDER: &str = "src/guide/pictures";
 
 fn main() {
-    for watched in ["build.rs", "glsl", "tools/shadergen", PICTURES] {
+    for watched in ["build.rs", "glsl", "tools/shadergen", PICTURES_FOLDER] {
         println!("cargo::rerun-if-changed={watched}");
     }
     let folder = |variable| std::env::var_os(variable).map(PathBuf::from).expect("cargo sets it");
     let (root, out) = (folder("CARGO_MANIFEST_DIR"), folder("OUT_DIR"));
-    std::fs::write(out.join("pictures.md"), pictures(&root.join(PICTURES))).expect("cargo's folder is writable");
+    std::fs::write(out.join("pictures.md"), pictures(&root.join(PICTURES_FOLDER))).expect("cargo's folder is writable");
     if let Err(findings) = shadergen::run(&root.join("glsl"), &out) {
         for finding in findings {
             for line in finding.to_string().lines() {
@@ -26,7 +26,7 @@ fn main() {
     }
 }
 
-/// The pictures of the guide as Markdown link definitions with the bytes inside, because rustdoc copies no files:
+/// Returns the guide's pictures as Markdown link definitions with embedded bytes, because rustdoc copies no files:
 /// `[photo]: data:image/png;base64,...`.
 fn pictures(folder: &Path) -> String {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());

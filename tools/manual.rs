@@ -1,25 +1,25 @@
-//! Writes manual pages and completions for shells, made from the flags and commands of the program.
+//! Writes manual pages and shell completions, generated from the program's flags and commands.
 //!
 //!     cargo run --example manual -- FOLDER
 //!
-//! FOLDER/man has a page for each command, FOLDER/completions a file for each shell.
+//! FOLDER/man gets a page per command, FOLDER/completions a file per shell.
 
 use clap_complete::Shell;
 use std::io;
 use std::path::Path;
 
-/// Shells that have completions.
-pub const SHELLS: [Shell; 3] = [Shell::Bash, Shell::Zsh, Shell::Fish];
+/// Shells with completions.
+pub const COMPLETION_SHELLS: [Shell; 3] = [Shell::Bash, Shell::Zsh, Shell::Fish];
 
-/// Writes all of them.
+/// Writes all pages and completions.
 pub fn write(folder: &Path) -> io::Result<()> {
-    // Pages of one version are the same for every commit and set of features.
+    // The pages of a version are the same for every commit and feature set.
     let mut command = labelgs::cli::command::command().long_version(None::<&'static str>);
     let (pages, completions) = (folder.join("man"), folder.join("completions"));
     std::fs::create_dir_all(&pages)?;
     std::fs::create_dir_all(&completions)?;
     clap_mangen::generate_to(command.clone(), &pages)?;
-    for shell in SHELLS {
+    for shell in COMPLETION_SHELLS {
         clap_complete::generate_to(shell, &mut command, "labelgs", &completions)?;
     }
     Ok(())

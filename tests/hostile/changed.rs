@@ -3,7 +3,7 @@
 //! Each seed is cut at many lengths, changed at many bytes in four ways, and given hostile numbers at many places:
 //! as bytes of every width, and where it is text in place of every number.
 
-use super::targets::{Place, TARGETS, Target};
+use super::targets::{ALL_TARGETS, TargetFolder, Target};
 use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
@@ -91,7 +91,7 @@ fn words(text: &[u8]) -> Vec<(usize, usize)> {
 
 /// Runs all changes of the seeds of a target; returns how many there were, how many were accepted, and the most bytes.
 fn run(target: &'static Target) -> (usize, usize, usize) {
-    let place = Place::new(target);
+    let place = TargetFolder::new(target);
     let (mut cases, mut accepted, mut most) = (0, 0, 0);
     for (index, seed) in (target.seeds)().iter().enumerate() {
         changes(seed, &mut |bytes| {
@@ -121,7 +121,7 @@ fn run_all(prefixes: &[&str]) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     let start = std::time::Instant::now();
     let mut total = 0;
-    for target in TARGETS.iter().filter(|target| prefixes.iter().any(|prefix| target.name.starts_with(prefix))) {
+    for target in ALL_TARGETS.iter().filter(|target| prefixes.iter().any(|prefix| target.name.starts_with(prefix))) {
         let (cases, accepted, most) = pool.install(|| run(target));
         println!("{}: {cases} cases, {accepted} accepted, at most {} KiB", target.name, most >> 10);
         assert!(cases > 100, "{}: only {cases} cases", target.name);

@@ -1,14 +1,14 @@
 //! Replays the findings of fuzzing and its seeds through every reader.
 
-use super::targets::{Place, TARGETS, find};
+use super::targets::{ALL_TARGETS, TargetFolder, find};
 use std::fs;
 use std::path::Path;
 
 /// Every seed is a valid file, so fuzzing starts from accepted input.
 #[test]
 fn seeds_are_accepted() {
-    for target in &TARGETS {
-        let place = Place::new(target);
+    for target in &ALL_TARGETS {
+        let place = TargetFolder::new(target);
         let seeds = (target.seeds)();
         assert!(!seeds.is_empty(), "{} has no seed", target.name);
         for (index, seed) in seeds.iter().enumerate() {
@@ -31,7 +31,7 @@ fn findings_stay_fixed() {
     let mut replayed = 0;
     for folder in fs::read_dir(&root).expect("the folder of findings").map(|entry| entry.expect("a folder").path()) {
         let name = folder.file_name().expect("a name").to_string_lossy().into_owned();
-        let place = Place::new(find(&name).unwrap_or_else(|| panic!("{name} is no target")));
+        let place = TargetFolder::new(find(&name).unwrap_or_else(|| panic!("{name} is no target")));
         for file in fs::read_dir(&folder).expect("findings").map(|entry| entry.expect("a file").path()) {
             place.check(&fs::read(&file).expect("a finding"));
             replayed += 1;

@@ -36,7 +36,7 @@ fn every_command_has_a_page_and_completions() {
     assert!(all.len() > 26, "{} commands", all.len());
     let completions =
         ["labelgs.bash", "_labelgs", "labelgs.fish"].map(|name| (name, read(format!("completions/{name}"))));
-    assert_eq!(completions.len(), manual::SHELLS.len());
+    assert_eq!(completions.len(), manual::COMPLETION_SHELLS.len());
     for (name, command) in &all {
         let page = read(format!("man/{name}.1"));
         assert!(page.contains(&format!(".TH {name} 1 ")), "{name}: {page}");

@@ -1,5 +1,6 @@
-//! How much of true objects is found by clicks that a rule makes: the first one in the view that shows most of the object, where it is
-//! farthest from its border; then, as long as an object lacks something, where what is wrong in any view is farthest from its border.
+//! Scores objects found by simulated clicks against true masks. The first click is in the view that shows most of the
+//! object, at the point farthest from its border. While the object is incomplete, each further click is where the error
+//! in any view is farthest from its border.
 
 use crate::{device, measure::table};
 use labelgs::engine::Engine;
@@ -19,10 +20,10 @@ use std::{
     time::Instant,
 };
 
-/// IoU from which an object needs no further click.
-const ENOUGH: f64 = 0.9;
+/// An object with at least this IoU needs no further click.
+const IOU_ENOUGH: f64 = 0.9;
 
-/// Options of the clicks.
+/// Options of the simulated clicks.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
     /// Model, a PLY or the folder of a run.
@@ -51,7 +52,7 @@ struct Truth<'a> {
     is_held_out: bool,
 }
 
-/// Prints a row for each object: its clicks, and after each IoU over all pixels of held-out views, and seconds.
+/// Prints a row per object: its clicks, the IoU after each of them over all pixels of held-out views, and seconds.
 pub fn run(options: &Options) -> Result<()> {
     let model = read_model(&model_file(&options.model)?)?.gaussians;
     let network = Network::open(&options.network, rayon::current_num_threads())?;
@@ -83,7 +84,7 @@ pub fn run(options: &Options) -> Result<()> {
         };
         let mut next =
             Vec::from_iter(largest.map(|truth| deepest(truth, &where_differ(&truth.mask, id, None))).transpose()?);
-        while let Some((_, click)) = next.pop().filter(|_| hints.clicks.len() < options.clicks && iou < ENOUGH) {
+        while let Some((_, click)) = next.pop().filter(|_| hints.clicks.len() < options.clicks && iou < IOU_ENOUGH) {
             hints.clicks.push(click);
             let (start, mut first) = (Instant::now(), None);
             let found = clicking.object(&hints, &mut |progress| {
@@ -92,7 +93,7 @@ pub fn run(options: &Options) -> Result<()> {
                 }
                 Ok(())
             });
-            // Where the model shows nothing, the next best place is clicked.
+            // Where the model shows nothing, click the next best position.
             if matches!(found, Err(Error::Usage { .. })) && !next.is_empty() {
                 hints.clicks.pop();
                 continue;
@@ -115,20 +116,20 @@ pub fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// 1 where a map of one object differs from the true one of an id, or everywhere on it.
+/// Returns 1 where a map of one object differs from the true object, or everywhere on the true object without a map.
 fn where_differ(mask: &LabelMap, id: u16, map: Option<&LabelMap>) -> LabelMap {
     let found = |at: usize| map.is_some_and(|map| map.ids[at] != 0);
     let ids = mask.ids.iter().enumerate().map(|(at, other)| u16::from((*other == id) != found(at))).collect();
     LabelMap { ids, ..mask.clone() }
 }
 
-/// Draws an object in each view.
+/// Renders an object in each view.
 fn maps(engine: &mut Engine, truths: &[Truth], rows: &[bool]) -> Result<Vec<LabelMap>> {
     engine.set_labels(&rows.iter().map(|is_in| u32::from(*is_in)).collect::<Vec<_>>())?;
     truths.iter().map(|truth| label_map(engine, &truth.view.camera, NEAR_DEFAULT)).collect()
 }
 
-/// Intersection over union of all pixels of held-out views.
+/// Returns the intersection over union over all pixels of held-out views.
 fn iou_of(truths: &[Truth], maps: &[LabelMap], id: u16) -> f64 {
     let held_out = truths.iter().zip(maps).filter(|(truth, _)| truth.is_held_out);
     let pixels = held_out.flat_map(|(truth, map)| truth.mask.ids.iter().map(move |other| *other == id).zip(&map.ids));

@@ -1,4 +1,4 @@
-//! Kernels that are compiled when a benchmark runs, by the compiler of the build.
+//! Compiles kernels at benchmark run time with the build's compiler.
 
 use crate::shadergen::compile::{Define, GlslCompiler, Purpose};
 use crate::shadergen::{interface, reflect};
@@ -7,19 +7,19 @@ use labelgs::{Error, Result};
 use std::path::Path;
 
 /// The engine's kernels.
-pub const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
+pub const GLSL_FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
 fn compiler() -> Result<GlslCompiler> {
-    GlslCompiler::new(&Path::new(GLSL).join("include")).map_err(Error::Bug)
+    GlslCompiler::new(&Path::new(GLSL_FOLDER).join("include")).map_err(Error::Bug)
 }
 
-/// The macros of a device that reads through texel buffers, or none.
+/// Returns the macros of a device that reads through texel buffers, or none.
 pub fn texel_define(texel: bool) -> Vec<Define> {
     if texel { vec![("TEXEL".to_owned(), None)] } else { Vec::new() }
 }
 
-/// SPIR-V of a kernel with the engine's includes. It lives as long as the program, since pipelines are told apart by the
-/// address of their module.
+/// Compiles a kernel with the engine's includes to SPIR-V. The result lives as long as the program, because pipelines
+/// are identified by the address of their module.
 pub fn spirv(name: &str, source: &str, defines: &[Define]) -> Result<&'static [u8]> {
     let words = compiler()?.compile(name, source, defines, Purpose::Ship).map_err(Error::Check)?;
     Ok(words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>().leak())

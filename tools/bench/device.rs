@@ -1,13 +1,13 @@
-//! The device that is measured.
+//! The measured device.
 
 use labelgs::gpu::{Gpu, GpuOptions, MessageLog};
 use labelgs::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Messages of the validation layer for each device; outlives the device.
+/// Messages of the validation layer per device; they outlive the device.
 static LOGS: Mutex<Vec<MessageLog>> = Mutex::new(Vec::new());
 
-/// The device that LABELGS_DEVICE names, or the best.
+/// Opens the device named by LABELGS_DEVICE, or the best one.
 pub fn open() -> Result<Arc<Gpu>> {
     let gpu = Gpu::new(&GpuOptions::from_env()?)?;
     LOGS.lock().unwrap_or_else(PoisonError::into_inner).push(gpu.message_log());

@@ -1,4 +1,4 @@
-//! A city that is larger than the memory of the device: time and memory of the host for its pictures, list and one object.
+//! A city larger than the device's memory: host time and memory of rendering, listing and extracting an object.
 
 use super::Common;
 use super::measure::{table, write_json};
@@ -16,10 +16,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Size of a block of houses, world units.
-const BLOCK: f64 = 60.0;
+/// Size of a city block, world units.
+const BLOCK_SIZE: f64 = 60.0;
 /// Degree of the spherical harmonics.
-const DEGREE: u32 = 3;
+const SH_DEGREE: u32 = 3;
 /// The first label, which masks cannot have.
 const FIRST_LABEL: usize = 70_000;
 
@@ -34,7 +34,7 @@ pub struct Options {
     pub millions: usize,
 }
 
-/// Measures the program in processes of its own.
+/// Measures the program in separate processes.
 pub fn run(options: &Options) -> Result<()> {
     let common = &options.common;
     let (count, side, size, limit) = match common.small {
@@ -78,7 +78,7 @@ fn length(path: &str) -> u64 {
     std::fs::metadata(path).map_or(0, |found| found.len())
 }
 
-/// Writes blocks of houses, one after the other, a label each.
+/// Writes the blocks in order, with one label each.
 fn write_city(path: &Path, count: usize, side: usize) -> Result<()> {
     let one = Gaussians {
         means: vec![[0.0; 3]],
@@ -87,7 +87,7 @@ fn write_city(path: &Path, count: usize, side: usize) -> Result<()> {
         opacities: vec![0.0],
         sh0: vec![[0.0; 3]],
         sh_rest: vec![[0.0; 3]; 15],
-        sh_degree: DEGREE,
+        sh_degree: SH_DEGREE,
         labels: Some(vec![0]),
         ..Gaussians::default()
     };
@@ -109,18 +109,18 @@ fn write_city(path: &Path, count: usize, side: usize) -> Result<()> {
     })
 }
 
-/// The columns of a Gaussian on the ground, on a wall or on a roof of a block.
+/// Returns the columns of a Gaussian on the ground, on a wall or on the roof of a block.
 fn gaussian(random: &mut SmallRng, block: usize, side: usize) -> [f32; 63] {
     let mut draw = |low: f64, high: f64| random.random_range(low..high);
-    let half = 0.35 * BLOCK;
+    let half = 0.35 * BLOCK_SIZE;
     let height = 8.0 + (block * 7 % 23) as f64;
     let place = match draw(0.0, 1.0) {
-        kind if kind < 0.3 => DVec3::new(draw(-0.5, 0.5) * BLOCK, 0.0, draw(-0.5, 0.5) * BLOCK),
+        kind if kind < 0.3 => DVec3::new(draw(-0.5, 0.5) * BLOCK_SIZE, 0.0, draw(-0.5, 0.5) * BLOCK_SIZE),
         kind if kind < 0.6 => DVec3::new(half * draw(-1.0, 1.0).signum(), -draw(0.0, height), draw(-half, half)),
         kind if kind < 0.9 => DVec3::new(draw(-half, half), -draw(0.0, height), half * draw(-1.0, 1.0).signum()),
         _ => DVec3::new(draw(-half, half), -height, draw(-half, half)),
     };
-    let corner = DVec3::new((block % side) as f64 + 0.5, 0.0, (block / side) as f64 + 0.5) * BLOCK;
+    let corner = DVec3::new((block % side) as f64 + 0.5, 0.0, (block / side) as f64 + 0.5) * BLOCK_SIZE;
     let mut values = [0.0; 63];
     values[..3].copy_from_slice(&(place + corner).as_vec3().to_array());
     values[6..9].copy_from_slice(&[0; 3].map(|_| draw(-1.0, 1.0) as f32));
@@ -141,13 +141,13 @@ fn cameras(side: usize, (width, height): (u32, u32)) -> [(&'static str, Camera);
         let (cx, cy) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         Camera { rotation, translation: -(rotation * eye), fx: focal, fy: focal, cx, cy, width, height }
     };
-    let all = side as f64 * BLOCK;
-    let street = DVec3::new(BLOCK * (side / 2) as f64, -1.7, 0.45 * all);
+    let all = side as f64 * BLOCK_SIZE;
+    let street = DVec3::new(BLOCK_SIZE * (side / 2) as f64, -1.7, 0.45 * all);
     let above = DVec3::new(0.5 * all, -0.8 * all, -0.3 * all);
     [("street", at(street, street + DVec3::Z)), ("above", at(above, DVec3::new(0.5 * all, 0.0, 0.5 * all)))]
 }
 
-/// Runs the program; returns its seconds, and its largest memory where the system tells it, bytes.
+/// Runs the program. Returns its seconds, and its peak memory if the system reports it, bytes.
 fn measured(args: &[String]) -> Result<(f64, Option<u64>)> {
     let failed = |what: String| Error::Bug(format!("labelgs {}: {what}", args[0]));
     let start = Instant::now();

@@ -1,7 +1,7 @@
 //! Benchmarks: run time against error, the cost of a step and of a label, memory, and two programs against each other.
 //!
-//! `tools/bench/run COMMAND` builds with optimisation and runs one of them. Each prints its tables and writes JSON
-//! into `--output`. With `--small` it does the same in seconds on tiny scenes, as the tests run it.
+//! `tools/bench/run COMMAND` builds with optimisation and runs a benchmark. It prints tables and writes JSON to
+//! `--output`. With `--small` it does the same in seconds on tiny scenes, as in the tests.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,
@@ -48,10 +48,10 @@ struct Arguments {
 /// Options of all benchmarks.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Common {
-    /// Tiny scenes and few repetitions; times mean nothing then.
+    /// Tiny scenes and few repetitions; times are then meaningless.
     #[arg(long)]
     pub small: bool,
-    /// Folder of JSON files.
+    /// Folder for JSON files.
     #[arg(long, short, value_name = "DIR", default_value = "target/bench")]
     pub output: PathBuf,
 }
@@ -62,31 +62,31 @@ enum Command {
     Kernels(kernels::KernelArgs),
     /// Cost of a step with labels relative to one without, by covered area and number of objects.
     Steps(Common),
-    /// Quality against processor time of this program, and of another one.
+    /// Quality against CPU time of this program and another.
     Training(training::Options),
     /// Scores of real captures, as papers report them, beside those of other trainers.
     Real(training::real::Options),
-    /// Rates and costs of the device, and how near each stage of a step comes to the limit that follows.
+    /// Rates and costs of the device, and how close each stage of a step comes to the resulting limit.
     Limits(Common),
-    /// The blends of made splats: the chain of a lone tile, and a picture of even tiles.
+    /// The blends of synthetic splats: the chain of a single tile, and an image of equal tiles.
     Tile(Common),
-    /// The sort in each form that the device has.
+    /// The sort in each form that the device supports.
     Sort(Common),
-    /// Bytes of a step by the order of the Gaussians.
+    /// Bytes of a step for different orders of the Gaussians.
     Order(order::Options),
-    /// Objects from clicks that a rule makes, compared with true masks.
+    /// Objects from simulated clicks, compared with true masks.
     Clicks(clicks::Options),
-    /// Meshes of the objects of a trained model, against the true surfaces.
+    /// Meshes of a trained model's objects, compared with the true surfaces.
     Meshes(meshes::Options),
-    /// Objects from strokes that a rule draws, compared with true masks.
+    /// Objects from simulated strokes, compared with true masks.
     Strokes(strokes::Options),
-    /// A large model from a trained one, to be timed.
+    /// A large model made from a trained one, for timing.
     Split(split::Options),
     /// Predicted against measured memory of training.
     Memory(Common),
-    /// A city that is larger than the memory of the device: its pictures, its list, one object of it.
+    /// A city larger than the device's memory: its renders, its list, one of its objects.
     Large(large::Options),
-    /// One measurement of `memory`, in a process of its own.
+    /// One measurement of `memory`, in a separate process.
     #[command(hide = true)]
     MemoryOf { gaussians: u32, width: u32, height: u32 },
 }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 pub struct Cost {
     /// Wall clock, ms.
     pub wall: f64,
-    /// Processor time of all threads of this process, ms; 0 where the system does not tell.
+    /// CPU time of all threads of this process, ms; 0 if the system does not report it.
     pub cpu: f64,
 }
 
@@ -24,14 +24,14 @@ pub fn timed<T>(work: impl FnOnce() -> Result<T>) -> Result<(T, Cost)> {
     Ok((done, Cost { wall: ms(wall.elapsed()), cpu: ms(cpu_time().saturating_sub(cpu)) }))
 }
 
-/// Processor time of this process, all threads; 0 where the system does not tell.
+/// CPU time of this process, all threads; 0 if the system does not report it.
 #[cfg(unix)]
 fn cpu_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
 }
 
-/// Without a source of processor time.
+/// Without a source of CPU time.
 #[cfg(not(unix))]
 fn cpu_time() -> Duration {
     Duration::ZERO
@@ -62,7 +62,7 @@ pub fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split(' ').next()?.parse().ok()
 }
 
-/// Formats a table: first row as head, first column aligned to the left, others to the right.
+/// Formats a table: the first row is the head; the first column is left-aligned, the others right-aligned.
 pub fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |column: usize| rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();

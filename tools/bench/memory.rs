@@ -1,4 +1,4 @@
-//! Predicted against measured memory of training, on a device whose memory is the host's.
+//! Predicted against measured memory of training, on a device that uses host memory.
 
 use super::measure::write_json;
 use super::trained::timed_step;
@@ -17,11 +17,11 @@ use std::process::Command;
 use std::sync::Arc;
 
 /// Allowed difference between prediction and measurement.
-const TOLERANCE: f64 = 0.1;
+const RATIO_TOLERANCE: f64 = 0.1;
 /// Steps of each training.
-const STEPS: u32 = 2;
+const STEP_COUNT: u32 = 2;
 
-/// Measures each size in a process of its own, so that no size reuses memory of an earlier one.
+/// Measures each size in a separate process, so that none reuses memory of an earlier size.
 pub fn run(common: &Common) -> Result<()> {
     if !device::open()?.is_cpu() {
         println!("memory: the memory of this device is not the host's; nothing to measure");
@@ -52,7 +52,7 @@ pub fn run(common: &Common) -> Result<()> {
     write_json(&common.output.join("memory.json"), &json!({ "schema_version": 1, "rows": rows }))?;
     let ratio =
         |row: &Value| row["measured"].as_f64().unwrap_or(f64::NAN) / row["predicted"].as_f64().unwrap_or(f64::NAN);
-    match rows.iter().map(ratio).find(|ratio| !((1.0 - ratio).abs() <= TOLERANCE)) {
+    match rows.iter().map(ratio).find(|ratio| !((1.0 - ratio).abs() <= RATIO_TOLERANCE)) {
         None => Ok(()),
         Some(ratio) => Err(Error::Bug(format!("measured memory is {ratio:.3} of the predicted, more than 10 % off"))),
     }
@@ -80,7 +80,7 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
         ..TrainConfig::default()
     };
     let options = SchedulerOptions { poison_step: true, ..SchedulerOptions::default() };
-    // A training on one Gaussian compiles all kernels first, because compiled code is not the engine's memory.
+    // Train on a single Gaussian first, which compiles all kernels, because compiled code is not the engine's memory.
     let small = scene(1, width, height);
     steps(&mut Trainer::new(Arc::clone(&gpu), config.clone(), &small.0, &small.1, options)?)?;
     let (dataset, model) = scene(count, width, height);
@@ -101,13 +101,13 @@ pub fn measure(count: u32, width: u32, height: u32) -> Result<()> {
 /// Runs the steps and returns the seconds of the last one.
 fn steps(trainer: &mut Trainer) -> Result<f64> {
     let mut seconds = 0.0;
-    for _ in 0..STEPS {
+    for _ in 0..STEP_COUNT {
         seconds = timed_step(trainer)?.1.wall / 1e3;
     }
     Ok(seconds)
 }
 
-/// Random small Gaussians of degree 3 in a ball before a camera, two of them in objects.
+/// Random small Gaussians of degree 3 in a ball in front of a camera; two of them belong to objects.
 pub fn scene(count: u32, width: u32, height: u32) -> (Dataset, Gaussians) {
     let mut random = SmallRng::seed_from_u64(7);
     let mut model = Gaussians { sh_degree: 3, ..Gaussians::default() };
@@ -142,7 +142,7 @@ pub fn scene(count: u32, width: u32, height: u32) -> (Dataset, Gaussians) {
     (Dataset { train: vec![view], ..Dataset::default() }, model)
 }
 
-/// A line of /proc/self/status, bytes.
+/// Returns a value of /proc/self/status, bytes.
 fn resident(name: &str) -> Result<u64> {
     let problem = || Error::Bug(format!("/proc/self/status has no {name}"));
     let text = std::fs::read_to_string("/proc/self/status").map_err(|_| problem())?;

@@ -1,4 +1,4 @@
-//! How far meshes of a trained model of a made scene are from the true surfaces.
+//! How far meshes from a trained model of a synthetic scene are from the true surfaces.
 
 use crate::{device, measure::table};
 use glam::DVec3;
@@ -10,10 +10,10 @@ use labelgs::scenes::camera_json::views_of_model;
 use labelgs::synth::{Preset, World};
 use std::{path::PathBuf, time::Instant};
 
-/// Options of the meshes.
+/// Options of the mesh comparison.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
-    /// Folder of a run on a scene of `labelgs synth` with seed 0, whose labels are those of its masks.
+    /// Folder of a run on a scene of `labelgs synth` with seed 0, with the labels of its masks.
     model: PathBuf,
     /// Objects of the scene.
     #[arg(long, value_enum, default_value = "default")]
@@ -23,7 +23,7 @@ pub struct Options {
     cells: u32,
 }
 
-/// Prints a row for each object: distances of the corners of its mesh from the true surface, in its diagonals.
+/// Prints a row per object: distances of its mesh's vertices from the true surface, in object diagonals.
 pub fn run(options: &Options) -> Result<()> {
     let model = read_model(&model_file(&options.model)?)?.gaussians;
     let cameras: Vec<DVec3> = views_of_model(&options.model)?.iter().map(|view| view.camera.centre()).collect();

@@ -1,5 +1,5 @@
-//! What the order of the Gaussians costs a card: bytes of a step in the order of the model, along a curve through space (Morton), and
-//! at random. Counted from what passes read and write, not timed, so any device will do.
+//! The cost of the Gaussians' order on a GPU: bytes of a step in model order, along a space-filling curve (Morton), and
+//! in random order. Bytes are counted from what passes read and write, not timed, so any device will do.
 
 use crate::{device, measure::table};
 use labelgs::formats::read_model;
@@ -15,14 +15,15 @@ use labelgs::{Result, gpu::Gpu};
 use rand::Rng;
 use std::{array, path::PathBuf, sync::Arc};
 
-/// Bytes of a Gaussian in each plane: position, size, rotation, bands of colour. All Gaussians need the first two to be culled.
-const PLANES: [u64; 7] = [16, 16, 16, 16, 48, 64, 96];
+/// Bytes of a Gaussian in each plane: position, size, rotation, colour bands. Culling reads the first two for all
+/// Gaussians.
+const PLANE_BYTES: [u64; 7] = [16, 16, 16, 16, 48, 64, 96];
 /// Bytes of a splat.
-const SPLAT: u64 = 48;
-/// Least that memory moves, bytes.
-const SECTOR: u64 = 32;
-/// Bytes of a line of a cache.
-const LINE: u64 = 128;
+const SPLAT_BYTES: u64 = 48;
+/// Smallest memory transaction, bytes.
+const SECTOR_BYTES: u64 = 32;
+/// Bytes of a cache line.
+const CACHE_LINE_BYTES: u64 = 128;
 
 /// Options of the counts.
 #[derive(clap::Args, Clone, Debug)]
@@ -35,15 +36,15 @@ pub struct Options {
     /// Longest side of the views, px.
     #[arg(long)]
     max_resolution: Option<u32>,
-    /// Views, evenly from all.
+    /// Number of views, evenly chosen.
     #[arg(long, default_value_t = 4)]
     views: usize,
 }
 
-/// Gaussians of a view by depth, which of them have a gradient, and places in that order of the splats of each tile.
-type Seen = (Vec<usize>, Vec<bool>, Vec<Vec<u32>>);
+/// Gaussians of a view by depth, whether each has a gradient, and indices in that order of each tile's splats.
+type ViewOrder = (Vec<usize>, Vec<bool>, Vec<Vec<u32>>);
 
-/// Prints them.
+/// Prints the counts.
 pub fn run(options: &Options) -> Result<()> {
     let model =
         Gaussians { labels: None, label_confidence: None, ..read_model(&model_file(&options.model)?)?.gaussians };
@@ -51,7 +52,7 @@ pub fn run(options: &Options) -> Result<()> {
     let views = open(&options.scene, &load)?.train;
     let (gpu, every) = (device::open()?, (views.len() / options.views.max(1)).max(1));
     let seen = views.iter().step_by(every).map(|view| look(&gpu, &model, &view.camera)).collect::<Result<Vec<_>>>()?;
-    let mean = |of: fn(&Seen) -> usize| seen.iter().map(of).sum::<usize>() / seen.len().max(1);
+    let mean = |of: fn(&ViewOrder) -> usize| seen.iter().map(of).sum::<usize>() / seen.len().max(1);
     let (visible, touched) = (mean(|of| of.0.len()), mean(|of| of.1.iter().filter(|&&touched| touched).count()));
     let pairs = mean(|of| of.2.iter().map(Vec::len).sum());
     println!("{} Gaussians; {visible} visible, {touched} with a gradient, {pairs} pairs; MB of a view", model.len());
@@ -73,8 +74,8 @@ pub fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Runs a step of a view.
-fn look(gpu: &Arc<Gpu>, model: &Gaussians, camera: &Camera) -> Result<Seen> {
+/// Runs a step on a view.
+fn look(gpu: &Arc<Gpu>, model: &Gaussians, camera: &Camera) -> Result<ViewOrder> {
     let shape = KernelShape { antialiased: model.antialiased, ..KernelShape::for_device(gpu.capabilities()) };
     let camera = Camera { translation: camera.translation + camera.rotation * model.origin, ..camera.clone() };
     let (size, pixels) = ((camera.width as usize, camera.height as usize), (camera.width * camera.height) as usize);
@@ -97,7 +98,7 @@ fn look(gpu: &Arc<Gpu>, model: &Gaussians, camera: &Camera) -> Result<Seen> {
     Ok((splats.iter().map(|splat| splat.gaussian).collect(), touched, lists.collect()))
 }
 
-/// Codes of 10 bits an axis in the box around all.
+/// Returns Morton codes of 10 bits per axis in the bounding box of all means.
 fn codes(means: &[[f32; 3]]) -> Vec<u32> {
     let side = |axis: usize, pick: fn(f32, f32) -> f32| means.iter().map(|mean| mean[axis]).reduce(pick).unwrap_or(0.0);
     let sides: [_; 3] = array::from_fn(|axis| (side(axis, f32::min), side(axis, f32::max)));
@@ -107,7 +108,7 @@ fn codes(means: &[[f32; 3]]) -> Vec<u32> {
     means.iter().map(|mean| (0..30).map(|at| bit(mean, at)).sum()).collect()
 }
 
-/// MB of the units that elements of so many bytes at ascending places lie in.
+/// Returns the MB moved in units that contain elements of `bytes` bytes at ascending positions.
 fn moved(places: impl IntoIterator<Item = u64>, bytes: u64, unit: u64) -> f64 {
     let (mut next, mut units) = (0, 0);
     for place in places {
@@ -117,23 +118,24 @@ fn moved(places: impl IntoIterator<Item = u64>, bytes: u64, unit: u64) -> f64 {
     (units * unit) as f64 / 1e6
 }
 
-/// Share of the subgroups of 32 without a visible Gaussian, and MB: of the visible ones with both moments, because they are late; of
-/// all that an update reads and writes; of the splats of each tile; and of the lines of a cache that these lie in.
-fn count((gaussians, touched, tiles): &Seen, places: &[u64]) -> [f64; 5] {
+/// Returns the share of the subgroups of 32 without a visible Gaussian, and MB: of the visible Gaussians with both
+/// moments; of everything that an update reads and writes; of each tile's splats; and of the cache lines that contain
+/// these.
+fn count((gaussians, touched, tiles): &ViewOrder, places: &[u64]) -> [f64; 5] {
     let mut order: Vec<(u64, usize)> =
         gaussians.iter().zip(0..).map(|(&gaussian, rank)| (places[gaussian], rank)).collect();
     order.sort_unstable();
     let idle = 1.0 - moved(order.iter().map(|of| of.0), 1, 32) * 1e6 / places.len().next_multiple_of(32) as f64;
     let planes = |from: usize, all: bool| -> f64 {
         let places = || order.iter().filter(|of| all || touched[of.1]).map(|of| of.0);
-        PLANES[from..].iter().map(|&bytes| moved(places(), bytes, SECTOR)).sum()
+        PLANE_BYTES[from..].iter().map(|&bytes| moved(places(), bytes, SECTOR_BYTES)).sum()
     };
     let mut numbers = vec![0; order.len()];
     (0..).zip(&order).for_each(|(number, &(_, rank))| numbers[rank] = number);
     let of_tile = |tile: &Vec<u32>| {
         let mut own: Vec<u64> = tile.iter().map(|&rank| numbers[rank as usize]).collect();
         own.sort_unstable();
-        [SECTOR, LINE].map(|unit| moved(own.iter().copied(), SPLAT, unit))
+        [SECTOR_BYTES, CACHE_LINE_BYTES].map(|unit| moved(own.iter().copied(), SPLAT_BYTES, unit))
     };
     let [splats, lines] = tiles.iter().map(of_tile).fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
     [idle, 3.0 * planes(2, true), 6.0 * planes(0, false), splats, lines]

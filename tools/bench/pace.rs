@@ -1,4 +1,4 @@
-//! Steps of several trainings, timed in turn, so that a busy machine is equally busy for all of them.
+//! Steps of several trainings, timed in turn, so that the load of the machine affects all of them alike.
 
 use super::measure::{median, timed};
 use super::trained::timing_config;
@@ -13,27 +13,27 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Steps that follow each other without a wait between them: a card that waits for the host lowers its clock. One of them
-/// has object layers.
-const TURN: u32 = 8;
+/// Steps in a row without a wait in between, because a GPU that waits for the host lowers its clock. One of them has
+/// object layers.
+const STEPS_PER_TURN: u32 = 8;
 
-/// A training whose steps are timed: of photos of full size, all bands of colour and, with masks, labels.
+/// A training whose steps are timed, on full-size photos with all colour bands and, with masks, labels.
 pub struct Pace {
     /// Name in tables.
     pub name: String,
     trainer: Trainer,
     tile_pixels: f64,
-    /// Sum of the passes, ms, by step.
+    /// Total pass time per step, ms.
     pub passes: Vec<f64>,
     /// The same by stage.
     pub stages: BTreeMap<Stage, Vec<f64>>,
-    /// Host's clock, ms a step, by turn.
+    /// Host time per step, ms, by turn.
     pub wall: Vec<f64>,
-    /// Processor time of all threads, ms a step, by turn.
+    /// CPU time of all threads per step, ms, by turn.
     pub processor: Vec<f64>,
-    /// Reports, by step.
+    /// Reports per step.
     pub reports: Vec<StepReport>,
-    /// Items of the step's list.
+    /// Items in the step's list.
     pub items: usize,
 }
 
@@ -57,13 +57,13 @@ impl Pace {
         })
     }
 
-    /// Does what a run of default settings does for labels besides its steps, and returns the processor time, ms: votes
-    /// and occluders when labels start, and votes at the end.
+    /// Does the label work of a default run besides its steps, and returns the CPU time, ms: votes and occluders when
+    /// labels start, and votes at the end.
     pub fn sweeps(&mut self) -> Result<f64> {
         if !self.trainer.has_labels() {
             return Ok(0.0);
         }
-        // The driver compiles when a list first runs, so each runs once before. As in a run, masks are not yet judged
+        // The driver compiles when a list first runs, so run each once before. As in a run, masks are not judged yet
         // when labels start.
         self.trainer.labelled_model()?;
         self.trainer.refresh_occluders()?;
@@ -76,11 +76,11 @@ impl Pace {
         Ok(start.cpu + end.cpu)
     }
 
-    /// Runs steps and waits for the last. Steps in which the driver compiles are not counted.
+    /// Runs steps and waits for the last one. Steps in which the driver compiles are not counted.
     fn turn(&mut self) -> Result<()> {
         let (reports, cost) = timed(|| {
             let mut reports = Vec::new();
-            for _ in 0..TURN {
+            for _ in 0..STEPS_PER_TURN {
                 reports.extend(self.trainer.step()?);
             }
             reports.extend(self.trainer.drain()?);
@@ -88,8 +88,8 @@ impl Pace {
         })?;
         let times = self.trainer.take_times();
         if times.iter().all(|times| !times.is_first) {
-            self.wall.push(cost.wall / f64::from(TURN));
-            self.processor.push(cost.cpu / f64::from(TURN));
+            self.wall.push(cost.wall / f64::from(STEPS_PER_TURN));
+            self.processor.push(cost.cpu / f64::from(STEPS_PER_TURN));
         }
         for times in times.iter().filter(|times| !times.is_first) {
             let report = reports.iter().find(|report| report.step == times.step);
@@ -106,17 +106,17 @@ impl Pace {
         Ok(())
     }
 
-    /// Median over the steps of a number of their reports.
+    /// Returns the median over the steps of a number in their reports.
     pub fn median(&self, value: impl Fn(&StepReport) -> f64) -> f64 {
         median(self.reports.iter().map(value))
     }
 
-    /// (pixel, splat) pairs that the steps walked, by step.
+    /// Returns the (pixel, splat) pairs that each step walked.
     pub fn pairs(&self) -> Vec<f64> {
         self.reports.iter().map(|report| report.report.counters.walked_splats() as f64 * self.tile_pixels).collect()
     }
 
-    /// What the steps worked on, for tables and for JSON.
+    /// Describes the workload of the steps, for tables and JSON.
     pub fn about(&self) -> (String, Value) {
         let (gaussians, pairs) = (self.trainer.gaussian_count(), median(self.pairs()));
         let timed = Timed::new(&self.reports);
@@ -141,7 +141,7 @@ impl Pace {
     }
 }
 
-/// Runs the trainings in turn until each has the wanted number of timed steps.
+/// Runs the trainings in turn until each has enough timed steps.
 pub fn race(paces: &mut [Pace], steps: usize) -> Result<()> {
     while paces.iter().any(|pace| pace.passes.len() < steps || pace.wall.is_empty()) {
         for pace in paces.iter_mut() {

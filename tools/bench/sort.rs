@@ -1,4 +1,4 @@
-//! The sort alone, in each form that the device has.
+//! The sort alone, in each form that the device supports.
 
 use crate::measure::{median, table, write_json};
 use crate::{Common, device};
@@ -19,17 +19,17 @@ use rand::Rng;
 use serde_json::json;
 use std::sync::Arc;
 
-/// The same buffers for keys of depths and of tiles; the sort starts in the first pair.
-const KEYS: [Buf; 2] = [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B];
-const VALUES: [Buf; 2] = [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B];
-/// Has the keys of every run, which the sort overwrites.
-const SOURCE: Buf = Buf::SPLAT_FROM_INSTANCE;
-/// Has the digits that the pass which writes keys counts.
-const DIGITS: Buf = Buf::INSTANCE_OFFSETS;
-/// Bits of depths, and of the tiles of a large picture.
-const BITS: [u32; 2] = [32, 13];
+/// The same buffers are used for depth and tile keys; the sort starts in the first pair.
+const KEY_BUFFERS: [Buf; 2] = [Buf::TILE_KEYS_A, Buf::TILE_KEYS_B];
+const VALUE_BUFFERS: [Buf; 2] = [Buf::TILE_VALUES_A, Buf::TILE_VALUES_B];
+/// Stores the keys of every run, because the sort overwrites its input.
+const SOURCE_BUFFER: Buf = Buf::SPLAT_FROM_INSTANCE;
+/// Stores the digits counted by the pass that writes keys.
+const DIGIT_BUFFER: Buf = Buf::INSTANCE_OFFSETS;
+/// Bits of depths, and of the tiles of a large image.
+const KEY_BITS: [u32; 2] = [32, 13];
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(common: &Common) -> Result<()> {
     let gpu = device::open()?;
     let (counts, rounds): (&[usize], _) = match (common.small, gpu.is_cpu()) {
@@ -48,7 +48,7 @@ pub fn run(common: &Common) -> Result<()> {
     let mut found = Vec::new();
     for (name, shape) in forms.into_iter().filter_map(|(name, shape)| Some((name, shape?))) {
         let narrow = name == "narrow";
-        let fit = BITS.into_iter().filter(|&bits| !narrow || bits <= 16);
+        let fit = KEY_BITS.into_iter().filter(|&bits| !narrow || bits <= 16);
         for (&count, bits) in counts.iter().flat_map(|count| fit.clone().map(move |bits| (count, bits))) {
             let ms = timed(&gpu, shape, (count, bits, narrow), rounds)?;
             let rate = count as f64 / ms / 1e6;
@@ -63,7 +63,7 @@ pub fn run(common: &Common) -> Result<()> {
     write_json(&common.output.join("sort.json"), &all)
 }
 
-/// Median ms of a sort of so many keys by so many bits, which are narrow or not; its result is checked.
+/// Returns the median ms of a sort of keys with the given bits, either narrow or not. Checks the result.
 fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32, bool), rounds: usize) -> Result<f64> {
     let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
     let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
@@ -84,12 +84,12 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32,
     })?;
     let capacity = *engine.capacity();
     let mut builder = Builder::new("sort", &shape, &capacity);
-    builder.list.copy(SOURCE, KEYS[0], 0);
+    builder.list.copy(SOURCE_BUFFER, KEY_BUFFERS[0], 0);
     if shape.sweeps() {
-        builder.list.fill(Buf::SWEEP, 0).copy(DIGITS, Buf::SWEEP, u64::from(SWEEP_WORDS) * 4);
+        builder.list.fill(Buf::SWEEP, 0).copy(DIGIT_BUFFER, Buf::SWEEP, u64::from(SWEEP_WORDS) * 4);
     }
     let before = builder.list.work.len();
-    let buffers = SortBuffers { keys: KEYS, values: VALUES, narrow };
+    let buffers = SortBuffers { keys: KEY_BUFFERS, values: VALUE_BUFFERS, narrow };
     let (keys_out, _) = sort(&mut builder, buffers, bits, Count::Instances, "alone", true);
     let list = builder.list;
     let id = engine.raw_mut().prepare(&list)?;
@@ -114,12 +114,12 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32,
     Ok(median(times))
 }
 
-/// Words of so many keys.
+/// Returns the number of words for the keys.
 fn words(count: usize, narrow: bool) -> usize {
     if narrow { count.div_ceil(2) } else { count }
 }
 
-/// The words of keys; of 16 bits each, the first is in the low half.
+/// Packs keys into words; of two 16-bit keys, the first is in the low half.
 fn packed(keys: &[u32], narrow: bool) -> Vec<u32> {
     if !narrow {
         return keys.to_vec();
@@ -127,7 +127,7 @@ fn packed(keys: &[u32], narrow: bool) -> Vec<u32> {
     keys.chunks(2).map(|two| two[0] | two.get(1).map_or(0, |key| key << 16)).collect()
 }
 
-/// Uploads the keys, their number, and what the pass that writes keys counts of them.
+/// Uploads the keys, their number, and the counts of the pass that writes keys.
 fn announce(engine: &mut Engine, keys: &[u32], narrow: bool) -> Result<()> {
     let (bits, items) = (engine.shape().digit_bits, engine.shape().sweep_items);
     let mut digits = vec![0_u32; SWEEP_WORDS as usize];
@@ -140,12 +140,12 @@ fn announce(engine: &mut Engine, keys: &[u32], narrow: bool) -> Result<()> {
     let count = keys.len() as u32;
     let sweeps = engine.shape().sweeps();
     let sched = engine.raw_mut();
-    sched.upload(SOURCE, 0, 0, &packed(keys, narrow))?;
+    sched.upload(SOURCE_BUFFER, 0, 0, &packed(keys, narrow))?;
     sched.upload(Buf::STEP, 0, 0, &[StepUniforms::zeroed()])?;
     sched.upload(Buf::COUNTERS, 0, 0, &[Counters { instance_count: count, ..Counters::zeroed() }])?;
     if sweeps {
         let partitions = count.div_ceil(SWEEP_LANES * items);
-        sched.upload(DIGITS, 0, 0, &digits)?;
+        sched.upload(DIGIT_BUFFER, 0, 0, &digits)?;
         sched.upload(Buf::DISPATCH_ARGS, 0, u64::from(ARGS_SWEEP_INSTANCES), &[partitions, 1, 1])?;
     }
     Ok(())

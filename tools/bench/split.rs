@@ -1,5 +1,5 @@
-//! A large model from a trained one: each Gaussian becomes several, as when a training splits it. Steps of a training then
-//! settle them.
+//! Makes a large model from a trained one: each Gaussian is split into several, as in training. Further training steps
+//! then settle them.
 
 use glam::{Quat, Vec3};
 use labelgs::formats::{read_model, write_model};
@@ -17,12 +17,12 @@ pub struct Options {
     pub model: PathBuf,
     /// PLY to write.
     pub to: PathBuf,
-    /// Gaussians of it.
+    /// Number of Gaussians in the large model.
     #[arg(long, value_name = "N")]
     pub gaussians: usize,
 }
 
-/// Writes it.
+/// Writes the large model.
 pub fn run(options: &Options) -> Result<()> {
     let path = model_file(&options.model)?;
     let model = read_model(&path)?.gaussians;
@@ -36,7 +36,8 @@ pub fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Splits Gaussians evenly into `count`. Parts lie as their Gaussian does, and cover the same area together.
+/// Splits Gaussians evenly into `count`. The parts keep the orientation of their Gaussian and together cover the same
+/// area.
 fn split(model: &Gaussians, count: usize) -> Gaussians {
     let mut random = generator(5);
     let mut normal = || (0..12).map(|_| random.random::<f32>()).sum::<f32>() - 6.0;

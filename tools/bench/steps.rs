@@ -1,5 +1,5 @@
-//! Cost of labels relative to the same steps without masks, by the area of the masks and by the number of objects: of the
-//! steps, and of the whole part of a run that has labels, with its votes and occluders.
+//! The cost of labels relative to the same steps without masks, by the area of the masks and by the number of objects:
+//! for the steps, and for the whole labelled part of a run, with its votes and occluders.
 
 use super::measure::write_json;
 use super::pace::{Pace, race};
@@ -20,16 +20,16 @@ const LABEL_STEPS: f64 = 1200.0;
 
 /// Sizes of a run.
 struct Size {
-    /// Size of the training pictures.
+    /// Size of the training images.
     picture: (u32, u32),
     views: u32,
     training: u32,
-    /// Timed steps of each; a multiple of the steps between two with object layers.
+    /// Timed steps per training; a multiple of the interval between steps with object layers.
     timed: usize,
     objects: [usize; 2],
 }
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(common: &Common) -> Result<()> {
     let size = if common.small {
         Size { picture: (48, 40), views: 9, training: 20, timed: 8, objects: [3, 12] }
@@ -48,7 +48,7 @@ pub fn run(common: &Common) -> Result<()> {
     )
 }
 
-/// Compares the made masks with masks that cover every pixel.
+/// Compares synthetic masks with masks that cover every pixel.
 fn by_area(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, timed: usize) -> Result<Vec<Value>> {
     let made = synth::dataset(options, TEST_EVERY);
     let share = covered(&made)?;
@@ -77,7 +77,7 @@ fn by_number(gpu: &Arc<Gpu>, options: &SynthOptions, model: &Gaussians, size: &S
     table(paces, size.timed, (options.width, options.height))
 }
 
-/// Share of the pixels that belong to an object.
+/// Returns the share of pixels that belong to an object.
 fn covered(dataset: &Dataset) -> Result<f64> {
     let (mut of_objects, mut all) = (0, 0);
     for mask in dataset.train.iter().filter_map(|view| view.mask.as_ref()) {
@@ -88,7 +88,7 @@ fn covered(dataset: &Dataset) -> Result<f64> {
     Ok(of_objects as f64 / all.max(1) as f64)
 }
 
-/// Masks of `objects` regions of space, which together cover the model.
+/// Returns masks of `objects` regions of space, which together cover the model.
 fn divided(gpu: &Arc<Gpu>, dataset: &Dataset, model: &Gaussians, objects: usize) -> Result<Dataset> {
     let mut labels = vec![0; model.len()];
     let mut all: Vec<usize> = (0..model.len()).collect();
@@ -126,7 +126,7 @@ fn divide(rows: &mut [usize], means: &[[f32; 3]], parts: usize, next: &mut u32, 
 
 fn table(mut paces: Vec<Pace>, timed: usize, (width, height): (u32, u32)) -> Result<Vec<Value>> {
     race(&mut paces, timed)?;
-    // A mean, because a few steps have object layers.
+    // Use a mean, because a few steps have object layers.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let plain = (mean(&paces[0].passes), mean(&paces[0].processor), mean(&paces[0].pairs()));
     println!("{timed} steps of each in turn");

@@ -1,5 +1,5 @@
-//! How much of true objects is found by strokes that a rule draws: a line through the middle of each object, and of the
-//! background, in the first training view that shows half as much of it as any.
+//! Scores objects found by simulated strokes against true masks. Each object, and the background, gets a line through
+//! its middle in the first training view that shows at least half as much of it as any view.
 
 use crate::{device, measure::table};
 use labelgs::edit::strokes::{GraphCut, Stroke};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Options of the strokes.
+/// Options of the simulated strokes.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
     /// Model, a PLY or the folder of a run.
@@ -33,8 +33,8 @@ pub struct Options {
     max_resolution: Option<u32>,
 }
 
-/// Prints for each object its stroke, and the IoU of what is found over all pixels of held-out views and over all
-/// Gaussians, beside that of the votes of all masks, whose labels count as true ones of Gaussians.
+/// Prints for each object its stroke, and the IoU of the result over all pixels of held-out views and over all
+/// Gaussians, beside the IoU of the votes of all masks, whose labels serve as ground truth for Gaussians.
 pub fn run(options: &Options) -> Result<()> {
     let model = read_model(&model_file(&options.model)?)?.gaussians;
     let masks = Some(options.masks.clone());
@@ -106,7 +106,7 @@ fn iou(pairs: impl Iterator<Item = (bool, bool)>) -> f64 {
     both as f64 / either.max(1) as f64
 }
 
-/// Draws a stroke for each object, and one for the background.
+/// Draws a stroke for each object and one for the background.
 fn draw(views: &[View]) -> Result<Vec<(Stroke, &View)>> {
     let masks: Vec<(Arc<LabelMap>, &View)> = views
         .iter()
@@ -129,9 +129,8 @@ fn draw(views: &[View]) -> Result<Vec<(Stroke, &View)>> {
     Ok(strokes)
 }
 
-/// Returns the pixels of the longest line through the middle of the part of an id that is deepest: the way between the
-/// two ends that are farthest apart, as far from the border as it can be, without what lies nearer to an end than to
-/// the border.
+/// Returns the pixels of the longest line through the deepest part of an id: the path between the two ends that are
+/// farthest apart, as far from the border as possible, without pixels nearer to an end than to the border.
 fn medial_line(map: &LabelMap, id: u16) -> Vec<[u32; 2]> {
     let depths = map.depths(id);
     let at_most = |at: &usize| (depths[*at], Reverse(*at));
@@ -159,8 +158,8 @@ fn medial_line(map: &LabelMap, id: u16) -> Vec<[u32; 2]> {
     middle.iter().map(|&at| [at as u32 % map.width, at as u32 / map.width]).collect()
 }
 
-/// Returns the cost of the cheapest way to each pixel of the part around one, and the pixel before it on that way.
-/// `cost` is that of a pixel by its depth.
+/// Returns the cost of the cheapest path from one pixel to each pixel of its part, and the previous pixel on that path.
+/// `cost` maps a pixel's depth to its cost.
 fn ways(map: &LabelMap, depths: &[u32], from: usize, cost: impl Fn(u32) -> u64) -> (Vec<u64>, Vec<usize>) {
     let (mut ways, mut before) = (vec![u64::MAX; depths.len()], vec![from; depths.len()]);
     let (width, height) = (map.width as usize, map.height as usize);

@@ -1,6 +1,6 @@
-//! The blends alone: the chain of a lone tile, and a picture of even tiles.
+//! The blends alone: the chain of a single tile, and an image of equal tiles.
 
-use crate::kernels::{Bed, MODES, Replacements};
+use crate::kernels::{TestBed, ALL_MODES, Replacements};
 use crate::measure::{median, table, write_json};
 use crate::{Common, device};
 use glam::DMat3;
@@ -12,24 +12,24 @@ use labelgs::verify::selftest::scenes::{Scene, generator, uniform};
 use labelgs::{Error, Result};
 use serde_json::json;
 
-/// Opacity of the splats: no pixel of the longest list becomes opaque, so that all of it is walked.
-const OPACITY: f64 = 0.012;
+/// Opacity of the splats: no pixel of the longest list becomes opaque, so the whole list is walked.
+const SPLAT_OPACITY: f64 = 0.012;
 /// Standard deviation of the splats, px.
-const DEVIATION: f64 = 0.3;
-/// Distance of the splats from the borders of their tile, px; more than a splat of this opacity reaches.
-const INSET: f64 = 1.25;
+const SPLAT_DEVIATION: f64 = 0.3;
+/// Distance of the splats from the borders of their tile, px: more than the reach of a splat of this opacity.
+const TILE_INSET: f64 = 1.25;
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(common: &Common) -> Result<()> {
     let gpu = device::open()?;
-    // Tiles along the picture's sides, and splats of each.
+    // Tiles along the image's sides, and splats per tile.
     let even_tiles = if gpu.is_cpu() { [25, 20] } else { [100, 67] };
     let (cases, rounds) = match common.small {
         true => ([([1, 1], 64), ([1, 1], 256), ([4, 3], 30)], 2),
         false => ([([1, 1], 1_024), ([1, 1], 8_192), (even_tiles, 300)], 20),
     };
     let shape = KernelShape::for_device(gpu.capabilities());
-    println!("{}: the blends of made splats, degree 0, without labels", gpu.capabilities().name);
+    println!("{}: the blends of synthetic splats, degree 0, without labels", gpu.capabilities().name);
     let head = ["px", "Gaussians", "longest list", "M pairs", "forward ms", "backward ms", "G pairs/s", "backward"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     let mut found = Vec::new();
@@ -37,9 +37,9 @@ pub fn run(common: &Common) -> Result<()> {
     for (tiles, splats) in cases {
         let scene = even(&shape, tiles, splats);
         let (size, gaussians) = ((scene.camera.width, scene.camera.height), scene.gaussians.len());
-        let modes = [(MODES[0], Replacements::default())];
-        let mut bed = Bed::new(&gpu, scene, &modes)?;
-        // Buffers grow, the driver compiles.
+        let modes = [(ALL_MODES[0], Replacements::default())];
+        let mut bed = TestBed::new(&gpu, scene, &modes)?;
+        // Let buffers grow and the driver compile.
         bed.run(0)?;
         let samples = (0..=rounds).map(|_| bed.run(0)).collect::<Result<Vec<_>>>()?;
         let counters = &samples[0].counters;
@@ -62,7 +62,7 @@ pub fn run(common: &Common) -> Result<()> {
         }));
     }
     println!("{}", table(&rows));
-    // The difference removes the constant cost.
+    // The difference of two runs removes the constant cost.
     let [(few, short), (many, long)] = [lone[0], lone[1]];
     let chain = [0, 1].map(|way: usize| (long[way] - short[way]) * 1e6 / (many - few));
     println!("a splat of a lone tile: {:.1} ns forward, {:.1} ns backward\n", chain[0], chain[1]);
@@ -71,7 +71,7 @@ pub fn run(common: &Common) -> Result<()> {
     write_json(&common.output.join("tile.json"), &all)
 }
 
-/// A picture whose tiles have so many splats each, of which none leaves its tile.
+/// An image whose tiles have the given number of splats each, none of which leaves its tile.
 fn even(shape: &KernelShape, [columns, rows]: [u32; 2], splats: usize) -> Scene {
     let (width, height) = (columns * shape.tile_width, rows * shape.tile_height);
     let focal = f64::from(width.max(64));
@@ -90,15 +90,15 @@ fn even(shape: &KernelShape, [columns, rows]: [u32; 2], splats: usize) -> Scene 
     for tile in 0..columns * rows {
         for _ in 0..splats {
             let mut place = |corner: u32, side: u32| {
-                f64::from(corner * side) + uniform(&mut random, INSET, f64::from(side) - INSET)
+                f64::from(corner * side) + uniform(&mut random, TILE_INSET, f64::from(side) - TILE_INSET)
             };
             let (x, y) = (place(tile % columns, shape.tile_width), place(tile / columns, shape.tile_height));
             let depth = uniform(&mut random, 2.0, 8.0);
             let at = [(x - camera.cx) * depth / focal, (y - camera.cy) * depth / focal, depth];
             gaussians.means.push(at.map(|value| value as f32));
             gaussians.quats.push([1.0, 0.0, 0.0, 0.0]);
-            gaussians.scales.push([(DEVIATION * depth / focal).ln() as f32; 3]);
-            gaussians.opacities.push((OPACITY / (1.0 - OPACITY)).ln() as f32);
+            gaussians.scales.push([(SPLAT_DEVIATION * depth / focal).ln() as f32; 3]);
+            gaussians.opacities.push((SPLAT_OPACITY / (1.0 - SPLAT_OPACITY)).ln() as f32);
             gaussians.sh0.push([0.3, 0.0, -0.3]);
         }
     }

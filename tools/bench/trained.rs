@@ -10,11 +10,11 @@ use labelgs::synth::{self, SynthOptions};
 use labelgs::train::{StepReport, Trainer, first_model};
 use std::sync::Arc;
 
-/// One view in this many of a made scene is held out.
+/// One of this many views of a synthetic scene is held out.
 pub const TEST_EVERY: u32 = 8;
 
-/// Runs one step and waits for it; returns its report and its time. Not for times of a card, which lowers its clock while
-/// it waits.
+/// Runs one step and waits for it. Returns its report and its time. Not for GPU times, because a GPU lowers its clock
+/// while it waits.
 pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
     timed(|| {
         let mut reports = trainer.step()?;
@@ -23,7 +23,7 @@ pub fn timed_step(trainer: &mut Trainer) -> Result<(Vec<StepReport>, Cost)> {
     })
 }
 
-/// Model of a made scene after a number of steps without masks.
+/// Trains a model of a synthetic scene for a number of steps without masks.
 pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result<Gaussians> {
     let dataset = without_masks(&synth::dataset(options, TEST_EVERY));
     let config = TrainConfig { iterations: steps, ..TrainConfig::default() };
@@ -35,7 +35,7 @@ pub fn plain_model(gpu: &Arc<Gpu>, options: &SynthOptions, steps: u32) -> Result
     trainer.model()
 }
 
-/// Settings for timing: all bands of colour and labels from the first step, and nothing between the steps after it.
+/// Settings for timing: all colour bands and labels from the first step, and nothing between steps after it.
 pub fn timing_config() -> TrainConfig {
     TrainConfig {
         iterations: u32::MAX,
@@ -51,7 +51,7 @@ pub fn timing_config() -> TrainConfig {
     }
 }
 
-/// The scene without masks.
+/// Returns the scene without masks.
 pub fn without_masks(dataset: &Dataset) -> Dataset {
     let mut plain = dataset.clone();
     plain.train.iter_mut().for_each(|view| view.mask = None);

@@ -1,4 +1,4 @@
-//! Takes one object out of a model: writes the object alone, and the scene without it.
+//! Extracts an object from a model: writes the object, and the scene without it.
 //!
 //! ```sh
 //! cargo run --release --example extract -- MODEL LABEL OBJECT.ply REST.ply
@@ -17,7 +17,7 @@ fn main() -> labelgs::Result<()> {
     for row in summarise(&model) {
         println!("label {:>5}: {:>7} Gaussians around {:.2?}", row.label, row.count, row.centre);
     }
-    // Gaussians that straddle the object's contour would stick out of it when it stands alone.
+    // Gaussians that straddle the object's contour would stick out of the isolated object.
     let object = extract(&model, &[label], MIN_LABEL_CONFIDENCE)?;
     let rest = remove(&model, &[label])?;
     println!("{} Gaussians of the object, {} of the rest", object.len(), rest.len());

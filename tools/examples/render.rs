@@ -1,4 +1,4 @@
-//! Renders a view of a scene from a model: its colours, and the label of each pixel in colours.
+//! Renders a view of a scene from a model: its colours, and the label of each pixel as a colour.
 //!
 //! ```sh
 //! cargo run --release --example render -- MODEL SCENE VIEW OUT.png LABELS.png

@@ -1,4 +1,4 @@
-//! Trains parameters of each photo by a schedule of its own: exposures that stay as they are from the middle of the run on.
+//! Trains per-photo parameters with a custom schedule: exposures that stay fixed in the second half of the run.
 //!
 //! ```sh
 //! cargo run --release --example shared -- SCENE STEPS
@@ -13,7 +13,7 @@ use labelgs::train::{
 use std::path::Path;
 use std::sync::Arc;
 
-/// Exposures with learning rates in the first half only. Rows, passes and first values are those of [`Exposure`].
+/// Exposures with learning rates in the first half only. Rows, passes and initial values are those of [`Exposure`].
 #[derive(Debug, Default)]
 struct EarlyExposure(Exposure);
 

@@ -1,4 +1,5 @@
-//! Trains by a strategy of its own: Gaussians never grow, faint ones go. A pass takes the momentum of positions.
+//! Trains with a custom strategy: Gaussians never grow, and faint ones are removed. An extra pass clears the momentum
+//! of positions.
 //!
 //! ```sh
 //! cargo run --release --example strategy -- SCENE STEPS OUT.ply
@@ -28,7 +29,7 @@ impl Strategy for Thinning {
     }
 
     fn act(&mut self, at: StepContext, population: &mut Population) -> labelgs::Result<()> {
-        // Without a threshold nothing grows.
+        // Without a threshold, nothing grows.
         let uniforms = StepUniforms { densify_threshold: 0.0, prune_opacity: 0.02, ..population.uniforms() };
         let counts = population.densify(uniforms, u64::MAX)?;
         println!("step {}: {} Gaussians removed, {} left", at.step, counts.pruned, population.count());
@@ -36,10 +37,10 @@ impl Strategy for Thinning {
     }
 
     fn extension(&self) -> Arc<dyn Extension> {
-        Arc::new(WithoutMomentum)
+        Arc::new(ClearMomentum)
     }
 
-    /// Each number is a variant of the step with its own recording; 0 has no passes of the extension.
+    /// Each number is a variant of the step, recorded separately; 0 has no passes of the extension.
     fn passes(&self, at: StepContext) -> u32 {
         u32::from(at.step > at.config.iterations / 2)
     }
@@ -47,9 +48,9 @@ impl Strategy for Thinning {
 
 /// Clears the first moments of positions after an update.
 #[derive(Debug)]
-struct WithoutMomentum;
+struct ClearMomentum;
 
-impl Extension for WithoutMomentum {
+impl Extension for ClearMomentum {
     fn extend(&self, _passes: u32, hook: Hook, b: &mut Builder) {
         if hook == Hook::Updated {
             b.list.fill(Buf::M_MEANS, 0);

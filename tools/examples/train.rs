@@ -21,7 +21,7 @@ fn main() -> labelgs::Result<()> {
     request.start = Start::New(settings);
     request.inputs.masks = Some(masks.into());
 
-    // The device is opened by a closure, because a run can open it again after a loss. `()` observes nothing.
+    // A closure opens the device, because a run can reopen it after a loss. `()` observes nothing.
     let summary = run::train(&request, &|| Gpu::new(&GpuOptions::default()), &mut ())?;
     println!("{} Gaussians in {}", summary.gaussians, summary.model.display());
     if let Some(psnr) = summary.scores.and_then(|scores| scores.mean.psnr) {

@@ -1,4 +1,4 @@
-//! Watches a training: prints its progress, renders the scene on the way, and stops it early.
+//! Watches a training: prints its progress, renders the scene in between, and stops it early.
 //!
 //! ```sh
 //! cargo run --release --example watch -- SCENE OUT STEPS

@@ -1,4 +1,4 @@
-//! The fuzzer: one program for all readers; `LABELGS_FUZZ_TARGET` names the one that is fuzzed. See README.md.
+//! The fuzzer: a single program for all readers; `LABELGS_FUZZ_TARGET` names the one to fuzz. See README.md.
 #![no_main]
 
 #[path = "../../tests/support/memory.rs"]
@@ -9,17 +9,17 @@ mod targets;
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::OnceLock;
-use targets::Place;
+use targets::TargetFolder;
 
 #[global_allocator]
 static MEMORY: memory::Counting = memory::Counting;
 
-static PLACE: OnceLock<Place> = OnceLock::new();
+static TARGET_FOLDER: OnceLock<TargetFolder> = OnceLock::new();
 
-/// The folder of the target. With `LABELGS_FUZZ_SEEDS` the target's own seeds are put into that folder first, where
-/// libFuzzer finds them a moment later.
-fn place() -> &'static Place {
-    PLACE.get_or_init(|| {
+/// Returns the folder of the target. With `LABELGS_FUZZ_SEEDS`, first writes the target's seeds to that folder, where
+/// libFuzzer finds them.
+fn place() -> &'static TargetFolder {
+    TARGET_FOLDER.get_or_init(|| {
         let name = std::env::var("LABELGS_FUZZ_TARGET").expect("LABELGS_FUZZ_TARGET names a target");
         let target = targets::find(&name).unwrap_or_else(|| panic!("there is no target {name}: {}", targets::names()));
         if let Some(folder) = std::env::var_os("LABELGS_FUZZ_SEEDS") {
@@ -28,7 +28,7 @@ fn place() -> &'static Place {
                 std::fs::write(path, seed).expect("the folder of seeds can be written");
             }
         }
-        Place::new(target)
+        TargetFolder::new(target)
     })
 }
 

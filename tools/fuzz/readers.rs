@@ -66,7 +66,7 @@ pub fn scene(folder: &Path, _: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Numbers that a device can be given.
+/// Returns numbers to pass to a device.
 pub fn sound_camera(camera: &Camera) {
     let Camera { fx, fy, cx, cy, width, height, .. } = *camera;
     assert!(width > 0 && height > 0, "{camera:?}");
@@ -117,7 +117,7 @@ pub fn mask_rgb(folder: &Path, _: &Path) -> Result<()> {
     imported(folder, Format::DevaLong)
 }
 
-/// Masks of a scene with one changed picture.
+/// Masks of a scene with one changed image.
 pub fn imported(folder: &Path, format: Format) -> Result<()> {
     let dataset = open(folder)?;
     let out = folder.join("out");

@@ -10,8 +10,8 @@ use labelgs::scene::Gaussians;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-/// Size of all pictures, px.
-const SIZE: (u32, u32) = (12, 8);
+/// Size of all images, px.
+const IMAGE_SIZE: (u32, u32) = (12, 8);
 
 /// The bytes that a writer of files writes.
 fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
@@ -21,7 +21,7 @@ fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
     std::fs::read(path).expect("a file")
 }
 
-/// `cameras.bin` with a camera of each model that can be read.
+/// `cameras.bin` with a camera of each supported model.
 pub fn colmap_cameras_bin() -> Vec<Vec<u8>> {
     let models: [(u32, &[f64]); 13] = [
         (1, &[10.0, 11.0, 5.5, 4.5]),
@@ -41,21 +41,21 @@ pub fn colmap_cameras_bin() -> Vec<Vec<u8>> {
     let file = |(model, parameters): (u32, &[f64])| {
         let mut out = 1u64.to_le_bytes().to_vec();
         out.extend([1, model].map(u32::to_le_bytes).concat());
-        out.extend([u64::from(SIZE.0), u64::from(SIZE.1)].map(u64::to_le_bytes).concat());
+        out.extend([u64::from(IMAGE_SIZE.0), u64::from(IMAGE_SIZE.1)].map(u64::to_le_bytes).concat());
         parameters.iter().for_each(|value| out.extend(value.to_le_bytes()));
         out
     };
     models.map(file).to_vec()
 }
 
-/// (w, x, y, z) and translation of the pictures.
-const POSES: [([f64; 4], [f64; 3]); 2] =
+/// (w, x, y, z) and translation of the images.
+const IMAGE_POSES: [([f64; 4], [f64; 3]); 2] =
     [([0.9, 0.1, -0.2, 0.3], [1.0, 0.5, 4.0]), ([0.8, -0.1, 0.2, 0.1], [-1.0, 0.25, 5.0])];
 
-/// `images.bin` with two pictures, one of them in a folder.
+/// `images.bin` with two images, one of them in a folder.
 pub fn colmap_images_bin() -> Vec<u8> {
     let mut out = 2u64.to_le_bytes().to_vec();
-    for (index, (name, (quaternion, translation))) in ["00.png", "sub/b 1.png"].iter().zip(POSES).enumerate() {
+    for (index, (name, (quaternion, translation))) in ["00.png", "sub/b 1.png"].iter().zip(IMAGE_POSES).enumerate() {
         out.extend((index as u32 + 1).to_le_bytes());
         quaternion.iter().chain(&translation).for_each(|value| out.extend(value.to_le_bytes()));
         out.extend(1u32.to_le_bytes());
@@ -67,7 +67,7 @@ pub fn colmap_images_bin() -> Vec<u8> {
     out
 }
 
-/// Positions and colours of the points, enough of them to start from.
+/// Positions and colours of the points, enough to start from.
 fn points() -> impl Iterator<Item = ([f64; 3], [u8; 3])> {
     (0..17u8)
         .map(|i| ([f64::from(i) * 0.1 - 0.8, f64::from(i % 5) * 0.2, f64::from(i % 3) + 1.0], [i * 15, 255 - i, 7]))
@@ -103,7 +103,7 @@ pub fn colmap_cameras_txt() -> Vec<Vec<u8>> {
 /// `images.txt`.
 pub fn colmap_images_txt() -> Vec<u8> {
     let mut text = String::from("# Image list\n");
-    for (index, (name, ([w, x, y, z], [a, b, c]))) in ["00.png", "sub/b 1.png"].iter().zip(POSES).enumerate() {
+    for (index, (name, ([w, x, y, z], [a, b, c]))) in ["00.png", "sub/b 1.png"].iter().zip(IMAGE_POSES).enumerate() {
         let observations = if index == 0 { "" } else { "1.5 2.5 -1 3.0 4.0 7" };
         text += &format!("{} {w} {x} {y} {z} {a} {b} {c} 1 {name}\n{observations}\n", index + 1);
     }
@@ -180,19 +180,19 @@ fn gaussians(count: usize, degree: u32, labelled: bool) -> Gaussians {
     g
 }
 
-/// A model of another program.
+/// A model from another program.
 pub fn golden(name: &str) -> Vec<u8> {
     golden_file("formats", name)
 }
 
-/// A file of masks of another program.
+/// A mask file from another program.
 pub fn golden_mask(name: &str) -> Vec<u8> {
     golden_file("masks", name)
 }
 
 fn golden_file(room: &str, name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    // The fuzzer is a crate of its own, below the engine's.
+    // The fuzzer is a separate crate, in a subfolder of the engine's.
     let root = if folder.ends_with("tools/fuzz") { folder.join("../..") } else { folder.to_owned() };
     std::fs::read(root.join("src").join(room).join("tests/golden").join(name)).expect("a file of the tests")
 }
@@ -205,12 +205,12 @@ fn exported(name: &str, degree: u32, options: WriteOptions) -> Vec<u8> {
     })
 }
 
-/// SPZ of version 3, packed.
+/// Compressed SPZ of version 3.
 pub fn spz_gzip() -> Vec<Vec<u8>> {
     vec![exported("a.spz", 1, WriteOptions::default()), golden("splat-transform-v3.spz")]
 }
 
-/// SPZ of version 3 before it is packed.
+/// SPZ of version 3 before compression.
 pub fn spz_stream() -> Vec<u8> {
     let mut bytes = Vec::new();
     let packed = exported("a.spz", 2, WriteOptions::default());
@@ -224,7 +224,7 @@ pub fn spz_framed() -> Vec<Vec<u8>> {
     vec![exported("a.spz", 1, options), golden("splat-transform-v4.spz")]
 }
 
-/// USD with labels and names, and one of another program: every kind of value, groups and places.
+/// USD with labels and names, and a file of another program: every kind of value, groups and transforms.
 pub fn usd_text() -> Vec<Vec<u8>> {
     vec![exported("a.usda", 1, WriteOptions::default()), golden("foreign.usda")]
 }
@@ -253,7 +253,7 @@ pub fn glb() -> Vec<Vec<u8>> {
     vec![exported("a.glb", 0, WriteOptions::default()), exported("a.glb", 1, WriteOptions::default())]
 }
 
-/// Models of every degree, with labels and without, and one as text.
+/// Models of all degrees, with and without labels, and one in ascii.
 pub fn ply_model() -> Vec<Vec<u8>> {
     let model = |degree, labelled| {
         written("a.ply", |path| {
@@ -271,7 +271,7 @@ pub fn ply_model() -> Vec<Vec<u8>> {
     all
 }
 
-/// Points with whole, broken and no colours, as text and as numbers.
+/// Points with integer, float and no colours, in ascii and binary.
 pub fn ply_cloud() -> Vec<Vec<u8>> {
     let head = |format: &str, kind: &str| {
         let xyz = "property float x\nproperty float y\nproperty double z\n";
@@ -294,14 +294,14 @@ pub fn ply_cloud() -> Vec<Vec<u8>> {
 /// A PNG of this kind with samples that differ.
 fn png(colour: png::ColorType, depth: png::BitDepth, samples: impl Fn(usize) -> u8) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, SIZE.0, SIZE.1);
+    let mut encoder = png::Encoder::new(&mut bytes, IMAGE_SIZE.0, IMAGE_SIZE.1);
     encoder.set_color(colour);
     encoder.set_depth(depth);
     if colour == png::ColorType::Indexed {
         encoder.set_palette((0..3 << (depth as u8)).map(|i| i as u8).collect::<Vec<u8>>());
     }
-    let line = (SIZE.0 as usize * colour.samples() * depth as usize).div_ceil(8);
-    let data: Vec<u8> = (0..line * SIZE.1 as usize).map(samples).collect();
+    let line = (IMAGE_SIZE.0 as usize * colour.samples() * depth as usize).div_ceil(8);
+    let data: Vec<u8> = (0..line * IMAGE_SIZE.1 as usize).map(samples).collect();
     let mut writer = encoder.write_header().expect("a header");
     writer.write_image_data(&data).expect("pixels");
     writer.finish().expect("an end");
@@ -311,7 +311,7 @@ fn png(colour: png::ColorType, depth: png::BitDepth, samples: impl Fn(usize) -> 
 use png::BitDepth::{Eight, Four, One, Sixteen, Two};
 use png::ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
 
-/// Grey and palette pictures of every depth.
+/// Grey and palette images of every depth.
 pub fn mask() -> Vec<Vec<u8>> {
     let kinds = [
         (Grayscale, Eight),
@@ -332,18 +332,18 @@ pub fn mask_rgb() -> Vec<Vec<u8>> {
     vec![png(Rgb, Eight, |i| if i / 36 % 2 == 0 { 1 } else { 0 })]
 }
 
-/// Black and white of every kind without transparency.
+/// Black and white images of every kind without transparency.
 pub fn mask_binary() -> Vec<Vec<u8>> {
     let kinds = [(Grayscale, Eight), (Grayscale, Sixteen), (Indexed, One), (Rgb, Eight)];
     kinds.map(|(colour, depth)| png(colour, depth, |i| if i / 24 % 2 == 0 { 255 } else { 0 })).to_vec()
 }
 
-/// Instances of COCO, of CVAT with tracks, and of Label Studio.
+/// COCO instances, from CVAT with tracks, and from Label Studio.
 pub fn coco() -> Vec<Vec<u8>> {
     ["coco.json", "cvat-tracks.json", "label-studio-coco.json"].map(golden_mask).to_vec()
 }
 
-/// A run of DEVA.
+/// A DEVA run.
 pub fn pred_json() -> Vec<u8> {
     let text = r#"{"annotations": [{"file_name": "00.jpg", "segments_info": [{"id": 65793, "category_id": 0, "score": 0.9},
 {"id": 7, "category_id": null}]}], "categories": [{"id": 0, "name": "cup"}]}"#;
@@ -352,7 +352,7 @@ pub fn pred_json() -> Vec<u8> {
 
 /// Depths from 1 on.
 fn depths() -> Vec<f32> {
-    (0..SIZE.0 * SIZE.1).map(|i| 1.0 + i as f32 * 0.25).collect()
+    (0..IMAGE_SIZE.0 * IMAGE_SIZE.1).map(|i| 1.0 + i as f32 * 0.25).collect()
 }
 
 /// 16-bit grey.
@@ -362,7 +362,7 @@ pub fn depth_png() -> Vec<Vec<u8>> {
 
 /// One channel and three.
 pub fn depth_exr() -> Vec<Vec<u8>> {
-    let (width, height) = SIZE;
+    let (width, height) = IMAGE_SIZE;
     let one = written("a.exr", |path| pixels::write_exr_y(path, width, height, &depths()).expect("written"));
     let three: Vec<[f32; 3]> = depths().into_iter().map(|value| [value, 0.0, -value]).collect();
     vec![one, written("a.exr", |path| pixels::write_exr_rgb(path, width, height, &three).expect("written"))]
@@ -417,9 +417,10 @@ pub fn photo_png() -> Vec<Vec<u8>> {
     kinds.map(|(colour, depth)| png(colour, depth, |i| (i * 7) as u8)).to_vec()
 }
 
-/// JPEG in colour and grey, and JPEG of other programs: progressive, CMYK, with restarts and an orientation.
+/// Colour and grey JPEG, and JPEG of other programs: progressive, CMYK, with restarts and an orientation.
 pub fn photo_jpeg() -> Vec<Vec<u8>> {
-    let colour = image::RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 90]));
+    let colour =
+        image::RgbImage::from_fn(IMAGE_SIZE.0, IMAGE_SIZE.1, |x, y| image::Rgb([x as u8 * 20, y as u8 * 30, 90]));
     let jpeg = |picture: image::DynamicImage| {
         let mut bytes = Cursor::new(Vec::new());
         picture.write_to(&mut bytes, image::ImageFormat::Jpeg).expect("a JPEG");
@@ -444,7 +445,7 @@ pub fn checkpoint() -> Vec<u8> {
     body
 }
 
-/// The defaults, the paper's, and a few lines by hand.
+/// The defaults, the paper's settings, and a few hand-written lines.
 pub fn config_toml() -> Vec<Vec<u8>> {
     let dump = |settings: &Settings| settings.dump(&[("device", "x".into())]).expect("text").into_bytes();
     let own = b"iterations = 500\nbackground = [0.0, 0.5, 1.0]\nsave_at = [10, 20]\nnear = 0.1\n".to_vec();
@@ -469,7 +470,7 @@ pub fn occlusion_json() -> Vec<u8> {
     br#"{"schema_version": 1, "kind": "depth", "views": {"00.png": {"1": [], "2": [1, 7]}}}"#.to_vec()
 }
 
-/// A photo and a frame after it.
+/// A photo and a following frame.
 pub fn frames_json() -> Vec<u8> {
     let camera = String::from_utf8(camera_json()).expect("text");
     format!(

@@ -1,6 +1,6 @@
 //! The fuzzed readers of user files, as a table of names and functions. The fuzzer and the tests share it.
 //!
-//! Each target is a folder in which one file changes. Bytes are written to that file and read as the program reads
+//! Each target is a folder in which one file changes. The bytes are written to that file and read as the program reads
 //! them. The reader must accept them with a consistent result, or refuse them with an error that names a file and is
 //! not `Error::Bug`.
 
@@ -19,7 +19,7 @@ use tempfile::TempDir;
 pub struct Target {
     /// Name.
     pub name: &'static str,
-    /// The file that the bytes go to, below the folder.
+    /// The file, below the folder, that receives the bytes.
     file: &'static str,
     /// Writes the other files of the folder.
     prepare: fn(&Path),
@@ -29,11 +29,11 @@ pub struct Target {
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Adds a correct checksum to the bytes, for formats in which a checksum would reject every change.
     dress: fn(&[u8]) -> Vec<u8>,
-    /// Bytes of memory that each byte of the file may take.
+    /// Bytes of memory that the reader may use per byte of the file.
     per_byte: usize,
 }
 
-const PLAIN: Target = Target {
+const PLAIN_TARGET: Target = Target {
     name: "",
     file: "",
     prepare: |_| (),
@@ -43,18 +43,18 @@ const PLAIN: Target = Target {
     per_byte: 64,
 };
 
-/// Files of compressed pixels: a byte may stand for 8192 samples, as floats and once more while they are decoded.
-const PIXELS: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN };
+/// Files of compressed pixels: a byte may encode 8192 samples, held as floats and once more during decoding.
+const PIXEL_TARGET: Target = Target { per_byte: 8192 * 4 * 2, ..PLAIN_TARGET };
 
 /// All readers.
-pub const TARGETS: [Target; 45] = [
+pub const ALL_TARGETS: [Target; 45] = [
     Target {
         name: "colmap_cameras_bin",
         file: "sparse/0/cameras.bin",
         prepare: colmap_bin,
         read: scene,
         seeds: seeds::colmap_cameras_bin,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "colmap_images_bin",
@@ -62,7 +62,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: scene,
         seeds: || vec![seeds::colmap_images_bin()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "colmap_points_bin",
@@ -70,7 +70,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: scene,
         seeds: || vec![seeds::colmap_points_bin()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "colmap_cameras_txt",
@@ -78,7 +78,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_txt,
         read: scene,
         seeds: seeds::colmap_cameras_txt,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "colmap_images_txt",
@@ -86,7 +86,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_txt,
         read: scene,
         seeds: || vec![seeds::colmap_images_txt()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "colmap_points_txt",
@@ -94,7 +94,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_txt,
         read: scene,
         seeds: || vec![seeds::colmap_points_txt()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "transforms_json",
@@ -102,7 +102,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: transforms,
         read: scene,
         seeds: seeds::transforms_json,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "poses_npy",
@@ -110,9 +110,9 @@ pub const TARGETS: [Target; 45] = [
         prepare: transforms,
         read: scene,
         seeds: || vec![seeds::poses_npy()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
-    // A node of the tree takes a hundred bytes, and three of the file make one.
+    // A tree node takes a hundred bytes and needs only three bytes of the file.
     Target {
         name: "metashape_xml",
         file: "cameras.xml",
@@ -120,15 +120,15 @@ pub const TARGETS: [Target; 45] = [
         read: scene,
         seeds: seeds::metashape_xml,
         per_byte: 256,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
-    Target { name: "ply_model", file: "model.ply", read: model, seeds: seeds::ply_model, ..PLAIN },
+    Target { name: "ply_model", file: "model.ply", read: model, seeds: seeds::ply_model, ..PLAIN_TARGET },
     Target {
         name: "ply_packed",
         file: "model.ply",
         read: model,
         seeds: || vec![seeds::golden("splat-transform.compressed.ply")],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "spz_stream",
@@ -136,25 +136,31 @@ pub const TARGETS: [Target; 45] = [
         read: model,
         seeds: || vec![seeds::spz_stream()],
         dress: gzipped,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
-    Target { name: "spz_gzip", file: "model.spz", read: model, seeds: seeds::spz_gzip, ..PIXELS },
-    Target { name: "spz_framed", file: "model.spz", read: model, seeds: seeds::spz_framed, ..PIXELS },
-    Target { name: "glb", file: "model.glb", read: model, seeds: seeds::glb, ..PLAIN },
-    Target { name: "splat", file: "model.splat", read: model, seeds: || vec![seeds::golden("source.splat")], ..PLAIN },
-    Target { name: "usd_text", file: "model.usda", read: model, seeds: seeds::usd_text, ..PLAIN },
-    Target { name: "usd_package", file: "model.usdz", read: model, seeds: seeds::usd_package, ..PLAIN },
-    Target { name: "sog", file: "model.sog", read: model, seeds: seeds::sog, ..PIXELS },
+    Target { name: "spz_gzip", file: "model.spz", read: model, seeds: seeds::spz_gzip, ..PIXEL_TARGET },
+    Target { name: "spz_framed", file: "model.spz", read: model, seeds: seeds::spz_framed, ..PIXEL_TARGET },
+    Target { name: "glb", file: "model.glb", read: model, seeds: seeds::glb, ..PLAIN_TARGET },
+    Target {
+        name: "splat",
+        file: "model.splat",
+        read: model,
+        seeds: || vec![seeds::golden("source.splat")],
+        ..PLAIN_TARGET
+    },
+    Target { name: "usd_text", file: "model.usda", read: model, seeds: seeds::usd_text, ..PLAIN_TARGET },
+    Target { name: "usd_package", file: "model.usdz", read: model, seeds: seeds::usd_package, ..PLAIN_TARGET },
+    Target { name: "sog", file: "model.sog", read: model, seeds: seeds::sog, ..PIXEL_TARGET },
     Target {
         name: "sog_meta",
         file: "model.sog",
         read: model,
         seeds: || vec![seeds::sog_meta()],
         dress: sog_of_meta,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
-    Target { name: "ply_cloud", file: "cloud.ply", read: ply_cloud, seeds: seeds::ply_cloud, ..PLAIN },
-    Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PIXELS },
+    Target { name: "ply_cloud", file: "cloud.ply", read: ply_cloud, seeds: seeds::ply_cloud, ..PLAIN_TARGET },
+    Target { name: "mask", file: "mask.png", read: id_mask, seeds: seeds::mask, dress: png_sums, ..PIXEL_TARGET },
     Target {
         name: "mask_rgb",
         file: "in/00.png",
@@ -162,7 +168,7 @@ pub const TARGETS: [Target; 45] = [
         read: mask_rgb,
         seeds: seeds::mask_rgb,
         dress: png_sums,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "mask_binary",
@@ -171,7 +177,7 @@ pub const TARGETS: [Target; 45] = [
         read: |folder, _| imported(folder, Format::BinaryFolders),
         seeds: seeds::mask_binary,
         dress: png_sums,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "mask_auto",
@@ -180,7 +186,7 @@ pub const TARGETS: [Target; 45] = [
         read: |folder, _| imported(folder, Format::Auto),
         seeds: seeds::mask,
         dress: png_sums,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "mask_coco",
@@ -188,7 +194,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: |folder, _| imported(folder, Format::Coco),
         seeds: seeds::coco,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "mask_sam",
@@ -196,7 +202,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: |folder, _| imported(folder, Format::SamJson),
         seeds: || vec![seeds::golden_mask("sam/00.json")],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "mask_sam_table",
@@ -204,7 +210,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: sam_pictures,
         read: |folder, _| imported(folder, Format::SamFolders),
         seeds: || vec![seeds::golden_mask("sam/00.csv")],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "pred_json",
@@ -212,7 +218,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: pred_masks,
         read: mask_rgb,
         seeds: || vec![seeds::pred_json()],
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "depth_png",
@@ -221,7 +227,7 @@ pub const TARGETS: [Target; 45] = [
         read: depth,
         seeds: seeds::depth_png,
         dress: png_sums,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "depth_exr",
@@ -229,7 +235,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: depth,
         seeds: seeds::depth_exr,
-        ..PIXELS
+        ..PIXEL_TARGET
     },
     Target {
         name: "depth_npy",
@@ -237,7 +243,7 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: depth,
         seeds: seeds::depth_npy,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "depth_pfm",
@@ -245,16 +251,23 @@ pub const TARGETS: [Target; 45] = [
         prepare: colmap_bin,
         read: depth,
         seeds: seeds::depth_pfm,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
-    Target { name: "photo_png", file: "photo.png", read: photo, seeds: seeds::photo_png, dress: png_sums, ..PIXELS },
-    Target { name: "photo_jpeg", file: "photo.jpg", read: photo, seeds: seeds::photo_jpeg, ..PIXELS },
+    Target {
+        name: "photo_png",
+        file: "photo.png",
+        read: photo,
+        seeds: seeds::photo_png,
+        dress: png_sums,
+        ..PIXEL_TARGET
+    },
+    Target { name: "photo_jpeg", file: "photo.jpg", read: photo, seeds: seeds::photo_jpeg, ..PIXEL_TARGET },
     Target {
         name: "checkpoint",
         file: "a.ckpt",
         read: checkpoint,
         seeds: || vec![dressed(&seeds::checkpoint())],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "checkpoint_body",
@@ -262,32 +275,50 @@ pub const TARGETS: [Target; 45] = [
         read: checkpoint,
         seeds: || vec![seeds::checkpoint()],
         dress: dressed,
-        ..PLAIN
+        ..PLAIN_TARGET
     },
-    Target { name: "config_toml", file: "config.toml", read: config, seeds: seeds::config_toml, ..PLAIN },
-    Target { name: "camera_json", file: "camera.json", read: camera, seeds: || vec![seeds::camera_json()], ..PLAIN },
-    Target { name: "labels_json", file: "labels.json", read: labels, seeds: || vec![seeds::labels_json()], ..PLAIN },
+    Target { name: "config_toml", file: "config.toml", read: config, seeds: seeds::config_toml, ..PLAIN_TARGET },
+    Target {
+        name: "camera_json",
+        file: "camera.json",
+        read: camera,
+        seeds: || vec![seeds::camera_json()],
+        ..PLAIN_TARGET
+    },
+    Target {
+        name: "labels_json",
+        file: "labels.json",
+        read: labels,
+        seeds: || vec![seeds::labels_json()],
+        ..PLAIN_TARGET
+    },
     Target {
         name: "occlusion_json",
         file: "occlusion.json",
         read: occlusion,
         seeds: || vec![seeds::occlusion_json()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
-    Target { name: "frames_json", file: "frames.json", read: frames, seeds: || vec![seeds::frames_json()], ..PLAIN },
+    Target {
+        name: "frames_json",
+        file: "frames.json",
+        read: frames,
+        seeds: || vec![seeds::frames_json()],
+        ..PLAIN_TARGET
+    },
     Target {
         name: "profile_json",
         file: "profile.json",
         read: profile,
         seeds: || vec![seeds::profile_json()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "lpips_weights",
         file: "lpips.safetensors",
         read: weights,
         seeds: || vec![seeds::lpips_weights()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
     Target {
         name: "pipelines",
@@ -297,31 +328,31 @@ pub const TARGETS: [Target; 45] = [
             Ok(())
         },
         seeds: || vec![seeds::pipelines()],
-        ..PLAIN
+        ..PLAIN_TARGET
     },
 ];
 
-/// The reader of a name.
+/// Returns the reader with a name.
 pub fn find(name: &str) -> Option<&'static Target> {
-    const ALL: &[Target] = &TARGETS;
+    const ALL: &[Target] = &ALL_TARGETS;
     ALL.iter().find(|target| target.name == name)
 }
 
 /// All names, for messages.
 #[allow(dead_code, reason = "the tests walk the table instead")]
 pub fn names() -> String {
-    TARGETS.map(|target| target.name).join(" ")
+    ALL_TARGETS.map(|target| target.name).join(" ")
 }
 
 /// A target with its folder.
-pub struct Place {
+pub struct TargetFolder {
     target: &'static Target,
     folder: TempDir,
     file: PathBuf,
 }
 
-impl Place {
-    /// Makes the folder, in memory where there is such a place.
+impl TargetFolder {
+    /// Creates the folder, in memory if the system allows it.
     pub fn new(target: &'static Target) -> Self {
         let memory = Path::new("/dev/shm");
         let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
@@ -332,8 +363,8 @@ impl Place {
         Self { target, folder, file }
     }
 
-    /// Bytes of memory that the reader may take for a file of `length` bytes; the constant part is what decoders and
-    /// the rest of a scene need.
+    /// Returns the bytes of memory that the reader may use for a file of `length` bytes; the constant part covers
+    /// decoders and the rest of a scene.
     pub fn memory_bound(&self, length: usize) -> usize {
         (64 << 20) + self.target.per_byte * length
     }
@@ -348,13 +379,14 @@ impl Place {
         (self.target.read)(self.folder.path(), &self.file)
     }
 
-    /// Writes and reads the bytes, and panics on an answer that no user should get. Returns whether they were accepted.
+    /// Writes and reads the bytes, and panics on an answer that no user should get. Returns whether the bytes were
+    /// accepted.
     pub fn check(&self, bytes: &[u8]) -> bool {
         self.put(bytes);
         self.judge(self.read())
     }
 
-    /// The verdict of [`Place::check`] on an answer.
+    /// The verdict of [`TargetFolder::check`] on an answer.
     pub fn judge(&self, answer: Result<()>) -> bool {
         let Err(error) = answer else { return true };
         let text = error.to_string();
@@ -369,7 +401,7 @@ impl Place {
     }
 }
 
-/// A file of a checkpoint with this body, its checksum right.
+/// A checkpoint file with this body and a correct checksum.
 fn dressed(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"labelgsC".to_vec();
     bytes.extend(VERSION.to_le_bytes());
@@ -379,7 +411,7 @@ fn dressed(body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A stream of gzip with these bytes, its checksum right.
+/// A gzip stream with these bytes and a correct checksum.
 fn gzipped(bytes: &[u8]) -> Vec<u8> {
     let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     packer.write_all(bytes).expect("packed");
@@ -404,7 +436,7 @@ fn sog_of_meta(bytes: &[u8]) -> Vec<u8> {
     to.finish().expect("an archive").into_inner()
 }
 
-/// A PNG with the checksums of its chunks right again; anything else as it is.
+/// Recomputes the checksums of a PNG's chunks; returns anything else unchanged.
 fn png_sums(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if !bytes.starts_with(b"\x89PNG\r\n\x1a\n") {

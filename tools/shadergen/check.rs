@@ -1,12 +1,12 @@
-//! The rules that every shader keeps. Each breach is a [`Finding`] that stops the build.
+//! The rules for all shaders. Each breach is a [`Finding`] that stops the build.
 
 use super::interface::{Interface, Kind};
 use super::source::{line_of, without_comments};
 use super::{Finding, Shader, Variant, constants, is_snake_case};
 use std::collections::BTreeMap;
 
-/// Keywords of Rust, and names with another meaning in the generated modules.
-const RESERVED: &str = "as async await box crate do dyn enum extern fn gen impl let loop macro match mod move mut priv pub \
+/// Rust keywords, and names with another meaning in the generated modules.
+const RESERVED_WORDS: &str = "as async await box crate do dyn enum extern fn gen impl let loop macro match mod move mut priv pub \
     ref self static super trait try type unsafe use where yield structs constants";
 
 /// Breaches in one shader: its text and all its variants.
@@ -22,9 +22,9 @@ pub fn shader(shader: &Shader) -> Vec<Finding> {
     findings
 }
 
-/// Breaches in the text of any GLSL file: literals of the algorithm's constants.
+/// Breaches in the text of any GLSL file: literals that repeat the algorithm's constants.
 pub fn text(path: &str, source: &str) -> Vec<Finding> {
-    if path.ends_with(constants::FILE) {
+    if path.ends_with(constants::FILE_NAME) {
         return Vec::new();
     }
     let code = without_comments(source);
@@ -33,14 +33,14 @@ pub fn text(path: &str, source: &str) -> Vec<Finding> {
         for literal in known_literals(line) {
             findings.push(Finding::new(
                 format!("{path}:{}", index + 1),
-                format!("literal {literal}; use the constant of glsl/include/{}", constants::FILE),
+                format!("literal {literal}; use the constant of glsl/include/{}", constants::FILE_NAME),
             ));
         }
     }
     findings
 }
 
-/// Structs of one name must be equal in all shaders.
+/// Structs with the same name must be equal in all shaders.
 pub fn shared_structs(shaders: &[Shader]) -> Vec<Finding> {
     let mut known = BTreeMap::new();
     let mut findings = Vec::new();
@@ -58,7 +58,7 @@ pub fn shared_structs(shaders: &[Shader]) -> Vec<Finding> {
     findings
 }
 
-/// Siblings share the Rust side of their specialisation constants, so one name must be one constant.
+/// Siblings share the Rust side of their specialisation constants, so a name must be the same constant everywhere.
 pub fn siblings(shaders: &[Shader]) -> Vec<Finding> {
     let mut known = BTreeMap::new();
     let mut findings = Vec::new();
@@ -110,7 +110,7 @@ fn interface(shader: &Shader, variant: &Variant) -> Vec<Finding> {
     }
     let names = bindings.iter().map(|binding| binding.name.clone());
     for name in names.chain(spec.iter().map(|spec| spec.name.to_lowercase())) {
-        if RESERVED.split(' ').any(|word| word == name) || !is_snake_case(&name) {
+        if RESERVED_WORDS.split(' ').any(|word| word == name) || !is_snake_case(&name) {
             breach(&name, format!("`{name}` cannot be the name of a Rust field; use another name in snake_case"));
         }
     }
@@ -139,7 +139,7 @@ fn agreement(shader: &Shader, base: &Variant, other: &Variant) -> Option<Finding
     Some(Finding::new(format!("{}:1", shader.path), rule))
 }
 
-/// Which of 1/255, 0.99 and 1e-4 stand in a line of code.
+/// Returns which of 1/255, 0.99 and 1e-4 occur in a line of code.
 fn known_literals(line: &str) -> Vec<&'static str> {
     let tokens = tokens(line);
     let value = |index: usize| tokens.get(index).and_then(|token| number(token));
@@ -160,7 +160,7 @@ fn number(token: &str) -> Option<f64> {
     token.trim_end_matches(['f', 'F', 'u', 'U']).parse().ok()
 }
 
-/// Words and numbers (with their exponents) of a line, and every other character by itself.
+/// Splits a line into words, numbers (with exponents) and single other characters.
 fn tokens(line: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = line.trim_start();

@@ -1,4 +1,4 @@
-//! The shaderc crate behind one type: GLSL text in, SPIR-V words out.
+//! Wraps the shaderc crate in one type: GLSL text in, SPIR-V words out.
 
 use shaderc::{
     CompileOptions, Compiler, EnvVersion, OptimizationLevel, ResolvedInclude, ShaderKind, SourceLanguage, SpirvVersion,
@@ -18,7 +18,7 @@ pub enum Purpose {
     Ship,
 }
 
-/// Compiles shaders whose includes lie in one folder.
+/// Compiles shaders whose includes are in one folder.
 pub struct GlslCompiler {
     compiler: Compiler,
     include: PathBuf,

@@ -10,8 +10,8 @@ use rspirv::spirv::{Op, Word};
 use std::collections::HashMap;
 use std::fmt::Write;
 
-/// Where the constants are.
-pub const FILE: &str = "constants.glsl";
+/// Name of the file with the constants.
+pub const FILE_NAME: &str = "constants.glsl";
 
 /// One constant.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,9 +20,9 @@ pub struct Constant {
     pub name: String,
     /// `float`, `uint` or `int`.
     pub glsl_type: String,
-    /// The expression as it is written.
+    /// The expression as written.
     pub expression: String,
-    /// The comment behind it or the comment lines above it.
+    /// The comment after it, or the comment lines above it.
     pub doc: String,
     /// Bits of the value.
     pub bits: u32,
@@ -34,7 +34,7 @@ pub fn read(compiler: &GlslCompiler, text: &str) -> Result<Vec<Constant>, Vec<Fi
     if constants.is_empty() {
         return Ok(constants);
     }
-    let place = format!("glsl/include/{FILE}");
+    let place = format!("glsl/include/{FILE_NAME}");
     let fail = |rule: String| vec![Finding::new(place.clone(), rule)];
     let words = compiler.compile(&place, &probe(&constants), &[], Purpose::Reflect).map_err(fail)?;
     let stored = stored_constants(&words).map_err(fail)?;
@@ -96,12 +96,12 @@ fn probe(constants: &[Constant]) -> String {
         let _ = writeln!(stores, "    probe_{index} = {};", constant.name);
     }
     format!(
-        "#version 460\n#include \"{FILE}\"\nlayout(local_size_x = 1) in;\n\
+        "#version 460\n#include \"{FILE_NAME}\"\nlayout(local_size_x = 1) in;\n\
          layout(std430, set = 0, binding = 0) buffer probe_block {{\n{members}}};\nvoid main() {{\n{stores}}}\n"
     )
 }
 
-/// For each store of the module in order: the bits of the stored constant, if it is one.
+/// Returns the bits of the stored constant for each store of the module in order, or `None` if it stores no constant.
 fn stored_constants(words: &[u32]) -> Result<Vec<Option<u32>>, String> {
     let module = rspirv::dr::load_words(words).map_err(|error| error.to_string())?;
     let values: HashMap<Word, u32> = module

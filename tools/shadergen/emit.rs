@@ -117,17 +117,17 @@ fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
 }
 
 /// A struct with a field for each name, and the values of the fields with their GLSL names.
-fn emit_named(out: &mut String, doc: &str, head: (&str, &str), fields: &[Named]) {
+fn emit_named(out: &mut String, doc: &str, head: (&str, &str), fields: &[NamedField]) {
     let (name, generics) = head;
     let (ty, value) = if generics.is_empty() { (name.to_owned(), "u32") } else { (format!("{name}<B>"), "B") };
     let derived = if name == "Macros" { ", Default" } else { "" };
     put!(out, "    /// {doc}\n    #[derive(Clone, Copy, Debug, PartialEq{derived})]\n    pub struct {ty} {{");
-    for Named { doc, field, rust, .. } in fields {
+    for NamedField { doc, field, rust, .. } in fields {
         put!(out, "        /// {doc}\n        pub {field}: {rust},");
     }
     put!(out, "    }}\n    impl{generics} {ty} {{\n        /// GLSL names and values.");
     put!(out, "        pub fn named(self) -> [(&'static str, {value}); {}] {{", fields.len());
-    let pairs = fields.map_join(|Named { glsl, field, rust, .. }| match *rust {
+    let pairs = fields.map_join(|NamedField { glsl, field, rust, .. }| match *rust {
         "B" | "u32" => format!("({glsl:?}, self.{field})"),
         "f32" => format!("({glsl:?}, self.{field}.to_bits())"),
         _ => format!("({glsl:?}, self.{field} as u32)"),
@@ -136,7 +136,7 @@ fn emit_named(out: &mut String, doc: &str, head: (&str, &str), fields: &[Named])
 }
 
 /// A field of a generated struct.
-struct Named {
+struct NamedField {
     doc: String,
     glsl: String,
     field: String,
@@ -149,13 +149,13 @@ fn emit_macros(out: &mut String, siblings: &[&Shader]) {
     names.dedup();
     let named = names.into_iter().map(|glsl| {
         let field = glsl.to_lowercase().replace('=', "_");
-        Named { doc: format!("`{glsl}`."), glsl, field, rust: "bool" }
+        NamedField { doc: format!("`{glsl}`."), glsl, field, rust: "bool" }
     });
     emit_named(out, "Macros that make a sibling.", ("Macros", ""), &named.collect::<Vec<_>>());
 }
 
 fn emit_bindings(out: &mut String, siblings: &[&Shader]) {
-    let mut fields: Vec<Named> = Vec::new();
+    let mut fields: Vec<NamedField> = Vec::new();
     for sibling in siblings {
         let only = match sibling.macros().join(" ") {
             macros if macros.is_empty() => String::new(),
@@ -169,7 +169,7 @@ fn emit_bindings(out: &mut String, siblings: &[&Shader]) {
             };
             if !fields.iter().any(|field| field.glsl == *name) {
                 let doc = format!("Binding {binding}, {access}{only}.");
-                fields.push(Named { doc, glsl: name.clone(), field: name.clone(), rust: "B" });
+                fields.push(NamedField { doc, glsl: name.clone(), field: name.clone(), rust: "B" });
             }
         }
     }
@@ -183,11 +183,11 @@ fn emit_spec(out: &mut String, siblings: &[&Shader]) {
             constants.push(constant);
         }
     }
-    let fields: Vec<Named> = constants
+    let fields: Vec<NamedField> = constants
         .iter()
         .map(|SpecConstant { name, id, is_pushed, rust, .. }| {
             let doc = format!("`{name}`, {} {id}.", if *is_pushed { "pushed word" } else { "constant_id" });
-            Named { doc, glsl: name.clone(), field: name.to_lowercase(), rust }
+            NamedField { doc, glsl: name.clone(), field: name.to_lowercase(), rust }
         })
         .collect();
     emit_named(out, "Specialisation constants; a sibling takes what it has.", ("Spec", ""), &fields);

@@ -61,7 +61,7 @@ pub struct Field {
     pub offset: u32,
 }
 
-/// A struct type that stands in a block.
+/// A struct type in a block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Struct {
     /// GLSL name.
@@ -72,7 +72,7 @@ pub struct Struct {
     pub bytes: u32,
 }
 
-/// One constant of a pass: a specialisation constant, or a word that is pushed before the dispatch.
+/// A constant of a pass: a specialisation constant, or a word pushed before the dispatch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SpecConstant {
     /// GLSL name, or `LOCAL_SIZE_X` and so on.

@@ -1,5 +1,5 @@
 //! From GLSL to Rust: finds the shaders, compiles them, reflects their interfaces, checks the rules and writes
-//! `shaders.rs`. Called by `build.rs`; the tests call it on small folders of their own.
+//! `shaders.rs`. Called by `build.rs`; the tests call it on small folders.
 
 pub mod check;
 pub mod compile;
@@ -28,7 +28,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A finding at a place.
+    /// Creates a finding at a location.
     pub fn new(place: impl Into<String>, rule: impl Into<String>) -> Self {
         Self { place: place.into(), rule: rule.into() }
     }
@@ -54,7 +54,7 @@ pub struct Shader {
     pub path: String,
     /// Its text.
     pub source: String,
-    /// Base first.
+    /// The variants, base first.
     pub variants: Vec<Variant>,
 }
 
@@ -83,11 +83,11 @@ pub struct Variant {
     pub name: String,
     /// Its macros.
     pub defines: Vec<Define>,
-    /// The module that ships.
+    /// The shipped module.
     pub words: Vec<u32>,
     /// Interface of the module without optimisation.
     pub interface: Interface,
-    /// Binding numbers that the shipped module touches.
+    /// Binding numbers that the shipped module uses.
     pub used: BTreeSet<u32>,
 }
 
@@ -124,7 +124,7 @@ pub fn run(glsl: &Path, out: &Path) -> Result<(), Vec<Finding>> {
     save(out.join("shaders.rs"), generated.rust.as_bytes())
 }
 
-/// Everything but the writing. All findings of a stage come together.
+/// Everything except writing. All findings of a stage are reported together.
 pub fn generate(glsl: &Path) -> Result<Generated, Vec<Finding>> {
     let include = glsl.join("include");
     let compiler = GlslCompiler::new(&include).map_err(|error| vec![Finding::new("", error)])?;
@@ -137,11 +137,11 @@ pub fn generate(glsl: &Path) -> Result<Generated, Vec<Finding>> {
     for path in files(&include, "glsl")? {
         findings.extend(check::text(&message_path(glsl, &path), &read(&path)?));
     }
-    let constants = match fs::read_to_string(include.join(constants::FILE)) {
+    let constants = match fs::read_to_string(include.join(constants::FILE_NAME)) {
         Ok(text) => constants::read(&compiler, &text)?,
         Err(_) => Vec::new(),
     };
-    // Variants of one shader share many findings; one of each is enough.
+    // Variants of a shader share many findings, so report each once.
     let mut seen = BTreeSet::new();
     findings.retain(|finding| seen.insert(finding.to_string()));
     if !findings.is_empty() {

@@ -5,8 +5,8 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, Dim, ExecutionMode, Op, StorageClass, Word};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// What to do about padding, which the Rust side has none of.
-const WHOLE: &str = "let a scalar follow each vec3, and add scalars at the end";
+/// What to do about padding, which the Rust side does not support.
+const PADDING_CURE: &str = "let a scalar follow each vec3, and add scalars at the end";
 
 /// A module with lookup tables.
 struct Reflector<'a> {
@@ -31,7 +31,7 @@ pub fn interface(module: &Module) -> Interface {
     reflector.interface
 }
 
-/// Binding numbers of the variables that some function of the module touches.
+/// Returns the binding numbers of the variables that some function of the module uses.
 pub fn used_bindings(module: &Module) -> BTreeSet<u32> {
     let touched: BTreeSet<Word> = module
         .functions
@@ -202,7 +202,7 @@ impl<'a> Reflector<'a> {
             let ty = self.ty(&field, word(instruction, member as usize))?;
             let offset = self.member_decoration(id, member, Decoration::Offset).unwrap_or(0);
             if offset != end {
-                self.problem(&field, format!("`{field}` of `{name}` is at byte {offset}, not {end}; {WHOLE}"));
+                self.problem(&field, format!("`{field}` of `{name}` is at byte {offset}, not {end}; {PADDING_CURE}"));
             }
             align = align.max(ty.align);
             end = offset + ty.bytes;
@@ -211,7 +211,7 @@ impl<'a> Reflector<'a> {
         if !end.is_multiple_of(align) {
             self.problem(
                 name,
-                format!("`{name}` ends at byte {end}, which std430 rounds up to multiples of {align}; {WHOLE}"),
+                format!("`{name}` ends at byte {end}, which std430 rounds up to multiples of {align}; {PADDING_CURE}"),
             );
         }
         Some(Struct { name: name.to_owned(), fields, bytes: end })

@@ -1,6 +1,6 @@
-//! Places in GLSL text.
+//! Locations in GLSL text.
 
-/// Line (from 1) of the first place where `name` stands as a word; 1 if it stands nowhere.
+/// Returns the line (from 1) of the first occurrence of `name` as a word; 1 if there is none.
 pub fn line_of(source: &str, name: &str) -> usize {
     let is_word = |line: &str| line.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == name);
     without_comments(source).lines().position(is_word).map_or(1, |index| index + 1)

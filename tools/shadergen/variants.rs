@@ -1,10 +1,10 @@
 //! Parser of `glsl/variants.txt`: which shaders are compiled more than once, and with which macros.
 //!
-//! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` once more as `stem_suffix`, with the same interface.
-//! `call* + suffix: DEFINE` does so for every shader that calls a function of this prefix, and for its variants so far.
-//! `sibling = stem: DEFINE` makes a shader of its own, with an interface of its own, from the same file.
-//! Every stem has its base variant without macros; it needs no line. Lines work in order: a `*` reaches the siblings
-//! above it. `#` begins a comment.
+//! `stem + suffix: DEFINE OTHER=4` compiles `stem.comp` again as `stem_suffix`, with the same interface. `call* +
+//! suffix: DEFINE` does so for every shader that calls a function with this prefix, and for its variants so far.
+//! `sibling = stem: DEFINE` makes a separate shader with its own interface from the same file. Every stem has its base
+//! variant without macros, which needs no line. Lines apply in order: a `*` includes the siblings above it. `#` starts
+//! a comment.
 
 use super::compile::Define;
 use super::{Finding, is_snake_case};
@@ -62,7 +62,7 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<VariantLine>, Vec<Finding>> {
     if findings.is_empty() { Ok(lines) } else { Err(findings) }
 }
 
-/// Whether a text calls a function whose name begins with `prefix`.
+/// Returns whether a text calls a function whose name starts with `prefix`.
 fn calls(source: &str, prefix: &str) -> bool {
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
     source

@@ -1,4 +1,4 @@
-//! A scene on the device with the lists of all modes.
+//! A scene on the device with the command lists of all modes.
 
 use super::errors::Outcome;
 use super::modes::{Mode, Replacements};
@@ -20,26 +20,27 @@ use std::sync::Arc;
 pub struct Sample {
     /// Milliseconds of each stage.
     pub stages: BTreeMap<Stage, f64>,
-    /// Processor time of the process, ms; none where the system does not tell.
+    /// CPU time of the process, ms; `None` if the system does not report it.
     pub cpu: Option<f64>,
     /// Counters of the device.
     pub counters: Counters,
 }
 
-/// A scene, an engine, and a list for each mode.
-pub struct Bed<'a> {
+/// A scene, an engine, and a command list per mode.
+pub struct TestBed<'a> {
     fixture: Fixture,
     modes: &'a [(Mode, Replacements)],
     lists: Vec<ListId>,
-    /// Of the items of every list.
+    /// Stages of the items of every list.
     stages: Vec<Stage>,
 }
 
-impl<'a> Bed<'a> {
+impl<'a> TestBed<'a> {
     /// Uploads the scene.
     pub fn new(gpu: &Arc<Gpu>, scene: Scene, modes: &'a [(Mode, Replacements)]) -> Result<Self> {
         let shape = KernelShape::for_device(gpu.capabilities());
-        // With a barrier before each item, times belong to their items; without aliasing, all can be read back.
+        // With a barrier before each item, times can be attributed to items; without aliasing, all buffers can be read
+        // back.
         let plan = PlanOptions { alias: false, guards: false, barrier_everywhere: true };
         let options = SchedulerOptions { plan, timestamps: true, ..SchedulerOptions::default() };
         let fixture = Fixture::new(Arc::clone(gpu), scene, false, shape, options)?;
@@ -51,7 +52,7 @@ impl<'a> Bed<'a> {
         self.fixture.engine.shape().tile_pixels()
     }
 
-    /// Without the optimiser, which no mode touches, and which would change the model.
+    /// Without the optimiser, which no mode changes and which would update the model.
     fn variant(&self) -> Variant {
         let size = (self.fixture.scene.camera.width, self.fixture.scene.camera.height);
         let sh_degree = self.fixture.config.sh_degree;
@@ -68,7 +69,7 @@ impl<'a> Bed<'a> {
         Ok(())
     }
 
-    /// Runs one list; again with more memory, and all lists recorded anew, if a buffer was too small.
+    /// Runs a list. If a buffer was too small, enlarges the memory, records all lists again and repeats.
     pub fn run(&mut self, list: usize) -> Result<Sample> {
         loop {
             if self.lists.is_empty() {
@@ -95,7 +96,7 @@ impl<'a> Bed<'a> {
         }
     }
 
-    /// Picture and gradients of the last run.
+    /// Returns the image and gradients of the last run.
     pub fn outcome(&mut self) -> Result<Outcome> {
         let pixels = self.fixture.pixels();
         let image = self.fixture.get::<[f32; 4]>(Buf::IMAGE, pixels)?;
@@ -103,7 +104,7 @@ impl<'a> Bed<'a> {
         Ok(Outcome { colours, rows: self.fixture.gradient_rows()? })
     }
 
-    /// The engine's own list gives the picture of the default mode, to the bit.
+    /// Checks that the engine's own list produces the image of the default mode bit by bit.
     pub fn check_default(&mut self, outcome: &Outcome) -> Result<()> {
         let key = ListKey::Train(self.variant());
         self.fixture.train_as(key)?;
@@ -111,6 +112,6 @@ impl<'a> Bed<'a> {
         if own.colours == outcome.colours && own.rows == outcome.rows {
             return Ok(());
         }
-        Err(Error::Check("the default mode is not the step of the engine".to_owned()))
+        Err(Error::Check("the default mode differs from the engine's step".to_owned()))
     }
 }

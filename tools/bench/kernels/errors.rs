@@ -1,4 +1,4 @@
-//! How far a picture and its gradients are from those in float64.
+//! Errors of an image and its gradients relative to float64.
 
 use super::mirror::Mirror;
 use crate::measure::quantile;
@@ -7,28 +7,28 @@ use labelgs::reference::model::{Group, flatten};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Elements below this part of the largest have no relative error of their own.
-const FLOOR: f64 = 1e-6;
+/// Elements below this share of the largest have no relative error.
+const RELATIVE_FLOOR: f64 = 1e-6;
 
-/// Absolute errors of the colours, all channels.
+/// Absolute errors of the colours over all channels.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct ColourError {
     /// Largest.
     pub max: f64,
-    /// 99.9 % are at most this.
+    /// 99.9 % quantile.
     pub p999: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
 }
 
-/// Errors of the gradient by one group of parameters.
+/// Errors of the gradients of a parameter group.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct GroupError {
-    /// Largest error by the largest magnitude.
+    /// Largest error divided by the largest magnitude.
     pub max: f64,
-    /// 99.9 % of the relative errors are at most this; of elements of at least 1e-6 of the largest magnitude.
+    /// 99.9 % quantile of the relative errors of elements that are at least 1e-6 of the largest magnitude.
     pub p999: f64,
-    /// Norm of the error by the norm of the gradient.
+    /// Norm of the error divided by the norm of the gradient.
     pub rms: f64,
 }
 
@@ -41,21 +41,21 @@ pub struct GradientError {
     pub worst: GroupError,
 }
 
-/// Errors against one reference.
+/// Errors relative to a reference.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Errors {
     /// Pixels that were compared.
     pub pixels: usize,
     /// Gaussians whose gradients were compared.
     pub rows: usize,
-    /// Of the picture.
+    /// Of the image.
     pub colours: ColourError,
     /// Of the gradients.
     pub gradients: GradientError,
 }
 
 impl Errors {
-    /// True if there is no NaN and no infinity.
+    /// Returns true if all errors are finite.
     pub fn are_finite(&self) -> bool {
         let (colours, worst) = (&self.colours, &self.gradients.worst);
         [colours.max, colours.p999, colours.rms, worst.max, worst.p999, worst.rms].iter().all(|v| v.is_finite())
@@ -64,13 +64,13 @@ impl Errors {
 
 /// Results of a step on a device.
 pub struct Outcome {
-    /// Picture, [height, width].
+    /// Image, [height, width].
     pub colours: Vec<[f64; 3]>,
-    /// Gradients by Gaussian.
+    /// Gradients per Gaussian.
     pub rows: Vec<Row>,
 }
 
-/// Compares all of it, or the pixels and rows whose decisions are farther than `sure` from going the other way.
+/// Compares everything, or only pixels and rows whose decisions are farther than `sure` from flipping.
 pub fn compare(outcome: &Outcome, mirror: &Mirror, sure: f64) -> Errors {
     let pixels = (0..mirror.colours.len()).filter(|&i| mirror.pixel_margins[i] >= sure);
     let differences: Vec<f64> =
@@ -85,7 +85,7 @@ pub fn compare(outcome: &Outcome, mirror: &Mirror, sure: f64) -> Errors {
     }
 }
 
-/// A NaN is worse than any number.
+/// Treats NaN as larger than any number.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
@@ -120,6 +120,6 @@ fn group_error(actual: &[f64], expected: &[f64]) -> GroupError {
     let norm = |squares: f64| squares.sqrt();
     let rms = norm(pairs().map(|(a, e)| (a - e) * (a - e)).sum()) / norm(expected.iter().map(|e| e * e).sum());
     let mut relative: Vec<f64> =
-        pairs().filter(|(_, e)| e.abs() >= FLOOR * largest).map(|(a, e)| ((a - e) / e).abs()).collect();
+        pairs().filter(|(_, e)| e.abs() >= RELATIVE_FLOOR * largest).map(|(a, e)| ((a - e) / e).abs()).collect();
     GroupError { max, p999: quantile(&mut relative, 0.999), rms }
 }

@@ -1,6 +1,6 @@
 //! Runs every mode on a scene: once for its errors, then round robin for its times.
 
-use super::bed::{Bed, Sample};
+use super::bed::{Sample, TestBed};
 use super::errors::{Errors, compare};
 use super::mirror::{View, without_cut_offs};
 use super::modes::{Mode, Replacements};
@@ -15,26 +15,26 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Stages that no mode touches.
-const UNTOUCHED: [Stage; 4] = [Stage::LOSS, Stage::OPTIMISE, Stage::LABELS, Stage::REPORT];
-/// Decisions nearer than this to their threshold may go the other way in f32 (tests/pass/step.rs).
-const MARGIN: f64 = 2e-5;
+const UNTOUCHED_STAGES: [Stage; 4] = [Stage::LOSS, Stage::OPTIMISE, Stage::LABELS, Stage::REPORT];
+/// Decisions closer to their threshold than this may flip in f32 (tests/pass/step.rs).
+const MARGIN_MIN: f64 = 2e-5;
 
 /// A mode on a scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModeResult {
     /// Name of the mode.
     pub name: &'static str,
-    /// Time of the stages that modes touch by that of the default in the same round, median over the rounds.
+    /// Time of the stages that modes change, relative to the default in the same round; median over the rounds.
     pub relative_median: f64,
-    /// Processor time of the step by that of the default in the same round, median over the rounds.
+    /// CPU time of the step, relative to the default in the same round; median over the rounds.
     pub relative_cpu: Option<f64>,
-    /// ms of each stage, median.
+    /// Median time of each stage, ms.
     pub stages: BTreeMap<&'static str, f64>,
-    /// (splat, tile) pairs that were sorted.
+    /// Number of sorted (splat, tile) pairs.
     pub instances: u32,
-    /// Against the float64 step with the engine's rules.
+    /// Errors relative to the float64 step with the engine's rules.
     pub against_rules: Errors,
-    /// Against the float64 step without stop and cut.
+    /// Errors relative to the float64 step without cut-offs.
     pub against_no_cut_offs: Errors,
 }
 
@@ -47,19 +47,19 @@ pub struct SceneResult {
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,
-    /// Image, px.
+    /// Image size, px.
     pub size: (u32, u32),
     /// Timed rounds.
     pub rounds: usize,
     /// Splats of the view.
     pub splats: u32,
-    /// (splat, pixel) pairs that the forward pass walked.
+    /// (splat, pixel) pairs walked by the forward pass.
     pub pairs: u64,
-    /// Processes that waited for a processor, on the average of a minute, after the scene.
+    /// Load average over a minute, after the scene.
     pub load: Option<f64>,
     /// The modes, the default first.
     pub modes: Vec<ModeResult>,
-    /// The default against the float64 step, where no decision is near: rounding alone.
+    /// Errors of the default relative to the float64 step where no decision is close: rounding alone.
     pub rounding: Errors,
 }
 
@@ -70,8 +70,8 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
     let picture = View::new(&rules, &scene).picture().0;
     scenes::set_photo(&mut scene, &picture);
     let (by_rules, by_open) = (View::new(&rules, &scene).step(), View::new(&open, &scene).step());
-    let mut bed = Bed::new(gpu, scene, modes)?;
-    // All lists once: buffers grow, drivers compile.
+    let mut bed = TestBed::new(gpu, scene, modes)?;
+    // Run all lists once, so that buffers grow and drivers compile.
     for list in 0..modes.len() {
         bed.run(list)?;
     }
@@ -82,7 +82,7 @@ pub fn scene(gpu: &Arc<Gpu>, plan: &Plan, modes: &[(Mode, Replacements)]) -> Res
         let outcome = bed.outcome()?;
         errors.push((compare(&outcome, &by_rules, 0.0), compare(&outcome, &by_open, 0.0)));
         if list == 0 {
-            rounding = compare(&outcome, &by_rules, MARGIN);
+            rounding = compare(&outcome, &by_rules, MARGIN_MIN);
             bed.check_default(&outcome)?;
         }
     }
@@ -111,7 +111,7 @@ fn result(
     (against_rules, against_no_cut_offs): (Errors, Errors),
 ) -> ModeResult {
     let touched = |sample: &Sample| {
-        let touched = sample.stages.iter().filter(|(stage, _)| !UNTOUCHED.contains(stage));
+        let touched = sample.stages.iter().filter(|(stage, _)| !UNTOUCHED_STAGES.contains(stage));
         Some(touched.map(|(_, ms)| ms).sum())
     };
     let relative_median = ratio(own, of_default, touched).unwrap_or(f64::NAN);
@@ -128,9 +128,9 @@ fn result(
     }
 }
 
-/// Samples of every list by round. Every round begins elsewhere and every other one goes backwards, so that no mode
-/// always follows the same one.
-fn time(bed: &mut Bed<'_>, count: usize, rounds: usize) -> Result<Vec<Vec<Sample>>> {
+/// Returns samples of every list by round. Each round starts at another list, and every other round runs backwards, so
+/// that no mode always follows the same one.
+fn time(bed: &mut TestBed<'_>, count: usize, rounds: usize) -> Result<Vec<Vec<Sample>>> {
     let mut samples: Vec<Vec<Sample>> = vec![Vec::new(); count];
     for round in 0..rounds {
         for place in 0..count {
@@ -142,24 +142,24 @@ fn time(bed: &mut Bed<'_>, count: usize, rounds: usize) -> Result<Vec<Vec<Sample
     Ok(samples)
 }
 
-/// Median of the ratios of each round.
+/// Returns the median of the rounds' ratios.
 fn ratio(own: &[Sample], of_default: &[Sample], ms: impl Fn(&Sample) -> Option<f64>) -> Option<f64> {
     let ratios = own.iter().zip(of_default).map(|(a, b)| Some(ms(a)? / ms(b)?));
     ratios.collect::<Option<Vec<f64>>>().map(median)
 }
 
-/// What is wrong with the default mode, if anything. Without near decisions, errors come from rounding, and in large
-/// scenes from a few pairs of equal f32 depth. Bounds are three times the errors on lavapipe.
+/// Returns what is wrong with the default mode, if anything. Without close decisions, errors come from rounding, and in
+/// large scenes from a few pairs of equal f32 depth. Bounds are three times the errors on lavapipe.
 pub fn fault_of_default(scene: &SceneResult, kind: Kind) -> Option<String> {
     let errors = &scene.rounding;
     let (colour, gradient) = match kind {
         // Exponents of needles are small differences of large products.
         Kind::Needles => (1.2e-4, 2.6e-4),
-        // Of 180,000 splats a few are sorted the other way.
+        // Of 180,000 splats, a few are sorted differently.
         Kind::Trained => (1e-5, 2.4e-4),
         _ => (5e-6, 3e-5),
     };
-    // Where nearly every Gaussian is near some decision, all of them are compared.
+    // If nearly every Gaussian is close to a decision, compare all of them.
     let all = &scene.modes.first()?.against_rules;
     let gradients = if errors.rows * 10 < scene.gaussians { &all.gradients } else { &errors.gradients };
     let found = (errors.colours.p999, gradients.worst.rms);

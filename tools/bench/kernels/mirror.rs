@@ -1,5 +1,5 @@
-//! The float64 step of the tests (`src/reference`), by blocks of the picture on all cores, so that scenes of the
-//! benchmark's size take seconds. Without labels.
+//! The float64 step of the tests (`src/reference`), computed by blocks of the image on all cores, so that
+//! benchmark-sized scenes take seconds. Without labels.
 
 use labelgs::reference::blend::{self, Margins, Upstream};
 use labelgs::reference::loss::photo_loss;
@@ -9,17 +9,17 @@ use labelgs::verify::selftest::scenes::Scene;
 use rayon::prelude::*;
 
 /// Side of a block, px.
-const BLOCK: usize = 32;
+const BLOCK_SIDE: usize = 32;
 
 /// Results of a step in float64.
 pub struct Mirror {
-    /// Picture, [height, width].
+    /// Image, [height, width].
     pub colours: Vec<[f64; 3]>,
-    /// Nearest decision of each pixel.
+    /// Smallest decision margin of each pixel.
     pub pixel_margins: Vec<f64>,
-    /// Gradients by Gaussian, [N].
+    /// Gradients per Gaussian, [N].
     pub rows: Vec<Row>,
-    /// Nearest decision that bears on each row, [N].
+    /// Smallest decision margin that affects each row, [N].
     pub row_margins: Vec<f64>,
 }
 
@@ -34,15 +34,15 @@ pub struct View<'a> {
     blocks: Vec<Block>,
 }
 
-/// A part of the picture and the splats that are near it.
+/// A part of the image and the splats near it.
 struct Block {
     corner: [usize; 2],
     size: (usize, usize),
-    /// Places in `View::splats`, nearest first.
+    /// Indices into `View::splats`, nearest first.
     places: Vec<usize>,
 }
 
-/// The rules without cut-offs: no pixel stops, and pairs count down to 2^-30, below any f32 sum.
+/// Returns rules without cut-offs: no pixel stops, and pairs count down to 2^-30, below any f32 sum.
 pub fn without_cut_offs() -> Rules {
     Rules { alpha_min: (-30.0_f64).exp2(), transmittance_min: 0.0, ..Rules::default() }
 }
@@ -71,19 +71,19 @@ impl<'a> View<'a> {
 
     fn fill_blocks(&mut self) {
         let (width, height) = self.size();
-        let columns = width.div_ceil(BLOCK);
+        let columns = width.div_ceil(BLOCK_SIDE);
         let block = |index: usize| {
-            let corner = [index % columns * BLOCK, index / columns * BLOCK];
-            let size = (BLOCK.min(width - corner[0]), BLOCK.min(height - corner[1]));
+            let corner = [index % columns * BLOCK_SIDE, index / columns * BLOCK_SIDE];
+            let size = (BLOCK_SIDE.min(width - corner[0]), BLOCK_SIDE.min(height - corner[1]));
             Block { corner, size, places: Vec::new() }
         };
-        self.blocks = (0..columns * height.div_ceil(BLOCK)).map(block).collect();
+        self.blocks = (0..columns * height.div_ceil(BLOCK_SIDE)).map(block).collect();
         for (place, splat) in self.splats.iter().enumerate() {
-            // One pixel wider than exact, as the mirror's own boxes are.
+            // One pixel wider than exact, like the mirror's own boxes.
             let Some(reach) = blend::reach(self.rules, splat) else { continue };
             let span = |axis: usize, end: usize| {
-                let low = (splat.mean2d[axis] - reach[axis] - 1.0).max(0.0) as usize / BLOCK;
-                let high = (splat.mean2d[axis] + reach[axis] + 1.0).clamp(0.0, end as f64 - 1.0) as usize / BLOCK;
+                let low = (splat.mean2d[axis] - reach[axis] - 1.0).max(0.0) as usize / BLOCK_SIDE;
+                let high = (splat.mean2d[axis] + reach[axis] + 1.0).clamp(0.0, end as f64 - 1.0) as usize / BLOCK_SIDE;
                 low..=high
             };
             for row in span(1, height) {
@@ -94,7 +94,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The splats of a block, with centres relative to its corner.
+    /// Returns the splats of a block, with centres relative to its corner.
     fn splats_of(&self, block: &Block) -> Vec<Splat> {
         let moved = |&place: &usize| {
             let splat = self.splats[place];
@@ -108,7 +108,7 @@ impl<'a> View<'a> {
         (block.corner[1] + index / block.size.0) * self.size().0 + block.corner[0] + index % block.size.0
     }
 
-    /// The picture and the margins of its pixels.
+    /// Renders the image and the margins of its pixels.
     pub fn picture(&self) -> (Vec<[f64; 3]>, Vec<f64>) {
         let background = self.scene.target.background;
         let blended: Vec<_> = (self.blocks.par_iter())
@@ -126,7 +126,7 @@ impl<'a> View<'a> {
         (colours, margins)
     }
 
-    /// The whole step.
+    /// Runs the whole step.
     pub fn step(&self) -> Mirror {
         let (colours, pixel_margins) = self.picture();
         let v_image = photo_loss(self.rules, &colours, &self.scene.target.photo).v_image;

@@ -1,9 +1,9 @@
 //! Kernels: time against error of every mode.
 //!
-//! A mode is a training step whose kernels are compiled with a macro (`modes`). It runs in the
-//! engine's own scheduler on seeded scenes, is timed by the device's timestamps round robin with all others, and its
-//! picture and gradients are compared with the float64 mirrors of the tests: once with the engine's rules, and once
-//! without any cut-off, which is what those rules stand for.
+//! A mode is a training step whose kernels are compiled with a macro (`modes`). It runs in the engine's own scheduler
+//! on seeded scenes and is timed round robin with all others by the device's timestamps. Its image and gradients are
+//! compared with the float64 mirrors of the tests: once with the engine's rules, and once without any cut-off, which
+//! those rules approximate.
 
 mod bed;
 mod errors;
@@ -14,8 +14,8 @@ mod pairs;
 mod report;
 mod scenes;
 
-pub use bed::Bed;
-pub use modes::{MODES, Mode, Replacements};
+pub use bed::TestBed;
+pub use modes::{ALL_MODES, Mode, Replacements};
 
 use super::Common;
 use super::measure::write_json;
@@ -28,10 +28,10 @@ use serde_json::json;
 pub struct KernelArgs {
     #[command(flatten)]
     common: Common,
-    /// These scenes alone.
+    /// Only these scenes.
     #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
     scenes: Vec<String>,
-    /// These modes alone, by their number in a full run; the default is always among them.
+    /// Only these modes, by their number in a full run; the default is always included.
     #[arg(long, value_name = "N,..", value_delimiter = ',')]
     modes: Vec<usize>,
     /// Timed rounds of every scene.
@@ -39,12 +39,12 @@ pub struct KernelArgs {
     rounds: Option<usize>,
 }
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(args: &KernelArgs) -> Result<()> {
     let load_before = super::measure::load();
     let gpu = super::device::open()?;
     let wanted = |number: usize| number == 0 || args.modes.is_empty() || args.modes.contains(&number);
-    let modes = MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
+    let modes = ALL_MODES.iter().enumerate().filter(|(number, _)| wanted(*number));
     let modes: Vec<_> = modes.map(|(_, mode)| (*mode, Replacements::default())).collect();
     let plain: Vec<Mode> = modes.iter().map(|(mode, _)| *mode).collect();
     let capabilities = gpu.capabilities();
@@ -73,7 +73,7 @@ pub fn run(args: &KernelArgs) -> Result<()> {
     if failures.is_empty() { Ok(()) } else { Err(Error::Check(failures.join("; "))) }
 }
 
-/// Failures: a NaN, or a default mode with too large an error.
+/// Returns failures: NaN, or a default mode with too large an error.
 fn faults(scene: &SceneResult, kind: scenes::Kind) -> Vec<String> {
     let mut faults: Vec<String> = measure::fault_of_default(scene, kind).into_iter().collect();
     for mode in &scene.modes {

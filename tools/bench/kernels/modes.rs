@@ -1,8 +1,8 @@
 //! The modes: training steps whose kernels are compiled with macros that trade accuracy for time.
 //!
-//! A macro takes the place of a constant of `glsl/include/constants.glsl`, or of a function of GLSL.
+//! A macro replaces a constant of `glsl/include/constants.glsl` or a GLSL function.
 
-use crate::compiler::{GLSL, spirv};
+use crate::compiler::{GLSL_FOLDER, spirv};
 use crate::shadergen::compile::Define;
 use labelgs::pass::Stage;
 use labelgs::scheduler::plan::{PassList, Work};
@@ -20,31 +20,31 @@ pub struct Mode {
     pub name: &'static str,
     /// The difference from the default, for the legend.
     pub about: &'static str,
-    /// Macro and value that kernels are compiled with.
+    /// Macro and value with which kernels are compiled.
     define: Option<(&'static str, &'static str)>,
-    /// Stages of these kernels; those that the macro leaves as they are stay.
+    /// Stages with these kernels; unaffected stages stay.
     stages: &'static [Stage],
 }
 
-const BLENDS: &[Stage] = &[Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
-/// Where it is decided which pairs there are, and in the blends, which of them count.
-const PAIRS: &[Stage] = &[Stage::PROJECT, Stage::TILE, Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
+const BLEND_STAGES: &[Stage] = &[Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
+/// Stages that decide which pairs exist, and in the blends, which of them count.
+const PAIR_STAGES: &[Stage] = &[Stage::PROJECT, Stage::TILE, Stage::BLEND_FORWARD, Stage::BLEND_BACKWARD];
 
 const fn stop(name: &'static str, about: &'static str, value: &'static str) -> Mode {
-    Mode { name, about, define: Some(("TRANSMITTANCE_MIN", value)), stages: BLENDS }
+    Mode { name, about, define: Some(("TRANSMITTANCE_MIN", value)), stages: BLEND_STAGES }
 }
 
 const fn cut(name: &'static str, about: &'static str, value: &'static str) -> Mode {
-    Mode { name, about, define: Some(("ALPHA_MIN", value)), stages: PAIRS }
+    Mode { name, about, define: Some(("ALPHA_MIN", value)), stages: PAIR_STAGES }
 }
 
-/// 2^x for -126 <= x <= 0: the whole part goes into the exponent, of the rest a polynomial with the least largest
+/// 2^x for -126 <= x <= 0: the integer part becomes the exponent; the rest is a polynomial with minimal largest
 /// relative error on [0, 1) by weighted least squares, 7.5e-5.
-const CUBIC: &str = "(uintBitsToFloat(uint(int(floor(x)) + 127) << 23) * \
+const EXP2_CUBIC: &str = "(uintBitsToFloat(uint(int(floor(x)) + 127) << 23) * \
      (0.9999252 + fract(x) * (0.6958336 + fract(x) * (0.22606716 + fract(x) * 0.07802452))))";
 
 /// Every mode, the default first.
-pub const MODES: &[Mode] = &[
+pub const ALL_MODES: &[Mode] = &[
     Mode { name: "default", about: "the step as the engine runs it", define: None, stages: &[] },
     stop("stop 1e-2", "a pixel stops at T < 1e-2", "1e-2"),
     stop("stop 1e-3", "a pixel stops at T < 1e-3", "1e-3"),
@@ -54,18 +54,18 @@ pub const MODES: &[Mode] = &[
     Mode {
         name: "exp2 cubic",
         about: "exp2 by a polynomial of degree 3 (relative error 7.5e-5)",
-        define: Some(("exp2(x)", CUBIC)),
-        stages: BLENDS,
+        define: Some(("exp2(x)", EXP2_CUBIC)),
+        stages: BLEND_STAGES,
     },
 ];
 
-/// Kernels of a mode, by the name of the engine's kernel that they stand in for.
+/// Kernels of a mode, by the name of the engine's kernel that they replace.
 #[derive(Debug, Default)]
 pub struct Replacements(RefCell<HashMap<&'static str, &'static ShaderDesc>>);
 
 impl Replacements {
-    /// The kernel with a macro; compiles it once, as the engine's own if the macro changes nothing.
-    fn of(&self, shader: &'static ShaderDesc, (name, value): (&str, &str)) -> Result<&'static ShaderDesc> {
+    /// Returns the kernel compiled once with a macro, or the engine's own if the macro changes nothing.
+    fn get(&self, shader: &'static ShaderDesc, (name, value): (&str, &str)) -> Result<&'static ShaderDesc> {
         if let Some(&made) = self.0.borrow().get(shader.name) {
             return Ok(made);
         }
@@ -81,7 +81,7 @@ impl Replacements {
 }
 
 impl Mode {
-    /// The list of the mode, from that of the default. Every mode changes the forward blend.
+    /// Returns the mode's list, derived from the default list. Every mode changes the forward blend.
     pub fn list(&self, default: &PassList, kernels: &Replacements) -> Result<PassList> {
         let mut list = PassList { name: self.name.to_owned(), ..default.clone() };
         let Some(define) = self.define else { return Ok(list) };
@@ -90,7 +90,7 @@ impl Mode {
             if let Work::Pass(pass) = work
                 && self.stages.contains(&pass.stage)
             {
-                let made = kernels.of(pass.shader, define)?;
+                let made = kernels.get(pass.shader, define)?;
                 if !std::ptr::eq(made, pass.shader) {
                     changed.insert(pass.stage);
                     pass.shader = made;
@@ -102,9 +102,9 @@ impl Mode {
     }
 }
 
-/// The file of a kernel; one that is declared to come from another kernel's has more words in its name.
+/// Returns the source file of a kernel. If it shares another kernel's source, its name has additional words.
 fn source_of(stem: &str) -> Result<PathBuf> {
-    let glsl = Path::new(GLSL);
+    let glsl = Path::new(GLSL_FOLDER);
     let folders: Vec<PathBuf> =
         fs::read_dir(glsl).map_err(Error::read(glsl))?.flatten().map(|folder| folder.path()).collect();
     let words = std::iter::successors(Some(stem), |name| name.rsplit_once('_').map(|(shorter, _)| shorter));

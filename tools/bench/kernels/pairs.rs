@@ -1,5 +1,6 @@
-//! How exact the gradient of a (pixel, splat) pair with respect to its opacity is: that of the device, which carries the light from
-//! behind as a sum, and that of two ways in f32 on the host, by sums too and by differences between the whole and the front.
+//! Accuracy of the gradient of a (pixel, splat) pair with respect to its opacity: of the device, which carries the light
+//! from behind as a sum, and of two f32 methods on the host, one with sums and one with differences between the total
+//! and the front.
 
 use crate::measure::{quantile, table};
 use glam::DMat3;
@@ -17,16 +18,16 @@ use labelgs::{Error, Result};
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Splats of a list: most of them faint, and its end opaque.
-const LENGTHS: [usize; 2] = [300, 1_000];
+/// Lengths of the splat lists: most splats are faint, and the end is opaque.
+const LIST_LENGTHS: [usize; 2] = [300, 1_000];
 /// Centre of the only pixel.
-const AT: [f64; 2] = [0.5; 2];
-/// Most that 99 % of the device's pairs may be off; 1.5e-5 seen, 1.3e-3 by differences.
-const BOUND: f64 = 1e-4;
-/// Distance of the decisions of a list to their opposite, so that device and mirror decide alike.
-const SURE: f64 = 1e-5;
+const PIXEL_CENTRE: [f64; 2] = [0.5; 2];
+/// Largest error of 99 % of the device's pairs; observed 1.5e-5, and 1.3e-3 by differences.
+const ERROR_MAX: f64 = 1e-4;
+/// Margin of a list's decisions, so that device and mirror decide alike.
+const MARGIN_MIN: f64 = 1e-5;
 
-/// Prints the errors of so many lists of each length, and returns them. Fails where those of the device are too large.
+/// Prints and returns the errors of `lists` lists of each length. Errors if the device's are too large.
 pub fn run(gpu: &Arc<Gpu>, lists: usize) -> Result<Vec<Value>> {
     let own = KernelShape { group_blend: None, ..KernelShape::for_device(gpu.capabilities()) };
     let groups = own.with_group_blend(gpu.capabilities());
@@ -40,7 +41,7 @@ pub fn run(gpu: &Arc<Gpu>, lists: usize) -> Result<Vec<Value>> {
     let mut found = Vec::new();
     for (name, mut errors) in ways {
         let numbers = [0.5, 0.99, 1.0].map(|share| quantile(&mut errors, share));
-        if errors.is_empty() || name.starts_with("device") && !(numbers[1] <= BOUND) {
+        if errors.is_empty() || name.starts_with("device") && !(numbers[1] <= ERROR_MAX) {
             return Err(Error::Check(format!("{name}: gradients of {} pairs, off by {numbers:?}", errors.len())));
         }
         rows.push(
@@ -50,15 +51,17 @@ pub fn run(gpu: &Arc<Gpu>, lists: usize) -> Result<Vec<Value>> {
             json!({ "way": name, "pairs": errors.len(), "median": numbers[0], "p99": numbers[1], "max": numbers[2] }),
         );
     }
-    println!("\ngradient of a pair of a pixel and a splat with respect to its opacity, lists of {LENGTHS:?} splats");
+    println!(
+        "\ngradient of a pair of a pixel and a splat with respect to its opacity, lists of {LIST_LENGTHS:?} splats"
+    );
     println!("{}", table(&rows));
     Ok(found)
 }
 
-/// Relative errors of the device, and of both ways on the host.
+/// Returns the relative errors of the device and of both host methods.
 fn errors(gpu: &Arc<Gpu>, shape: KernelShape, lists: usize) -> Result<(Vec<f64>, [Vec<f64>; 2])> {
     let (rules, mut device, mut models) = (Rules::default(), Vec::new(), [Vec::new(), Vec::new()]);
-    for length in LENGTHS {
+    for length in LIST_LENGTHS {
         let mut fixture = Fixture::new(Arc::clone(gpu), list(0, length), false, shape, readable())?;
         for seed in 0..lists as u64 {
             fixture.engine.upload_model(&list(seed, length).gaussians)?;
@@ -69,8 +72,8 @@ fn errors(gpu: &Arc<Gpu>, shape: KernelShape, lists: usize) -> Result<(Vec<f64>,
             let actual = fixture.splat_gradients(&splats)?;
             let upstream = Upstream::from_colours(&[gradient]);
             let expected = blend_backward(&rules, &splats, (1, 1), background, &upstream).values;
-            let ray = trace(&rules, splats.iter().enumerate(), AT);
-            if ray.margins.gradient() < SURE {
+            let ray = trace(&rules, splats.iter().enumerate(), PIXEL_CENTRE);
+            if ray.margins.gradient() < MARGIN_MIN {
                 continue;
             }
             let pairs: Vec<(f32, f32)> = (ray.contributions.iter())
@@ -94,7 +97,8 @@ fn light(colour: &[f64; 3], gradient: &[f64; 3]) -> f32 {
     colour.iter().zip(gradient).map(|(c, g)| *c as f32 * *g as f32).sum()
 }
 
-/// Back to front, as the backward walk: the light from behind is a sum of what is there, over the transmittance.
+/// Back to front, like the backward walk: the light from behind is the sum of what is there, divided by the
+/// transmittance.
 fn by_sums(pairs: &[(f32, f32)], background: f32) -> Vec<f32> {
     let (mut t, mut behind) = (pairs.iter().fold(1.0, |t, (alpha, _)| t * (1.0 - alpha)), background);
     let back = pairs.iter().rev().map(|(alpha, light)| {
@@ -108,7 +112,7 @@ fn by_sums(pairs: &[(f32, f32)], background: f32) -> Vec<f32> {
     found
 }
 
-/// Front to back, as in trainers with a workgroup for each part of a list: what is behind is the whole without the front.
+/// Front to back, like trainers with a workgroup per part of a list: what is behind is the total minus the front.
 fn by_differences(pairs: &[(f32, f32)], background: f32) -> Vec<f32> {
     let blend = |(sum, t): (f32, f32), &(alpha, light): &(f32, f32)| (sum + alpha * t * light, t * (1.0 - alpha));
     let (sum, rest) = pairs.iter().fold((0.0, 1.0), blend);
@@ -121,7 +125,7 @@ fn by_differences(pairs: &[(f32, f32)], background: f32) -> Vec<f32> {
     pairs.iter().map(gradient).collect()
 }
 
-/// A picture of one pixel, and splats before it in random order.
+/// A single pixel, with splats in front of it in random order.
 fn list(seed: u64, length: usize) -> Scene {
     let focal = 64.0;
     let (rotation, translation) = (DMat3::IDENTITY, glam::DVec3::ZERO);
@@ -130,7 +134,7 @@ fn list(seed: u64, length: usize) -> Scene {
     for index in 0..length {
         let mut draw = |low: f64, high: f64| uniform(&mut random, low, high);
         let depth = 2.0 + 6.0 * (index as f64 + draw(0.0, 1.0)) / length as f64;
-        // All faint ones together let through as much, whatever the length.
+        // All faint splats together transmit the same, whatever the length.
         let faint = (4.0 * draw(0.05, 1.0).powi(3) / length as f64 * 4.0).max(0.005);
         let opacity = if index * 50 < length * 49 { faint } else { draw(0.3, 0.95) };
         gaussians

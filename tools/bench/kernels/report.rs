@@ -7,7 +7,7 @@ use crate::measure::table;
 use labelgs::pass::Stage;
 
 /// Stages with a column of their own.
-const STAGES: [Stage; 7] = [
+const COLUMN_STAGES: [Stage; 7] = [
     Stage::PROJECT,
     Stage::SORT,
     Stage::TILE,
@@ -17,7 +17,7 @@ const STAGES: [Stage; 7] = [
     Stage::PROJECT_BACKWARD,
 ];
 
-/// Legend of the columns, and the modes by number.
+/// Prints the legend of the columns, and the numbered modes.
 pub fn legend(modes: &[Mode]) {
     println!(
         "times by those of the default, medians of the rounds' ratios: `passes` of all stages but loss and report, `CPU` \
@@ -30,7 +30,7 @@ pub fn legend(modes: &[Mode]) {
     }
 }
 
-/// All of a scene.
+/// Prints all results of a scene.
 pub fn scene(scene: &SceneResult) {
     let (width, height) = scene.size;
     println!(
@@ -44,7 +44,7 @@ pub fn scene(scene: &SceneResult) {
         scene.load.unwrap_or(f64::NAN),
     );
     let mut times = vec![vec![String::new(), "passes".to_owned(), "CPU".to_owned()]];
-    times[0].extend(STAGES.map(|stage| format!("{} ms", stage.name)));
+    times[0].extend(COLUMN_STAGES.map(|stage| format!("{} ms", stage.name)));
     times[0].push("instances".to_owned());
     let names = ["C max", "C 99.9%", "C rms", "G max", "G 99.9%", "G norm"];
     let mut errors = vec![vec![String::new()]];
@@ -53,7 +53,7 @@ pub fn scene(scene: &SceneResult) {
     for mode in &scene.modes {
         let cpu = mode.relative_cpu.map_or("-".to_owned(), |cpu| format!("{cpu:.3}"));
         let mut row = vec![mode.name.to_owned(), format!("{:.3}", mode.relative_median), cpu];
-        row.extend(STAGES.map(|stage| format!("{:.2}", mode.stages.get(stage.name).unwrap_or(&0.0))));
+        row.extend(COLUMN_STAGES.map(|stage| format!("{:.2}", mode.stages.get(stage.name).unwrap_or(&0.0))));
         row.push(mode.instances.to_string());
         times.push(row);
         let open = numbers(&mode.against_no_cut_offs);

@@ -1,4 +1,4 @@
-//! The scenes: two sizes with the statistics of a trained scene, and five that are hard on the arithmetic.
+//! The scenes: two sizes with the statistics of a trained scene, and five that are numerically difficult.
 
 use glam::{DMat3, DVec3};
 use labelgs::reference::loss::Photo;
@@ -8,7 +8,7 @@ use labelgs::verify::selftest::scenes::{Scene, generator, round, uniform};
 use rand::Rng;
 use rand_pcg::Pcg32;
 
-/// How large, and how often.
+/// Size and repetitions of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     /// Name in tables: S1, S2, A1 to A5.
@@ -17,7 +17,7 @@ pub struct Plan {
     pub about: &'static str,
     /// Gaussians.
     pub gaussians: usize,
-    /// Image, px.
+    /// Image size, px.
     pub size: (u32, u32),
     /// Timed rounds over all modes.
     pub rounds: usize,
@@ -32,13 +32,13 @@ pub enum Kind {
     Trained,
     /// Axes that differ by 1e4.
     Needles,
-    /// Layers of alpha 0.01 over the whole picture.
+    /// Layers of alpha 0.01 over the whole image.
     Faint,
-    /// Opacities around the clamp of alpha.
+    /// Opacities near the clamp of alpha.
     Opaque,
-    /// Depths of sixteen Gaussians each are equal.
+    /// Groups of sixteen Gaussians with equal depths.
     Ties,
-    /// Trained, 1e4 units from the origin.
+    /// As trained, 1e4 units from the origin.
     Far,
 }
 
@@ -65,7 +65,7 @@ pub fn plans(small: bool) -> Vec<Plan> {
     plans
 }
 
-/// The scene of a plan, without a photo.
+/// Builds the scene of a plan, without a photo.
 pub fn build(plan: &Plan) -> Scene {
     let mut random = generator(1000 + plan.name.bytes().map(u64::from).sum::<u64>());
     // f32 numbers, so that engine and mirror see the same camera.
@@ -84,8 +84,8 @@ pub fn build(plan: &Plan) -> Scene {
     Scene { camera, gaussians, target, frozen: 0 }
 }
 
-/// Gives a scene a photo that differs from its picture by 0.3 or more in every channel: then no kink of the L1 loss is
-/// near, and errors of gradients are those of the kernels. Multiples of 1/255.
+/// Gives a scene a photo that differs from its render by 0.3 or more in every channel, so that no kink of the L1 loss
+/// is near and errors of gradients are the kernels'. Values are multiples of 1/255.
 pub fn set_photo(scene: &mut Scene, picture: &[[f64; 3]]) {
     let away = |value: f64| {
         let value = if value > 0.5 { value.min(1.0) - 0.35 } else { value + 0.35 };
@@ -108,9 +108,9 @@ fn camera((width, height): (u32, u32), eye: DVec3) -> Camera {
     }
 }
 
-/// A Gaussian as the picture sees it.
-struct Drawn {
-    /// Share of the picture's width and height, from a little outside of it.
+/// A Gaussian in image space.
+struct ImageGaussian {
+    /// Position as a share of the image's width and height, extending slightly beyond it.
     at: [f64; 2],
     /// Depth, world units.
     depth: f64,
@@ -120,37 +120,41 @@ struct Drawn {
     opacity: f64,
 }
 
-fn draw(random: &mut Pcg32, kind: Kind, index: usize, count: usize) -> Drawn {
+fn draw(random: &mut Pcg32, kind: Kind, index: usize, count: usize) -> ImageGaussian {
     let at = [0; 2].map(|_| uniform(random, -0.05, 1.05));
     let turn = [0; 3].map(|_| uniform(random, 0.1, 1.0));
     match kind {
         Kind::Trained | Kind::Far => trained(random, at),
         Kind::Needles => {
             let long = 10.0 * normal(random).mul_add(0.5, 0.7).exp();
-            Drawn { at, depth: uniform(random, 2.0, 9.0), deviations: [long, long * 1e-4, long * 1e-4], opacity: 0.9 }
+            ImageGaussian {
+                at,
+                depth: uniform(random, 2.0, 9.0),
+                deviations: [long, long * 1e-4, long * 1e-4],
+                opacity: 0.9,
+            }
         }
         Kind::Faint => {
-            // Sizes and places differ, so that errors of splats differ.
+            // Sizes and positions differ, so that splats have different errors.
             let deviations = turn.map(|share| 60.0 + 60.0 * share);
             let depth = 2.0 + 8.0 * (index as f64 + 0.5) / count as f64;
-            Drawn { at: at.map(|v| 0.3 + 0.4 * v), depth, deviations, opacity: 0.0101 }
+            ImageGaussian { at: at.map(|v| 0.3 + 0.4 * v), depth, deviations, opacity: 0.0101 }
         }
         Kind::Opaque => {
             let opacity = 1.0 - 10.0_f64.powf(uniform(random, -4.0, -1.3));
-            Drawn { at, depth: uniform(random, 2.0, 9.0), deviations: turn.map(|share| 8.0 * share), opacity }
+            ImageGaussian { at, depth: uniform(random, 2.0, 9.0), deviations: turn.map(|share| 8.0 * share), opacity }
         }
         Kind::Ties => {
             let depths = (count / 16).max(1);
             let depth = round(2.0 + 8.0 * (index % depths) as f64 / depths as f64);
-            Drawn { at, depth, deviations: turn.map(|share| 5.0 * share), opacity: uniform(random, 0.1, 0.9) }
+            ImageGaussian { at, depth, deviations: turn.map(|share| 5.0 * share), opacity: uniform(random, 0.1, 0.9) }
         }
     }
 }
 
-/// Median width 2.5 px with a tail to some 25 px, flattened along one axis; opacities from faint to opaque with a
-/// median of 0.6, so that most pixels are opaque, and what is behind is hidden; on one of four sheets, each of which
-/// waves.
-fn trained(random: &mut Pcg32, at: [f64; 2]) -> Drawn {
+/// Median width 2.5 px with a tail to about 25 px, flattened along one axis; opacities from faint to opaque with a
+/// median of 0.6, so that most pixels are opaque and hide what is behind; on one of four wavy sheets.
+fn trained(random: &mut Pcg32, at: [f64; 2]) -> ImageGaussian {
     let width = 2.5 * (0.7 * normal(random)).exp();
     let flat = uniform(random, 0.05, 0.6);
     let second = uniform(random, 0.4, 1.0);
@@ -162,10 +166,15 @@ fn trained(random: &mut Pcg32, at: [f64; 2]) -> Drawn {
     let wave = (7.0 * at[0] + 1.3 * sheet).sin() * (5.0 * at[1] - 0.7 * sheet).cos();
     let depth = (2.0 + 2.5 * sheet + 0.6 * wave) * (1.0 + 0.01 * normal(random));
     let logit = (2.2 * normal(random) + 0.4).clamp(-5.3, 7.0);
-    Drawn { at, depth, deviations: [width, width * second, width * flat], opacity: 1.0 / (1.0 + (-logit).exp()) }
+    ImageGaussian {
+        at,
+        depth,
+        deviations: [width, width * second, width * flat],
+        opacity: 1.0 / (1.0 + (-logit).exp()),
+    }
 }
 
-fn push(out: &mut Gaussians, random: &mut Pcg32, camera: &Camera, eye: DVec3, one: &Drawn) {
+fn push(out: &mut Gaussians, random: &mut Pcg32, camera: &Camera, eye: DVec3, one: &ImageGaussian) {
     let x = (one.at[0] * f64::from(camera.width) - camera.cx) * one.depth / camera.fx;
     let y = (one.at[1] * f64::from(camera.height) - camera.cy) * one.depth / camera.fy;
     out.means.push([x + eye.x, y + eye.y, one.depth + eye.z].map(|v| v as f32));
@@ -177,7 +186,7 @@ fn push(out: &mut Gaussians, random: &mut Pcg32, camera: &Camera, eye: DVec3, on
     (0..15).for_each(|_| out.sh_rest.push([0; 3].map(|_| (0.06 * normal(random)) as f32)));
 }
 
-/// A normal number (Box and Muller).
+/// A normally distributed number (Box and Muller).
 fn normal(random: &mut Pcg32) -> f64 {
     let (radius, angle): (f64, f64) = (random.random_range(f64::EPSILON..1.0), random.random_range(0.0..1.0));
     (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()

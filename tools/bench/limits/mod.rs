@@ -1,8 +1,8 @@
-//! How near each stage of a step comes to the limit of the device.
+//! How close each stage of a step comes to the device's limit.
 //!
-//! The limit of a stage is the larger of its arithmetic by the rate of arithmetic and of its bytes by the rate of a
-//! copy, both measured in the same run, plus the time of dispatches that do nothing. The counts are lower bounds: the work of
-//! the method, not of the kernels, and without that of labels.
+//! The limit of a stage is the larger of two times: its arithmetic divided by the arithmetic rate, and its bytes
+//! divided by the copy rate, both measured in the same run. The time of empty dispatches is added. The counts are lower
+//! bounds: the work of the method, not of the kernels, and without labels.
 
 mod ceilings;
 
@@ -23,12 +23,12 @@ struct Requirement {
     operations: f64,
     exp2: f64,
     divisions: f64,
-    /// Read and written.
+    /// Bytes read and written.
     bytes: f64,
 }
 
 impl Requirement {
-    /// Seconds at least.
+    /// Returns the minimum time, seconds.
     fn seconds(self, c: &Ceilings) -> f64 {
         let arithmetic = self.operations / c.operations + self.exp2 / c.exp2 + self.divisions / c.divisions;
         arithmetic.max(self.bytes / c.bytes)
@@ -45,10 +45,10 @@ struct Step {
     tiles: u32,
 }
 
-/// vec4 of the coefficients of colour above the constant one, at degree 3: 45 floats.
-const HIGHER: f64 = 45.0 / 4.0;
+/// vec4 of the colour coefficients above degree 0, at degree 3: 45 floats.
+const SH_VECS: f64 = 45.0 / 4.0;
 
-/// Work of each stage of a step, for colours of degree 3.
+/// Returns the work of each stage of a step, for colours of degree 3.
 fn need(stage: Stage, s: &Step, digit_bits: u32) -> Requirement {
     let passes = |bits: u32| f64::from(bits.div_ceil(digit_bits));
     let tile_bits = u32::BITS - s.tiles.saturating_sub(1).leading_zeros();
@@ -57,7 +57,7 @@ fn need(stage: Stage, s: &Step, digit_bits: u32) -> Requirement {
         // Means and scales of all; all planes in, three records out of the visible.
         Stage::PROJECT => Requirement {
             operations: 40.0 * s.gaussians + 280.0 * s.splats,
-            bytes: (2.0 * vec4 + 8.0) * s.gaussians + ((7.0 + HIGHER) * vec4 + 8.0) * s.splats,
+            bytes: (2.0 * vec4 + 8.0) * s.gaussians + ((7.0 + SH_VECS) * vec4 + 8.0) * s.splats,
             ..Requirement::default()
         },
         // A pass reads the keys twice and keys and values once, and writes both.
@@ -94,20 +94,20 @@ fn need(stage: Stage, s: &Step, digit_bits: u32) -> Requirement {
         // Coefficients in, and the gradients of them and of their directions out.
         Stage::PROJECT_BACKWARD => Requirement {
             operations: 700.0 * s.splats,
-            bytes: (11.0 + 2.0 * HIGHER) * vec4 * s.splats,
+            bytes: (11.0 + 2.0 * SH_VECS) * vec4 * s.splats,
             ..Requirement::default()
         },
         // All planes of parameters with two moments, read and written, and the gradients of the visible.
         Stage::OPTIMISE => Requirement {
-            operations: 12.0 * 4.0 * (4.0 + HIGHER) * s.gaussians,
-            bytes: (4.0 + HIGHER) * vec4 * (6.0 * s.gaussians + s.splats),
+            operations: 12.0 * 4.0 * (4.0 + SH_VECS) * s.gaussians,
+            bytes: (4.0 + SH_VECS) * vec4 * (6.0 * s.gaussians + s.splats),
             ..Requirement::default()
         },
         _ => Requirement::default(),
     }
 }
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(common: &Common) -> Result<()> {
     let (options, training, timed) = if common.small {
         (SynthOptions { width: 48, height: 40, views: 9, ..Default::default() }, 20, 2)

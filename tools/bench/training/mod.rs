@@ -1,8 +1,8 @@
-//! Quality against processor time: this program at several lengths of a run and with several settings, and another program
-//! if one is named, such as that of an earlier revision.
+//! Quality against CPU time: this program with several run lengths and settings, and another program if given, such as
+//! an earlier revision.
 //!
-//! All train the same scenes from the same seeds in processes of their own, one after another. The scores are those of
-//! this program. Each length of a run is a training of its own, because schedules are fractions of the run.
+//! All train the same scenes from the same seeds in separate processes, one after another. All scores come from this
+//! program. Each run length is a separate training, because schedules are fractions of the run.
 
 pub mod real;
 mod rows;
@@ -12,23 +12,23 @@ use super::Common;
 use super::measure::table;
 use labelgs::synth::{self, Preset, SynthOptions};
 use labelgs::{Error, Result};
-use rows::{Plan, Row, Rows, SceneOf};
+use rows::{Plan, Row, Rows, TrainingScene};
 use std::path::{Path, PathBuf};
 
 /// Name of the other program in tables.
-const OTHER: &str = "other";
+const OTHER_NAME: &str = "other";
 /// Name of this program without further flags.
-const OWN: &str = "this";
+const OWN_NAME: &str = "this";
 
 /// Options of the comparison.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Options {
     #[command(flatten)]
     common: Common,
-    /// Seeds, each a training of every kind and length.
+    /// Seeds; each is a training of every kind and length.
     #[arg(long, value_name = "SEED,SEED", value_delimiter = ',', default_values_t = [0, 1, 2])]
     seeds: Vec<u64>,
-    /// Another labelgs program to compare with, such as one of an earlier revision.
+    /// Another labelgs program to compare with, such as an earlier revision.
     #[arg(long, value_name = "PROGRAM")]
     against: Option<PathBuf>,
     /// Scenes: plain, hard (built in), or FOLDER@PX with the longest side of a photo; with +MASKS, the name of a folder
@@ -41,7 +41,7 @@ pub struct Options {
     /// Steps of the other program.
     #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [3000])]
     against_lengths: Vec<u32>,
-    /// A further kind of training of this program: its name, and its flags after an equals sign. May be repeated.
+    /// Another kind of training of this program: its name, and its flags after an equals sign. May be repeated.
     #[arg(long = "kind", value_name = "NAME=FLAGS")]
     kinds: Vec<String>,
 }
@@ -54,7 +54,7 @@ struct Kind {
     lengths: Vec<u32>,
 }
 
-/// Runs it.
+/// Runs the benchmark.
 pub fn run(options: &Options) -> Result<()> {
     let common = &options.common;
     let own = PathBuf::from(env!("CARGO_BIN_EXE_labelgs"));
@@ -68,8 +68,8 @@ pub fn run(options: &Options) -> Result<()> {
         flags: flags.split_whitespace().map(str::to_owned).collect(),
         lengths: lengths.to_vec(),
     };
-    let mut kinds: Vec<Kind> = options.against.iter().map(|other| kind(OTHER, "", other, &against)).collect();
-    kinds.push(kind(OWN, "", &own, &lengths));
+    let mut kinds: Vec<Kind> = options.against.iter().map(|other| kind(OTHER_NAME, "", other, &against)).collect();
+    kinds.push(kind(OWN_NAME, "", &own, &lengths));
     for text in &options.kinds {
         let (name, flags) = text.split_once('=').unwrap_or((text, ""));
         kinds.push(kind(name, flags, &own, &lengths));
@@ -91,7 +91,7 @@ pub fn run(options: &Options) -> Result<()> {
             }
         }
     }
-    println!("\n{}", table(&table::of(&found, OTHER)));
+    println!("\n{}", table(&table::rows_of(&found, OTHER_NAME)));
     Ok(())
 }
 
@@ -114,8 +114,8 @@ fn line(row: &Row) -> String {
     )
 }
 
-/// Parses a scene; writes a built-in one into `folder`.
-fn scene_of(text: &str, folder: &Path, small: bool) -> Result<SceneOf> {
+/// Parses a scene; writes a built-in one to `folder`.
+fn scene_of(text: &str, folder: &Path, small: bool) -> Result<TrainingScene> {
     let (place, masks) = text.split_once('+').map_or((text, None), |(place, masks)| (place, Some(masks)));
     let (place, size) = place.split_once('@').map_or((place, "0"), |(place, size)| (place, size));
     let max_resolution =
@@ -142,5 +142,5 @@ fn scene_of(text: &str, folder: &Path, small: bool) -> Result<SceneOf> {
             format!("{stem}@{size}{}", masks.map_or(String::new(), |masks| format!("+{masks}")))
         }
     };
-    Ok(SceneOf { name, masks: masks.map(|masks| path.join(masks)), path, max_resolution })
+    Ok(TrainingScene { name, masks: masks.map(|masks| path.join(masks)), path, max_resolution })
 }

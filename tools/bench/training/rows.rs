@@ -1,5 +1,5 @@
-//! Trainings as a user runs them: a program in a process of its own, with the processor time of that process, and the
-//! scores of its model. Rows are kept in a file; those that are there are not measured again.
+//! Trainings as users run them: a program in a separate process, with its CPU time and the scores of its model. Rows
+//! are stored in a file; existing rows are not measured again.
 
 use labelgs::{Error, Result};
 use nix::sys::resource::{UsageWho, getrusage};
@@ -13,7 +13,7 @@ use std::process::Command;
 
 /// A scene to train on.
 #[derive(Clone, Debug)]
-pub struct SceneOf {
+pub struct TrainingScene {
     /// Name in the table.
     pub name: String,
     /// Folder.
@@ -31,7 +31,7 @@ pub struct Row {
     pub program: String,
     /// CRC-32 of the program's file.
     pub build: u32,
-    /// Flags besides those of scene, seed and steps.
+    /// Flags other than scene, seed and steps.
     pub flags: Vec<String>,
     /// Scene.
     pub scene: String,
@@ -39,19 +39,19 @@ pub struct Row {
     pub seed: u64,
     /// Steps.
     pub steps: u32,
-    /// Processor time of the whole process: reading, training, scoring the held-out views once; s.
+    /// CPU time of the whole process: reading, training, scoring the held-out views once; s.
     pub cpu: f64,
     /// Gaussians.
     pub gaussians: u64,
     /// Mean PSNR of the held-out views, dB.
     pub psnr: f64,
-    /// The same after a correction of the colours of each view; rows of earlier programs have none.
+    /// The same after a colour correction per view; rows of earlier programs do not have it.
     pub psnr_corrected: Option<f64>,
-    /// The PSNR over pixels that three training views see.
+    /// PSNR over pixels that three training views see.
     pub psnr_seen: Option<f64>,
     /// The same after a correction of these pixels.
     pub psnr_seen_corrected: Option<f64>,
-    /// The PSNR over the others.
+    /// PSNR over the other pixels.
     pub psnr_unseen: Option<f64>,
     /// Share of the pixels that three training views see.
     pub seen_share: f64,
@@ -61,7 +61,7 @@ pub struct Row {
     pub ssim: f64,
     /// Mean IoU of the label map.
     pub iou_map: Option<f64>,
-    /// Mean IoU of objects alone.
+    /// Mean IoU of isolated objects.
     pub iou_object: Option<f64>,
     /// Mean IoU of the boundaries of the label map.
     #[serde(default)]
@@ -77,7 +77,7 @@ pub struct Row {
     pub device: String,
 }
 
-/// What to train.
+/// A training to run.
 #[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// Name in the table.
@@ -87,7 +87,7 @@ pub struct Plan<'a> {
     /// Further flags.
     pub flags: &'a [String],
     /// Scene.
-    pub scene: &'a SceneOf,
+    pub scene: &'a TrainingScene,
     /// Seed.
     pub seed: u64,
     /// Steps.
@@ -96,7 +96,7 @@ pub struct Plan<'a> {
     pub lpips: Option<&'a Path>,
 }
 
-/// Rows of a file, in which each new row is stored at once.
+/// Rows of a file; each new row is stored at once.
 #[derive(Debug)]
 pub struct Rows {
     path: PathBuf,
@@ -116,7 +116,7 @@ impl Rows {
         Ok(Self { path: path.to_owned(), rows })
     }
 
-    /// Returns the row of a plan; trains and scores if it is not there. `judge` is the program that scores.
+    /// Returns the row of a plan; trains and scores if it is missing. `judge` is the program that scores.
     pub fn row(&mut self, plan: &Plan, judge: &Path) -> Result<Row> {
         let build = crc32fast::hash(&fs::read(plan.program).map_err(Error::read(plan.program))?);
         let is_it = |row: &&Row| {
@@ -139,13 +139,13 @@ impl Rows {
     }
 }
 
-/// Processor time of all finished child processes, s.
+/// Returns the CPU time of all finished child processes, s.
 fn children() -> Result<f64> {
     let used = getrusage(UsageWho::RUSAGE_CHILDREN).map_err(|error| Error::Bug(format!("getrusage: {error}")))?;
     Ok((used.user_time().num_microseconds() + used.system_time().num_microseconds()) as f64 * 1e-6)
 }
 
-/// Runs a program; returns what it prints.
+/// Runs a program and returns its output.
 pub fn program(program: &Path, args: &[&str]) -> Result<String> {
     let output = Command::new(program).args(args).output().map_err(Error::read(program))?;
     if !output.status.success() {

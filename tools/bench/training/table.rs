@@ -1,4 +1,4 @@
-//! Trainings as a table: a line for each kind and length, means over seeds with their range.
+//! Trainings as a table: a line per kind and length, with means and ranges over seeds.
 
 use super::rows::Row;
 
@@ -20,7 +20,7 @@ impl Group<'_> {
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
-    /// Mean, least and most.
+    /// Formats mean, minimum and maximum.
     pub fn cell(&self, digits: usize, of: impl Fn(&Row) -> Option<f64>) -> String {
         let values = self.values(of);
         if values.is_empty() {
@@ -36,7 +36,7 @@ impl Group<'_> {
     }
 }
 
-/// Groups in the order of their first rows.
+/// Groups rows in the order of their first occurrence.
 pub(super) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
     let mut found: Vec<Group> = Vec::new();
     for row in rows {
@@ -49,12 +49,12 @@ pub(super) fn groups(rows: &[Row]) -> Vec<Group<'_>> {
     found
 }
 
-/// The score that decides: PSNR where training can know the picture, else over whole views.
+/// Returns the decisive score: PSNR where training can know the image, otherwise over whole views.
 fn score(row: &Row) -> Option<f64> {
     row.psnr_seen.or(Some(row.psnr))
 }
 
-/// (CPU seconds, score) of a kind on a scene, by length.
+/// Returns (CPU seconds, score) of a kind on a scene, by length.
 fn curve(groups: &[Group], scene: &str, kind: &str) -> Vec<(f64, f64)> {
     let own = groups.iter().filter(|group| (group.scene, group.kind) == (scene, kind));
     let mut curve: Vec<(f64, f64)> =
@@ -63,7 +63,8 @@ fn curve(groups: &[Group], scene: &str, kind: &str) -> Vec<(f64, f64)> {
     curve
 }
 
-/// CPU seconds at which a curve first reaches a score, linear in the logarithm of time; none if it never does.
+/// Returns the CPU seconds at which a curve first reaches a score, linear in the logarithm of time; `None` if it never
+/// does.
 fn reached(curve: &[(f64, f64)], score: f64) -> Option<f64> {
     let mut before: Option<(f64, f64)> = None;
     for &(cpu, found) in curve {
@@ -77,8 +78,9 @@ fn reached(curve: &[(f64, f64)], score: f64) -> Option<f64> {
     None
 }
 
-/// The table. The last column is the time in which a kind reaches the longest training of `other`, relative to it.
-pub fn of(rows: &[Row], other: &str) -> Vec<Vec<String>> {
+/// Returns the table. The last column is the time in which a kind reaches the score of the longest training of `other`,
+/// relative to that training.
+pub fn rows_of(rows: &[Row], other: &str) -> Vec<Vec<String>> {
     let groups = groups(rows);
     let head = [
         "scene",

@@ -1,13 +1,13 @@
-//! Reads and writes SPZ by the crate `spz`, which has nothing in common with labelgs:
-//! `spz-oracle unpack IN.spz OUT.ply`, `spz-oracle pack IN.ply OUT.spz`. The PLY is that of 3DGS, with floats only.
+//! Reads and writes SPZ with the crate `spz`, which is independent of labelgs: `spz-oracle unpack IN.spz OUT.ply`,
+//! `spz-oracle pack IN.ply OUT.spz`. The PLY is a 3DGS PLY with only floats.
 
 use spz::{CoordinateSystem, GaussianSplat, PackOptions, UnpackOptions};
 use std::{env, error::Error, fs};
 
-/// Columns of a 3DGS PLY in front of the harmonics.
-const FIRST: [&str; 6] = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"];
-/// Columns behind them.
-const LAST: [&str; 8] = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
+/// Columns of a 3DGS PLY before the harmonics.
+const COLUMNS_BEFORE_SH: [&str; 6] = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"];
+/// Columns after the harmonics.
+const COLUMNS_AFTER_SH: [&str; 8] = ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = env::args().skip(1).collect();
@@ -23,14 +23,14 @@ fn unpack(from: &str, to: &str) -> Result<(), Box<dyn Error>> {
     let g = GaussianSplat::load_packed_from_file(from, &options)?;
     let count = g.num_points as usize;
     let rest = g.spherical_harmonics.len() / count / 3;
-    let columns = FIRST.map(str::to_owned).into_iter();
-    let columns = columns.chain((0..3 * rest).map(|k| format!("f_rest_{k}"))).chain(LAST.map(str::to_owned));
+    let columns = COLUMNS_BEFORE_SH.map(str::to_owned).into_iter();
+    let columns = columns.chain((0..3 * rest).map(|k| format!("f_rest_{k}"))).chain(COLUMNS_AFTER_SH.map(str::to_owned));
     let properties: String = columns.map(|name| format!("property float {name}\n")).collect();
     let header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n");
     let mut bytes = header.into_bytes();
     for row in 0..count {
         let triple = |values: &[f32]| values[3 * row..][..3].to_vec();
-        // The file has triples of colours, a PLY all of a channel.
+        // The file has triples of colours; a PLY stores them channel by channel.
         let harmonic = |k: usize| g.spherical_harmonics[3 * (row * rest + k % rest) + k / rest];
         let [x, y, z, w] = [0, 1, 2, 3].map(|k| g.rotations[4 * row + k]);
         let values = [triple(&g.positions), triple(&g.colors), (0..3 * rest).map(harmonic).collect()];
@@ -59,11 +59,11 @@ fn pack(from: &str, to: &str) -> Result<(), Box<dyn Error>> {
         num_points: (floats.len() / columns.len()) as i32,
         spherical_harmonics_degree: ((rest + 1) as f64).sqrt() as i32 - 1,
         antialiased: false,
-        positions: named(&FIRST[..3])?,
-        colors: named(&FIRST[3..])?,
+        positions: named(&COLUMNS_BEFORE_SH[..3])?,
+        colors: named(&COLUMNS_BEFORE_SH[3..])?,
         spherical_harmonics: of(&harmonics)?,
-        alphas: named(&LAST[..1])?,
-        scales: named(&LAST[1..4])?,
+        alphas: named(&COLUMNS_AFTER_SH[..1])?,
+        scales: named(&COLUMNS_AFTER_SH[1..4])?,
         rotations: named(&["rot_1", "rot_2", "rot_3", "rot_0"])?,
     };
     g.save_as_packed(to, &PackOptions::builder().from(CoordinateSystem::RDF).build())?;
