@@ -13,6 +13,7 @@ pub mod label_table;
 pub mod names;
 pub mod npy;
 pub mod photo_files;
+pub mod program;
 pub mod read;
 pub mod resize;
 pub mod run_folder;

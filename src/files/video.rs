@@ -1,15 +1,15 @@
 //! Encodes videos with ffmpeg, a separate program, so that no encoder is linked.
 
 use super::atomic;
+use super::program::FFMPEG;
 use labelgs_scene::{Error, Result};
-use std::env;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::{self, JoinHandle};
 
 /// Name of the encoder program.
-const ENCODER_NAME: &str = "ffmpeg";
+const ENCODER_NAME: &str = FFMPEG.name;
 /// Most bytes kept of the encoder's messages.
 const MESSAGE_BYTES_MAX: u64 = 4096;
 
@@ -20,10 +20,12 @@ pub type FrameSink<'a> = dyn FnMut(&[[u8; 3]]) -> Result<()> + 'a;
 pub fn find_encoder(path: &Path) -> Result<PathBuf> {
     let name = format!("{ENCODER_NAME}{}", env::consts::EXE_SUFFIX);
     let folders = env::var_os("PATH").unwrap_or_default();
-    env::split_paths(&folders).map(|folder| folder.join(&name)).find(|file| file.is_file()).ok_or_else(|| {
+    env::split_paths(&folders).map(|folder| folder.join(&name)).find().ok_or_else(|| {
         let problem = format!(
             "{ENCODER_NAME} makes videos, but is in no folder of PATH; install it (on Debian and Ubuntu: apt-get install \
-             {ENCODER_NAME}), or name a folder, which gets a PNG for each frame"
+             {ENCODER_NAME}), or name a folder, which gets a PNG for each frame, or \
+             install it ({})",
+            FFMPEG.how_to_install()
         );
         Error::write(path)(io::Error::new(ErrorKind::NotFound, problem))
     })
