@@ -162,7 +162,8 @@ fn the_scheduler_is_the_engines_own() {
     assert_eq!(found.map(|(path, _)| path).collect::<Vec<_>>(), Vec::<PathBuf>::new());
 }
 
-/// The command line alone knows flags and commands; a message of the library has a [`labelgs::Setting`].
+/// The command line alone knows flags and commands; a message of the library has a [`labelgs::Setting`], or a
+/// `Verb`.
 #[test]
 fn the_library_speaks_of_no_flags() {
     let root = labelgs::cli::command::command();
@@ -205,6 +206,7 @@ fn settings_in_messages_are_typed() {
     let mut flags = std::collections::BTreeSet::new();
     fields(&labelgs::cli::command::command(), &mut flags);
     flags.extend(labelgs::run::Settings::keys().map(|key| key.name.to_owned()));
+    let commands = labelgs::cli::command::command();
     let mut wrong = Vec::new();
     for (path, text) in files("src", &["rs"]) {
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
@@ -213,6 +215,9 @@ fn settings_in_messages_are_typed() {
             let place = |what: &str| format!("{}:{}: {what}", path.display(), at + 1);
             let typed = line.split("Setting(\"").skip(1).filter_map(|rest| rest.split('"').next());
             wrong.extend(typed.filter(|name| !flags.contains(*name)).map(|name| place(&format!("no flag is {name}"))));
+            let verbs = line.split("Verb(\"").skip(1).filter_map(|rest| rest.split('"').next());
+            let unknown = verbs.filter(|name| commands.find_subcommand(name).is_none());
+            wrong.extend(unknown.map(|name| place(&format!("no command is {name}"))));
             let plain = line.split("usage(\"").skip(1).filter_map(|rest| rest.split('"').next());
             let quoted = line.split('`').skip(1).step_by(2).map(|words| words.split(" = ").next().unwrap_or_default());
             let plain = plain.chain(quoted).filter(|name| flags.contains(*name) && !PLAIN.contains(name));

@@ -2,7 +2,7 @@
 
 mod setting;
 
-pub use setting::Setting;
+pub use setting::speak_of;
 pub use setting::name_settings;
 
 use std::path::{Path, PathBuf};

@@ -73,4 +73,10 @@ mod tests {
         assert_eq!(of(unknown, " = 5"), ["`label_samples = 5`", "label samples = 5"]);
         assert_eq!(String::from(known), "max_gaussians", "at the head of a message");
     }
+
+    #[test]
+    fn a_command_is_typed_in_the_command_line_alone() {
+        let of = |is_command_line| Verb("photos").typed(is_command_line, "DIR -o SCENE");
+        assert_eq!([true, false].map(of), ["`labelgs photos DIR -o SCENE`", "the command `photos` of labelgs"]);
+    }
 }
