@@ -2,7 +2,7 @@
 
 use crate::cli::commands::{
     ablate, benchmark, blocks, check, clean, convert, devices, edit, eval, extract_remove, frames, kernels, label,
-    list, masks, merge, occlusion, plan, profile, recolour, relabel, render, report, selftest, simplify,
+    list, masks, merge, occlusion, photos, plan, profile, recolour, relabel, render, report, selftest, simplify,
     split_components, synth, train, transform, view,
 };
 use crate::cli::support::{Context, GlobalArgs, settings};
@@ -40,6 +40,11 @@ pub enum Command {
     ///
     /// Example: labelgs synth scene
     Synth(synth::SynthArgs),
+    /// Make a scene of photos without poses, or of a video: COLMAP finds lens, poses and points. COLMAP, and ffmpeg for a
+    /// video, are programs that you install.
+    ///
+    /// Example: labelgs photos pictures -o scene
+    Photos(photos::PhotosArgs),
     /// Train a model of a scene from its photos. With masks, each Gaussian knows its object.
     ///
     /// Example: labelgs train scene --masks scene/masks --iterations 3000 -o out
@@ -174,6 +179,7 @@ impl Command {
     pub(super) fn run(&self, context: &Context) -> Result<()> {
         match self {
             Self::Synth(args) => synth::run(args, context),
+            Self::Photos(args) => photos::run(args, context),
             Self::Train(args) => train::run(args, context),
             Self::Eval(args) => eval::run(args, context),
             Self::List(args) => list::run(args, context),

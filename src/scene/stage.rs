@@ -33,4 +33,10 @@ impl Stage {
     pub fn count(&self) {
         self.span.record("done", self.done.fetch_add(1, Relaxed) + 1);
     }
+
+    /// So many items are done by now; fewer than before change nothing.
+    pub fn reach(&self, done: usize) {
+        let done = done as u64;
+        self.span.record("done", self.done.fetch_max(done, Relaxed).max(done));
+    }
 }

@@ -8,6 +8,7 @@ use super::split::SceneSplit;
 use super::{colmap, llff, metashape, transforms};
 use labelgs_files::content::{self, Content};
 use labelgs_files::names::shortened;
+use labelgs_scene::error::Verb;
 use labelgs_scene::words::counted;
 use labelgs_scene::{Error, Result, SceneProblem, Setting};
 use std::collections::BTreeSet;
@@ -15,6 +16,9 @@ use std::path::{Path, PathBuf};
 
 /// If at most one of this many photos in a folder has no pose, there is no note: programs that find poses drop some.
 const UNPOSED_ONE_OF: usize = 10;
+
+/// Makes a scene of photos without poses, as [`super::reconstruction`] does.
+const MAKE_SCENE: Verb = Verb("photos");
 
 /// Returns the folder of a scene, given the folder or one file in it.
 pub(super) fn folder_of(scene: &Path) -> &Path {
@@ -92,9 +96,10 @@ fn list_folder(place: &SceneFolder, scene: &Path) -> Result<Listing> {
         .to_owned();
     if let Some((folder, count)) = place.photos.most_photos() {
         problem += &format!(
-            ". {} holds {count} photos without poses: `tools/photos {} -o SCENE` finds the poses with COLMAP",
+            ". {} holds {} without poses: {} finds the poses with COLMAP",
             folder.display(),
-            folder.display()
+            counted(count, "photo"),
+            MAKE_SCENE.with(format!("{} -o SCENE", folder.display()))
         );
     }
     Err(Error::data(scene, "", problem))
@@ -153,7 +158,8 @@ fn without_pose(listing: &Listing) -> Option<String> {
 fn no_scene(content: Content) -> String {
     let Content { what, .. } = content;
     if what.starts_with("a video") {
-        return format!("is {what}, not a scene: `tools/photos VIDEO -o SCENE` makes one of it with COLMAP");
+        let make = MAKE_SCENE.with("VIDEO -o SCENE");
+        return format!("is {what}, not a scene: {make} makes one of it with COLMAP");
     }
     format!("is {what}, not a scene; name the folder of a scene, or its transforms.json, poses_bounds.npy or .xml")
 }

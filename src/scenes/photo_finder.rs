@@ -29,6 +29,11 @@ pub fn is_readable(path: &Path) -> bool {
     extension_is_of(path, &READABLE_EXTENSIONS)
 }
 
+/// Returns true for the name of a photo of a kind that cannot be read.
+pub fn is_unreadable(path: &Path) -> bool {
+    extension_is_of(path, &UNREADABLE)
+}
+
 fn extension_is_of(path: &Path, extensions: &[&str]) -> bool {
     let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
     extensions.iter().any(|known| known.eq_ignore_ascii_case(extension))

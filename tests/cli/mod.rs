@@ -11,6 +11,8 @@ mod long_training; // bit-identical results over 1,000 steps
 mod masks; // import, check and spoil masks from the command line
 mod motion; // cameras along a path and around an object, the sheet of labels
 mod objects; // an object on a turntable, trained alone
+#[cfg(unix)]
+mod photos; // photos without poses and videos become scenes, or a message
 mod resume; // killed, stopped and damaged runs resume to the same bits
 mod segmenter; // from photos to an object, with a segmenter in Python
 mod surroundings; // odd names, locales, closed streams, links, little memory

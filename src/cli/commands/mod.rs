@@ -17,6 +17,7 @@ pub(crate) mod list;
 pub(crate) mod masks;
 pub(crate) mod merge;
 pub(crate) mod occlusion;
+pub(crate) mod photos;
 pub(crate) mod plan;
 pub mod profile;
 pub(crate) mod recolour;

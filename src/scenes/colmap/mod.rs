@@ -114,6 +114,27 @@ pub fn list(scene: &SceneFolder) -> Result<Option<Listing>> {
     Ok(Some(Listing { views, points, notes, flaws, bad, ..Listing::new(&files.needed("images")?.0, Native::COLMAP) }))
 }
 
+/// What a model holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Contents {
+    /// Names of the photos that have poses, in the order of the file.
+    pub photos: Vec<String>,
+    /// Number of points.
+    pub points: usize,
+}
+
+/// Returns what the model in a folder holds; `None` if that holds no model.
+pub fn contents(folder: &Path) -> Result<Option<Contents>> {
+    let files = Files { folder: folder.to_owned() };
+    let Some((images, is_binary)) = files.path("images") else { return Ok(None) };
+    let images = match is_binary {
+        true => binary::images(&images, false)?,
+        false => text::images(&images, false)?.into_iter().collect::<Result<_>>()?,
+    };
+    let points = files.points(&mut Vec::new())?.map_or(0, |points| points.len());
+    Ok(Some(Contents { photos: images.into_iter().map(|image| image.name).collect(), points }))
+}
+
 /// Reads the points that a trainer wrote beside the model, if the model has none.
 fn points_of_ply(folder: &Path, notes: &mut Vec<String>) -> Result<Vec<Point>> {
     let path = folder.join("points3D.ply");

@@ -108,8 +108,8 @@ fn a_folder_of_photos_and_a_video_are_answered_with_the_way_to_poses() {
     let scene = Scene::new();
     scene.photo("pictures/a.png", 12, 8);
     let text = refusal(open(&scene));
-    assert!(text.contains("pictures holds 1 photos without poses") && text.contains("tools/photos"), "{text}");
+    assert!(text.contains("pictures holds 1 photo without poses: the command `photos`"), "{text}");
     let video = scene.write("clip.mp4", b"\0\0\0\x20ftypisom\0\0\x02\0isomiso2");
     let text = refusal(scenes::open(&video, &LoadOptions::default()));
-    assert!(text.contains("a video") && text.contains("tools/photos"), "{text}");
+    assert!(text.contains("a video") && text.contains("the command `photos`"), "{text}");
 }
