@@ -117,6 +117,11 @@ impl Evidence {
         }
     }
 
+    /// Returns the share of the views of the surface in question among these and those of the removed object.
+    pub(super) fn share(&self) -> f64 {
+        f64::from(self.own) / f64::from((self.own + self.removed).max(1))
+    }
+
     /// Returns what the views show together.
     pub(super) fn state(&self) -> State {
         let other = self.surface + self.through;

@@ -6,9 +6,11 @@
 //! err, as they do at contours). Planes are fitted
 //! to what the views show around the object. New flat Gaussians stand on these planes, only in holes between seen
 //! ones, so that they cover nothing that a view has seen. Their colours continue those around them, and a pattern that
-//! repeats there, such as tiles. Where the scene has
-//! one strong [`Light`], the shadow of the object on these planes goes with it.
+//! repeats there, such as tiles. Where there is a pattern, the plane's own Gaussians are copied into the hole too, from
+//! places whole periods away. Where the scene has one strong [`Light`], the shadow of the object on these planes goes with
+//! it.
 
+mod copied;
 mod evidence;
 mod hidden;
 mod light;
@@ -21,6 +23,7 @@ pub use light::Light;
 
 use super::select::{MIN_LABEL_CONFIDENCE, remove};
 use crate::nearest::tree;
+use copied::{Sources, Target};
 use glam::{DMat3, DQuat, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use labelgs_scene::harmonics::sh0_of;
@@ -38,9 +41,13 @@ pub const SIGHT_SIDE: u32 = 640;
 /// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal, and its
 /// least width, in cells.
 const RING: (f64, f64) = (0.25, 8.0);
-/// Width of the ring in which a pattern is looked for, in the same measures, and cells across it and the object.
+/// Width of the ring in which a pattern is looked for, in the same measures, the length of the object that counts there, in
+/// its widths, and the root of the number of cells.
 const PATTERN_RING: (f64, f64) = (0.75, 96.0);
+const LENGTH_OF_WIDTH: f64 = 2.0;
 const PATTERN_CELLS: f64 = 192.0;
+/// Fewest cells of a hole in which a pattern goes on: the search takes time, and in fewer it cannot be told.
+const PATTERN_HOLE_MIN: usize = 81;
 /// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
 const BLOCKER_SHARE_MAX: f64 = 0.25;
 /// Most points that one surface is looked for among.
@@ -152,14 +159,22 @@ impl Seen<'_> {
             return;
         }
         let (wide, cell) = place.wide();
-        let (around, their_shadows) = self.look(&wide, surface, cell);
-        let colours = around.lit(their_shadows.as_ref());
-        let pattern = Pattern::of(&around, &colours);
-        let added = sheet.painted(&holes, shadows.as_ref(), pattern.as_ref());
-        if !added.is_empty() {
-            *filled.added.entry(sheet.label).or_default() += added.len() as u64;
-            append(&mut filled.model, (&sheet.plane, place.cell), &added, sheet.label);
+        let found = (holes.len() >= PATTERN_HOLE_MIN).then(|| self.look(&wide, surface, cell));
+        let lit = found.as_ref().map_or_else(Vec::new, |(around, shadows)| around.lit(shadows.as_ref()));
+        let detail = found.as_ref().map_or_else(Vec::new, |(around, _)| around.detail(&lit));
+        let pattern = found.as_ref().and_then(|(around, _)| Pattern::of(around, &lit, &detail));
+        let painted = sheet.painted(&holes, shadows.as_ref(), pattern.as_ref());
+        if painted.is_empty() {
+            return;
         }
+        // Flat ones close the gaps between copies.
+        let mut new = flat(&filled.model, (&sheet.plane, place.cell), &painted, sheet.label);
+        if let (Some(pattern), Some((around, shadows))) = (&pattern, &found) {
+            let target = Target { sheet: &sheet, holes: &holes, shadows: shadows.as_ref() };
+            new.append(Sources::of(around, pattern).copies(&filled.model, is_lit.len(), &target));
+        }
+        *filled.added.entry(sheet.label).or_default() += new.len() as u64;
+        filled.model.append(new);
     }
 }
 
@@ -223,8 +238,13 @@ impl Place {
 
     /// Returns the place with a ring in which a pattern is looked for, and the size of the cells there.
     fn wide(&self) -> (Self, f64) {
-        let ring = (PATTERN_RING.0 * self.size()).max(PATTERN_RING.1 * self.cell);
-        let cell = self.cell.max((self.size() + 2.0 * ring) / PATTERN_CELLS);
+        let mut sides = (self.high - self.low).to_array();
+        sides.sort_unstable_by(f64::total_cmp);
+        // Along a long thin object, as much as across it is enough.
+        let size = self.size().min(LENGTH_OF_WIDTH * sides[1]);
+        let ring = (PATTERN_RING.0 * size).max(PATTERN_RING.1 * self.cell);
+        let area = (sides[1] + 2.0 * ring) * (sides[2] + 2.0 * ring);
+        let cell = self.cell.max(area.sqrt() / PATTERN_CELLS);
         (Self { ring, tree: Arc::clone(&self.tree), discs: Vec::new(), ..*self }, cell)
     }
 
@@ -288,13 +308,13 @@ impl Sight {
     }
 }
 
-/// Adds flat Gaussians on a plane.
-fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) {
+/// Returns flat Gaussians on a plane, with the columns of a model.
+fn flat(model: &Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) -> Gaussians {
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
     let quat = [turn.w, turn.x, turn.y, turn.z].map(|value| value as f32);
     let scale = [SPREAD.0, SPREAD.0, SPREAD.1].map(|share| (share * cell).ln() as f32);
     let count = places.len();
-    model.append(Gaussians {
+    Gaussians {
         means: places.iter().map(|(world, _)| (*world - model.origin).as_vec3().to_array()).collect(),
         quats: vec![quat; count],
         scales: vec![scale; count],
@@ -304,5 +324,5 @@ fn append(model: &mut Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3,
         labels: Some(vec![label; count]),
         label_confidence: Some(vec![1.0; count]),
         ..Gaussians::default()
-    });
+    }
 }

@@ -23,6 +23,8 @@ const DEVIATION_MIN: f64 = 0.012;
 /// Shortest period, in cells, and least likeness of two copies at a first guess.
 const PERIOD_MIN: f64 = 4.0;
 const GUESS_MIN: f64 = 0.2;
+/// Parts of the way to a guess between which the plane is compared too.
+const WAY_PARTS: isize = 8;
 /// Most guesses.
 const GUESSES_MAX: usize = 24;
 /// Least angle between two periods, as its sine.
@@ -39,7 +41,7 @@ const FORETOLD_MIN: f64 = 0.15;
 /// Steps of the last adjustment of periods, in cells.
 const ADJUSTMENTS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
-/// The colours of a plane in the light, as far as they are seen, on a grid of cells.
+/// The detail of a plane's colours in the light, as far as they are seen, on a grid of cells.
 struct Seen<'a> {
     sheet: &'a Sheet,
     colours: &'a [Option<DVec3>],
@@ -131,8 +133,13 @@ impl<'a> Seen<'a> {
             own >= GUESS_MIN && around.into_iter().all(|beside| value(beside) <= own)
         };
         let is_far = |[x, y]: [isize; 2]| DVec2::new(x as f64, y as f64).length() >= PERIOD_MIN;
+        // What is alike all the way there is so for its slow changes alone.
+        let is_beyond = |[x, y]: [isize; 2]| {
+            let between = (1..WAY_PARTS).map(|part| value([x * part / WAY_PARTS, y * part / WAY_PARTS]));
+            value([x, y]) - between.fold(f64::INFINITY, f64::min) >= FALL_MIN
+        };
         let mut found: Vec<[isize; 2]> =
-            (0..all.len() as isize).map(offset).filter(|&at| is_far(at) && is_peak(at)).collect();
+            (0..all.len() as isize).map(offset).filter(|&at| is_far(at) && is_peak(at) && is_beyond(at)).collect();
         found.sort_by(|&a, &b| value(b).total_cmp(&value(a)).then(a.cmp(&b)));
         found.truncate(GUESSES_MAX);
         found.into_iter().map(|[x, y]| DVec2::new(x as f64, y as f64)).collect()
@@ -229,12 +236,13 @@ pub(super) struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    /// Finds the pattern of a plane by its colours in the light; `None` if it has none that foretells what is seen.
-    pub(super) fn of(sheet: &'a Sheet, colours: &'a [Option<DVec3>]) -> Option<Self> {
-        let rough = Seen::new(sheet, colours, GUESS_SAMPLES);
-        if rough.roughness() < DEVIATION_MIN * DEVIATION_MIN {
+    /// Finds the pattern of a plane by its colours in the light, `lit`, and their detail; `None` if it has none that foretells
+    /// what is seen.
+    pub(super) fn of(sheet: &'a Sheet, lit: &[Option<DVec3>], colours: &'a [Option<DVec3>]) -> Option<Self> {
+        if Seen::new(sheet, lit, GUESS_SAMPLES).roughness() < DEVIATION_MIN * DEVIATION_MIN {
             return None;
         }
+        let rough = Seen::new(sheet, colours, GUESS_SAMPLES);
         let periods = rough.periods()?;
         let seen = Seen::new(sheet, colours, SAMPLES);
         let offsets = seen.matches(periods);
@@ -257,6 +265,21 @@ impl<'a> Pattern<'a> {
             && least <= likeness - FALL_MIN
             && foretold >= FORETOLD_MIN;
         is_one.then_some(pattern)
+    }
+
+    /// Returns the colours by which it was found.
+    pub(super) fn colours(&self) -> &'a [Option<DVec3>] {
+        self.seen.colours
+    }
+
+    /// Returns its offsets, in cells.
+    pub(super) fn offsets(&self) -> impl Iterator<Item = DVec2> {
+        self.offsets.iter().map(|&(offset, _)| offset)
+    }
+
+    /// Returns the colour at an offset from a cell; `None` if nothing is seen there.
+    pub(super) fn seen_at(&self, index: usize, offset: DVec2) -> Option<DVec3> {
+        self.seen.colour(self.seen.cell(index) + offset)
     }
 
     /// Returns the share of the variance of what is seen that is gone without the pattern.

@@ -12,6 +12,11 @@ use rayon::prelude::*;
 const BOUNDED_MIN: usize = 6;
 /// Most cells along a side.
 const SIDE_MAX: usize = 1024;
+/// Least share of the views that tell of a cell in which a surface is shown, rather than the removed object, for its colour to go
+/// on elsewhere: at the foot of an object few views shape what is there, and it has some of its colour.
+const OWN_SHARE_MIN: f64 = 0.65;
+/// Distance within which the mean of colours is what changes slowly, in cells.
+const SLOW_CELLS: usize = 32;
 /// Rounds and over-relaxation of the colours.
 const ROUNDS: usize = 600;
 const RELAXATION: f64 = 1.9;
@@ -29,6 +34,8 @@ pub(super) struct Sheet {
     states: Vec<State>,
     /// Mean colour over the views that show it; `None` where none does.
     pub colours: Vec<Option<DVec3>>,
+    /// Whether enough views show a cell for its colour to go on elsewhere.
+    is_shown: Vec<bool>,
 }
 
 /// Steps to the cells beside one.
@@ -61,10 +68,11 @@ impl Sheet {
         }
         let cells = |axis: usize| (((high[axis] - low[axis]) / cell).ceil() as usize).clamp(1, SIDE_MAX);
         let (width, height) = (cells(0), cells(1));
-        let (states, colours) = (Vec::new(), Vec::new());
-        let mut sheet = Self { plane, cell, corner: low, width, height, label, states, colours };
+        let (states, colours, is_shown) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sheet = Self { plane, cell, corner: low, width, height, label, states, colours, is_shown };
         let look = |index: usize| sheet.look(sheet.place(index), label, removed, sights);
-        (sheet.states, sheet.colours) = (0..width * height).into_par_iter().map(look).unzip();
+        let looks: (Vec<State>, (Vec<_>, Vec<_>)) = (0..width * height).into_par_iter().map(look).unzip();
+        (sheet.states, (sheet.colours, sheet.is_shown)) = looks;
         sheet
     }
 
@@ -96,8 +104,8 @@ impl Sheet {
         is_inside.then(|| y as usize * self.width + x as usize)
     }
 
-    /// Returns the state of a place on the surface of a label, and its colour.
-    fn look(&self, world: DVec3, label: u32, removed: &[u32], sights: &[Sight]) -> (State, Option<DVec3>) {
+    /// Returns the state of a place on the surface of a label, its colour, and whether enough views show it.
+    fn look(&self, world: DVec3, label: u32, removed: &[u32], sights: &[Sight]) -> (State, (Option<DVec3>, bool)) {
         let (mut evidence, mut sum, mut count) = (Evidence::default(), DVec3::ZERO, 0.0);
         for sight in sights {
             let Some((index, shown)) = evidence.add(world, (&self.plane, label), self.cell, removed, sight) else {
@@ -115,7 +123,7 @@ impl Sheet {
         }
         let state = evidence.state();
         let colour = (state == State::Seen && count > 0.0).then(|| sum / count);
-        (state, colour)
+        (state, (colour, evidence.share() >= OWN_SHARE_MIN))
     }
 
     /// Returns the cells of the holes that seen surface surrounds. What was closed bounds the next ones: a hole beside another
@@ -138,6 +146,11 @@ impl Sheet {
         closed
     }
 
+    /// Returns true for a cell of the surface that views show.
+    pub(super) fn is_seen(&self, index: usize) -> bool {
+        self.states[index] == State::Seen
+    }
+
     /// Returns positions and colours of some cells. `shadows` on the sheet change the colours, and a pattern of it goes on.
     pub(super) fn painted(
         &self,
@@ -146,7 +159,9 @@ impl Sheet {
         pattern: Option<&Pattern>,
     ) -> Vec<(DVec3, DVec3)> {
         let Some(colours) = self.continued(shadows, pattern) else { return Vec::new() };
-        cells.iter().map(|&index| (self.place(index), colours[index])).collect()
+        let after = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.after(index));
+        let shaded = |index: usize| (colours[index] * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
+        cells.iter().map(|&index| (self.place(index), shaded(index))).collect()
     }
 
     /// Returns true if there is seen surface in most directions, before anything free.
@@ -158,20 +173,29 @@ impl Sheet {
         STEPS_AROUND.iter().filter(meets).count() >= BOUNDED_MIN
     }
 
-    /// Returns the colours without any shadow, but for those at edges of shadows if there are others.
+    /// Returns the colours without any shadow, but for those at edges of shadows, and those that few views show, if there are
+    /// others.
     pub(super) fn lit(&self, shadows: Option<&Shadows>) -> Vec<Option<DVec3>> {
-        let Some(shadows) = shadows else { return self.colours.clone() };
-        let lit = |index: usize| self.colours[index].map(|colour| colour / shadows.before(index));
-        let sure = |index: usize| lit(index).filter(|_| !shadows.is_unsure(index));
         let cells = 0..self.colours.len();
-        let found: Vec<Option<DVec3>> = cells.clone().map(sure).collect();
-        if found.iter().any(Option::is_some) { found } else { cells.map(lit).collect() }
+        let before = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.before(index));
+        let lit: Vec<Option<DVec3>> =
+            cells.clone().map(|index| self.colours[index].map(|colour| colour / before(index))).collect();
+        let is_unsure = |index: usize| shadows.is_some_and(|shadows| shadows.is_unsure(index));
+        let sure = |index: usize| lit[index].filter(|_| self.is_shown[index] && !is_unsure(index));
+        let found: Vec<Option<DVec3>> = cells.map(sure).collect();
+        if found.iter().any(Option::is_some) { found } else { lit }
+    }
+
+    /// Returns colours without what changes slowly.
+    pub(super) fn detail(&self, colours: &[Option<DVec3>]) -> Vec<Option<DVec3>> {
+        let slow = means(self, colours, SLOW_CELLS);
+        colours.iter().zip(slow).map(|(&colour, slow)| Some(colour? - slow?)).collect()
     }
 
     /// Returns a colour for each cell: where none is known, the smoothest continuation (each the mean of its four
-    /// neighbours, free cells left out) of what a pattern leaves, with the pattern. `None` without any known colour. What has
-    /// a shadow continues as if it had none, and has that of the rest in the end.
-    fn continued(&self, shadows: Option<&Shadows>, pattern: Option<&Pattern>) -> Option<Vec<DVec3>> {
+    /// neighbours, free cells left out) of what a pattern leaves, with the pattern; all without shadows. `None` without any
+    /// known colour.
+    pub(super) fn continued(&self, shadows: Option<&Shadows>, pattern: Option<&Pattern>) -> Option<Vec<DVec3>> {
         let added = |index: usize| pattern.map_or(DVec3::ZERO, |pattern| pattern.at(self.place(index)));
         let added: Vec<DVec3> = (0..self.colours.len()).into_par_iter().map(added).collect();
         let lit = self.lit(shadows).into_iter().zip(&added);
@@ -196,9 +220,34 @@ impl Sheet {
                 colours[*index] = old + RELAXATION * (goal - old);
             }
         }
-        let after = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.after(index));
-        let shaded =
-            |(index, colour): (usize, DVec3)| ((colour + added[index]) * after(index)).clamp(DVec3::ZERO, DVec3::ONE);
-        Some(colours.into_iter().enumerate().map(shaded).collect())
+        Some(colours.into_iter().zip(added).map(|(colour, added)| colour + added).collect())
     }
+}
+
+/// Returns the mean of the colours within a square of cells around each.
+pub(super) fn means(sheet: &Sheet, colours: &[Option<DVec3>], radius: usize) -> Vec<Option<DVec3>> {
+    let (width, height) = (sheet.width, sheet.height);
+    // Sums of all above and to the left.
+    let mut sums = vec![(DVec3::ZERO, 0.0); (width + 1) * (height + 1)];
+    for y in 0..height {
+        let mut row = (DVec3::ZERO, 0.0);
+        for x in 0..width {
+            if let Some(colour) = colours[y * width + x] {
+                row = (row.0 + colour, row.1 + 1.0);
+            }
+            let above = sums[y * (width + 1) + x + 1];
+            sums[(y + 1) * (width + 1) + x + 1] = (above.0 + row.0, above.1 + row.1);
+        }
+    }
+    let mean = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let (left, right) = (x.saturating_sub(radius), (x + radius + 1).min(width));
+        let (top, bottom) = (y.saturating_sub(radius), (y + radius + 1).min(height));
+        let at = |x: usize, y: usize| sums[y * (width + 1) + x];
+        let corners = [at(right, bottom), at(left, top), at(left, bottom), at(right, top)];
+        let sum = corners[0].0 + corners[1].0 - corners[2].0 - corners[3].0;
+        let count = corners[0].1 + corners[1].1 - corners[2].1 - corners[3].1;
+        (count > 0.0).then(|| sum / count)
+    };
+    (0..colours.len()).into_par_iter().map(mean).collect()
 }

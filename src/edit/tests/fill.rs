@@ -5,6 +5,8 @@ use labelgs_edit::{Filled, Light, Sight, fill};
 use labelgs_scene::harmonics::SH_C0;
 use labelgs_scene::{Camera, Gaussians, LabelMap};
 
+mod patterns;
+
 /// Radius of a dome, label 1, that stands on the plane z = 0, label 0.
 const RADIUS: f64 = 0.4;
 const SIDE: u32 = 200;
@@ -88,6 +90,11 @@ fn sight_of(camera: Camera, under: Under, plane: impl Fn(DVec3) -> [f64; 3]) -> 
 
 /// A model of the dome, and of the plane without its disc.
 fn model(origin: DVec3) -> Gaussians {
+    model_of(origin, 20)
+}
+
+/// The same with so many Gaussians of the plane on either side.
+fn model_of(origin: DVec3, side: i32) -> Gaussians {
     let mut means = Vec::new();
     let mut labels = Vec::new();
     for (turn, height) in (0..100).flat_map(|turn| (0..26).map(move |height| (turn, height))) {
@@ -95,7 +102,7 @@ fn model(origin: DVec3) -> Gaussians {
         means.push(RADIUS * DVec3::new(angle.cos() * up.cos(), angle.sin() * up.cos(), up.sin()));
         labels.push(1);
     }
-    for (x, y) in (-20..=20).flat_map(|x| (-20..=20).map(move |y| (x, y))) {
+    for (x, y) in (-side..=side).flat_map(|x| (-side..=side).map(move |y| (x, y))) {
         let place = DVec3::new(f64::from(x), f64::from(y), 0.0) * 0.05;
         if place.length() > RADIUS {
             means.push(place);
@@ -297,62 +304,4 @@ fn the_shadow_of_the_rest_stays() {
     let light = Light { towards: sun(), shade: DVec3::splat(SHADE) };
     let filled = fill(&whole, &[1], &in_the_sun(), Some(&light)).expect("filled");
     assert_eq!(filled.lit, 0);
-}
-
-/// Edge of a tile, and how dark stains are.
-const TILE: f64 = 0.23;
-const STAIN: f64 = 0.05;
-
-/// Tiles in a turned grid, with light that falls off and stains that never repeat.
-fn tiles(place: DVec3) -> [f64; 3] {
-    let turned = DMat3::from_rotation_z(0.4) * place;
-    let is_odd = ((turned.x / TILE).floor() + (turned.y / TILE).floor()).rem_euclid(2.0) == 1.0;
-    let stain = STAIN * ((7.0 * place.x + 1.0).sin() * (11.0 * place.y + 3.0 * place.x).sin());
-    let light = 0.05 * place.x + stain;
-    if is_odd { [0.7 + light, 0.6 + light, 0.5 + light] } else { [0.3 + light, 0.35 + light, 0.4 + light] }
-}
-
-/// Stripes of one width.
-fn stripes(place: DVec3) -> [f64; 3] {
-    let is_odd = ((0.8 * place.x + 0.6 * place.y) / 0.12).floor().rem_euclid(2.0) == 1.0;
-    [if is_odd { 0.7 } else { 0.3 }; 3]
-}
-
-/// Blots that never repeat.
-fn blots(place: DVec3) -> [f64; 3] {
-    let cell = (place / 0.2).floor();
-    let word = (cell.x * 12.9898 + cell.y * 78.233).sin() * 43_758.547;
-    [0.3 + 0.4 * (word - word.floor()); 3]
-}
-
-/// Fills the place of the dome on a plane, and returns the root of the mean squared error of the new colours, and that of
-/// their mean.
-fn errors(plane: fn(DVec3) -> [f64; 3]) -> [f64; 2] {
-    let sights: Vec<Sight> = cameras().into_iter().map(|camera| sight_of(camera, Under::Hidden, plane)).collect();
-    let whole = model(DVec3::ZERO);
-    let rest = labelgs_edit::remove(&whole, &[1]).expect("rest").len();
-    let filled = fill(&whole, &[1], &sights, None).expect("filled").model;
-    let new: Vec<usize> = (rest..filled.len()).collect();
-    let truth: Vec<f64> = new.iter().map(|&row| plane(filled.world(row))[0]).collect();
-    let mean = truth.iter().sum::<f64>() / truth.len() as f64;
-    let shown = |row: usize| 0.5 + f64::from(filled.sh0[row][0]) * SH_C0;
-    let root = |off: &dyn Fn(usize) -> f64| {
-        ((0..new.len()).map(|at| off(at) * off(at)).sum::<f64>() / new.len() as f64).sqrt()
-    };
-    [root(&|at| shown(new[at]) - truth[at]), root(&|at| mean - truth[at])]
-}
-
-#[test]
-fn tiles_and_stripes_go_on_under_the_object() {
-    let [tiled, plain] = errors(tiles);
-    assert!(tiled < 0.45 * plain, "{tiled} from the tiles, whose own deviation is {plain}");
-    let [striped, plain] = errors(stripes);
-    assert!(striped < 0.45 * plain, "{striped} from the stripes, whose own deviation is {plain}");
-}
-
-#[test]
-fn what_has_no_pattern_stays_smooth() {
-    let [blotted, plain] = errors(blots);
-    // A copy of blots from elsewhere would be off by the root of two deviations.
-    assert!(blotted < 1.2 * plain, "{blotted} from the blots, whose own deviation is {plain}");
 }
