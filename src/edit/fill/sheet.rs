@@ -17,7 +17,9 @@ const SIDE_MAX: usize = 1024;
 const OWN_SHARE_MIN: f64 = 0.65;
 /// Distance within which the mean of colours is what changes slowly, in cells.
 const SLOW_CELLS: usize = 32;
-/// Rounds and over-relaxation of the colours.
+/// Largest change of a colour in a round that ends them: far less than a step of 8 bits.
+const CHANGE_MIN: f64 = 1e-5;
+/// Most rounds and over-relaxation of the colours.
 const ROUNDS: usize = 600;
 const RELAXATION: f64 = 1.9;
 
@@ -133,8 +135,9 @@ impl Sheet {
         let mut open: Vec<usize> = (0..states.len()).filter(|&index| states[index] == State::Hole).collect();
         let mut closed = Vec::new();
         loop {
-            let (found, left): (Vec<usize>, Vec<usize>) =
-                open.into_par_iter().partition(|&index| self.is_bounded(&states, index));
+            let sides: Vec<Vec<bool>> = STEPS_AROUND.par_iter().map(|&step| self.meets(&states, step)).collect();
+            let is_bounded = |index: &usize| sides.iter().filter(|seen| seen[*index]).count() >= BOUNDED_MIN;
+            let (found, left): (Vec<usize>, Vec<usize>) = open.into_iter().partition(is_bounded);
             if found.is_empty() {
                 break;
             }
@@ -164,13 +167,23 @@ impl Sheet {
         cells.iter().map(|&index| (self.place(index), shaded(index))).collect()
     }
 
-    /// Returns true if there is seen surface in most directions, before anything free.
-    fn is_bounded(&self, states: &[State], index: usize) -> bool {
-        let meets = |&&direction: &&[isize; 2]| {
-            let way = std::iter::successors(self.step(index, direction), |&at| self.step(at, direction));
-            way.map(|at| states[at]).find(|state| matches!(state, State::Seen | State::Free)) == Some(State::Seen)
+    /// Returns for each cell whether there is seen surface in a direction, before anything free.
+    fn meets(&self, states: &[State], direction: [isize; 2]) -> Vec<bool> {
+        let mut seen = vec![false; states.len()];
+        let meets = |seen: &[bool], index: usize| {
+            self.step(index, direction).is_some_and(|at| match states[at] {
+                State::Seen => true,
+                State::Free => false,
+                State::Hole | State::Unknown => seen[at],
+            })
         };
-        STEPS_AROUND.iter().filter(meets).count() >= BOUNDED_MIN
+        // The next cell comes before this one.
+        let is_ahead = direction[1] > 0 || (direction[1] == 0 && direction[0] > 0);
+        for at in 0..states.len() {
+            let index = if is_ahead { states.len() - 1 - at } else { at };
+            seen[index] = meets(&seen, index);
+        }
+        seen
     }
 
     /// Returns the colours without any shadow, but for those at edges of shadows, and those that few views show, if there are
@@ -214,10 +227,15 @@ impl Sheet {
             .filter(|(_, around): &(usize, Vec<usize>)| !around.is_empty())
             .collect();
         for _ in 0..ROUNDS {
+            let mut largest = 0.0_f64;
             for (index, around) in &unknown {
                 let goal = around.iter().map(|&at| colours[at]).sum::<DVec3>() / around.len() as f64;
-                let old = colours[*index];
-                colours[*index] = old + RELAXATION * (goal - old);
+                let change = RELAXATION * (goal - colours[*index]);
+                colours[*index] += change;
+                largest = largest.max(change.abs().max_element());
+            }
+            if largest < CHANGE_MIN {
+                break;
             }
         }
         Some(colours.into_iter().zip(added).map(|(colour, added)| colour + added).collect())
