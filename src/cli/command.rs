@@ -36,7 +36,7 @@ pub struct Cli {
 /// The commands, in the order of the help: what a newcomer needs comes first.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Make a test scene: photos with poses, points, masks, outlines of whole objects and depth.
+    /// Generate a synthetic test scene: photos with poses, points, masks, whole outlines and depth.
     ///
     /// Example: labelgs synth scene
     Synth(synth::SynthArgs),
@@ -45,77 +45,77 @@ pub enum Command {
     ///
     /// Example: labelgs photos pictures -o scene
     Photos(photos::PhotosArgs),
-    /// Train a model of a scene from its photos. With masks, each Gaussian knows its object.
+    /// Train a model from the photos of a scene. With masks, every Gaussian gets the label of its object.
     ///
     /// Example: labelgs train scene --masks scene/masks --iterations 3000 -o out
     Train(Box<train::args::TrainArgs>),
-    /// Score a model against the photos of a scene: PSNR, SSIM and, with masks, IoU.
+    /// Score a model against the photos of its scene: PSNR, SSIM and, with masks, IoU.
     ///
     /// Example: labelgs eval out --scene scene --masks scene/masks
     Eval(Box<eval::EvalArgs>),
-    /// Show the labels of a model: Gaussians, position, size and name of each.
+    /// List the objects of a model with label id, name, number of Gaussians, position and size.
     ///
     /// Example: labelgs list out
     List(list::ListArgs),
-    /// Write a model of the chosen objects alone.
+    /// Extract objects: write a model with only the chosen objects.
     ///
     /// Example: labelgs extract out --labels 3 -o object.ply
     Extract(extract_remove::ExtractArgs),
-    /// Write a model without the chosen objects.
+    /// Remove objects: write a model without the chosen objects.
     ///
     /// Example: labelgs remove out --labels 3 -o rest.ply
     Remove(extract_remove::RemoveArgs),
-    /// Render pictures, depth or label maps of a model, or of chosen objects.
+    /// Render images, depth or label maps of a model or of some of its objects.
     ///
     /// Example: labelgs render out --scene scene --only 3 -o pictures
     Render(render::RenderArgs),
-    /// Write the report of a training anew, or compare several trainings in one page.
+    /// Rewrite the report of a run, or compare several runs on one page.
     ///
     /// Example: labelgs report out
     Report(report::ReportArgs),
-    /// Make the changes again that were made in a viewer: the same model and the same bytes.
+    /// Replay the edits made in the viewer; gives the same model, byte for byte.
     ///
     /// Example: labelgs edit out --replay out/edits/001.edits.json -o changed.ply
     Edit(edit::ReplayArgs),
-    /// Show a model in a browser: from any side, beside its photos, by label; choose, rename, merge and remove objects.
+    /// View a model in a browser, compare it with its photos, and edit its objects.
     ///
     /// Example: labelgs view out --scene scene --masks scene/masks --open
     View(Box<view::ViewArgs>),
-    /// Write a model with the chosen objects in another colour.
+    /// Change the colour of objects.
     ///
     /// Example: labelgs recolour out --labels barrel --colour 0.9,0.1,0.1 --mix 0.7 -o red.ply
     #[command(alias = "recolor")]
     Recolour(recolour::RecolourArgs),
-    /// Write a model with other label ids.
+    /// Change label ids.
     ///
     /// Example: labelgs relabel out --map 3=7,4=0 -o relabelled.ply
     Relabel(relabel::RelabelArgs),
-    /// Write a model in which several labels are one.
+    /// Merge several labels into one.
     ///
     /// Example: labelgs merge out --labels 3,5 --name group -o merged.ply
     Merge(merge::MergeArgs),
-    /// Write a model in which each connected part of a label has a label of its own.
+    /// Split a label into its connected components, each with its own label.
     ///
     /// Example: labelgs split-components out --labels 3 --specks drop -o parts.ply
     SplitComponents(split_components::SplitArgs),
-    /// Write a model in another format, by the ending of the file, or a file for each object.
+    /// Convert a model to another format: PLY, SPZ, GLB, SOG, USD or a self-contained HTML page. The file extension
+    /// decides the format.
     ///
     /// Example: labelgs convert out scene.spz
     Convert(convert::ConvertArgs),
-    /// Write a model without faint, huge, lonely or far Gaussians.
+    /// Remove floaters: faint, huge, isolated or distant Gaussians.
     ///
     /// Example: labelgs clean out --min-opacity 0.02 --max-gap 10 -o clean.ply
     Clean(clean::CleanArgs),
-    /// Write a model with fewer Gaussians: neighbours of a label that the pictures can do without are merged. Prints what
-    /// that costs.
+    /// Reduce the number of Gaussians by merging neighbours of the same label, and print the loss of quality.
     ///
     /// Example: labelgs simplify out --scene scene --psnr-loss 0.2 -o small.ply
     Simplify(simplify::SimplifyArgs),
-    /// Write a model turned upright, scaled or moved.
+    /// Rotate a model upright, scale it or move it.
     ///
     /// Example: labelgs transform out --up z --scale 0.5 --origin 0,0,1 -o upright.ply
     Transform(transform::TransformArgs),
-    /// Write a model with labels from masks, for a model of any trainer, or from the labelled model that it is a copy of.
+    /// Label a model of any trainer, from masks, clicks, strokes, or a labelled copy of the model.
     ///
     /// Example: labelgs label out --scene scene --masks scene/masks -o labelled.ply
     Label(label::LabelArgs),
@@ -124,37 +124,37 @@ pub enum Command {
     /// Example: labelgs masks import scene/masks --scene scene -o imported
     #[command(subcommand)]
     Masks(masks::MasksVerb),
-    /// Look for faults of a capture before training: poses, blur, exposure, white balance, lonely photos, scale. Status
-    /// 1 if there are any.
+    /// Find problems in a scene before training: bad poses, blur, uneven exposure or white balance, isolated photos,
+    /// unusual scale. Exits with status 1 if there are any.
     ///
     /// Example: labelgs check scene
     Check(check::CheckArgs),
-    /// List which objects hide which in each view, without training.
+    /// List which objects occlude which in each view, without training.
     ///
     /// Example: labelgs occlusion scene --masks scene/masks --model out -o occlusion.json
     Occlusion(occlusion::OcclusionArgs),
-    /// Render a smooth video through the photos of a scene, as input of an object tracker.
+    /// Render a smooth video through the photos of a scene, as input for an object tracker.
     ///
     /// Example: labelgs frames out --scene scene -o video
     Frames(frames::FramesArgs),
-    /// Train a scene in several ways and compare the scores in one table.
+    /// Train variants of a scene and compare their scores in one table.
     ///
     /// Example: labelgs ablate scene --masks scene/masks -o ablation -- --iterations 3000
     Ablate(Box<ablate::AblateArgs>),
-    /// Train a scene that no one card holds: split it into blocks, join their models.
+    /// Train a scene that is too large for one GPU: split it into blocks and join the trained models.
     ///
     /// Example: labelgs blocks split scene --model out --card 24G --dry-run
     #[command(subcommand)]
     Blocks(Box<blocks::BlocksVerb>),
-    /// Score a model by a published benchmark, with its masks, its choice of objects and its averages.
+    /// Score a model as a published benchmark does: with its masks, prompts and averages.
     ///
     /// Example: labelgs benchmark out --scene scene --protocol binary --truth scene/amodal --objects 3
     Benchmark(Box<benchmark::BenchmarkArgs>),
-    /// Show each Vulkan device and whether it meets the requirements.
+    /// List the Vulkan devices and whether labelgs supports them.
     ///
     /// Example: labelgs devices
     Devices,
-    /// Check a device: results of every pass against float64, gradients and determinism.
+    /// Test a device: compare every pass with float64, and check gradients and determinism.
     ///
     /// Example: labelgs selftest
     Selftest(selftest::SelftestArgs),
@@ -164,11 +164,11 @@ pub enum Command {
     Plan(plan::PlanArgs),
     /// Compile every kernel and show its registers, spills and instructions.
     ///
-    /// They are what the driver tells. Status 1 if a kernel spills.
+    /// The numbers come from the driver. Exits with status 1 if a kernel spills.
     ///
     /// Example: labelgs kernels
     Kernels,
-    /// Show how long each pass of a training step takes.
+    /// Measure the time of each pass of a training step.
     ///
     /// Example: labelgs profile scene --masks scene/masks --steps 50
     Profile(profile::ProfileArgs),

@@ -9,12 +9,12 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SmallParts {
-    /// They keep their label.
+    /// Fragments keep their label.
     #[default]
     Keep,
-    /// They lose their label.
+    /// Fragments lose their label.
     Unlabel,
-    /// They are removed from the model.
+    /// Remove fragments from the model.
     Drop,
 }
 

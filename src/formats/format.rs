@@ -28,12 +28,12 @@ pub struct ReadModel {
 #[serde(rename_all = "lowercase")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum LabelType {
-    /// As floats in a PLY, which every reader of 3DGS files skips or keeps.
+    /// As floats in a PLY, PLY; every reader of 3DGS files accepts them.
     #[default]
     Float,
-    /// As unsigned integers in a PLY; some readers refuse or misread such a file.
+    /// As unsigned integers in a PLY; some programs refuse or misread such files.
     Uint,
-    /// Without labels and names, in any format.
+    /// Write no labels and no names, in any format.
     None,
 }
 
@@ -41,12 +41,12 @@ pub enum LabelType {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SpzVersion {
-    /// A single gzip stream, which most viewers read.
+    /// A single gzip stream, stream; most viewers read it.
     #[default]
     #[serde(rename = "3")]
     #[cfg_attr(feature = "cli", value(name = "3"))]
     V3,
-    /// A Zstandard stream per attribute.
+    /// A Zstandard stream per attribute; smaller.
     #[serde(rename = "4")]
     #[cfg_attr(feature = "cli", value(name = "4"))]
     V4,

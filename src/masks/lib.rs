@@ -49,21 +49,21 @@ pub enum Format {
     /// Detect the format. An ambiguous folder is an error.
     #[default]
     Auto,
-    /// DEVA with --use_short_id: 8-bit grey, the value is the id.
+    /// DEVA with --use_short_id: 8-bit grey, value = id.
     DevaShort,
-    /// DEVA with default settings: RGB, the id is R + 256 G + 65536 B.
+    /// DEVA with default settings: RGB, id = R + 256 G + 65536 B.
     DevaLong,
-    /// Palette images as in DAVIS: the index is the id.
+    /// Palette images as in DAVIS: index = id.
     Palette,
-    /// 16-bit grey, the value is the id.
+    /// 16-bit grey, value = id.
     Grey16,
-    /// A black and white image per photo, for a single object: NAME.png.
+    /// One black and white image per photo, for a single object: NAME.png.
     Binary,
-    /// A folder per object with a black and white image per photo: OBJECT/NAME.png.
+    /// One folder per object, one black and white image per photo: OBJECT/NAME.png.
     BinaryFolders,
-    /// A folder per photo with a black and white image per object: NAME/OBJECT.png.
+    /// One folder per photo, one black and white image per object: NAME/OBJECT.png.
     PhotoFolders,
-    /// `object_mask` of Gaussian Grouping: 8-bit grey, the value is the id.
+    /// `object_mask` of Gaussian Grouping: 8-bit grey, value = id.
     ObjectMask,
     /// `test_mask` of LERF-Mask: NAME/OBJECT.png.
     LerfMask,
@@ -71,11 +71,11 @@ pub enum Format {
     #[serde(rename = "3d-ovs")]
     #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
-    /// COCO instances as JSON, also as exported by CVAT and Label Studio.
+    /// COCO instances as JSON, as also exported by exported by CVAT and Label Studio.
     Coco,
-    /// Folders of Segment Anything's amg.py: NAME/0.png and NAME/metadata.csv.
+    /// Folders from Segment Anything's amg.py: NAME/0.png and NAME/metadata.csv.
     SamFolders,
-    /// Run lengths of Segment Anything's amg.py: NAME.json.
+    /// Run-length JSON from Segment Anything's amg.py: NAME.json.
     SamJson,
 }
 
@@ -94,11 +94,11 @@ pub enum Overlap {
     /// The format's rule: `Smaller` for Segment Anything, `Later` for COCO, otherwise `Error`.
     #[default]
     Auto,
-    /// The import fails and reports the number of shared pixels.
+    /// Fail, and report how many the number of shared pixels.
     Error,
-    /// The mask with fewer pixels in this photo wins, or the later one if they are equal.
+    /// The smaller mask in the photo wins, or the later one if they are equal.
     Smaller,
-    /// The later mask of the file wins; among black and white images, the one with the larger id.
+    /// The later mask in the file wins; among black and white images, the one with the larger id wins.
     Later,
 }
 
@@ -107,15 +107,15 @@ pub enum Overlap {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectPer {
-    /// By track if every mask has one; by name if every mask has one and no photo repeats a name; otherwise each mask
+    /// By track if every mask has a track id, by name if every mask has a name that repeats a photo, otherwise each mask
     /// is an object.
     #[default]
     Auto,
-    /// Masks with the same track are one object in all photos.
+    /// Masks with the same track id are one object in all photos.
     Track,
     /// Masks with the same name are one object in all photos.
     Name,
-    /// Each mask is a separate object, and each photo has separate ids.
+    /// Every mask is a separate object, separate each photo has separate ids.
     Mask,
 }
 

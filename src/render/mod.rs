@@ -48,7 +48,7 @@ impl Parts {
 /// The options of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Near plane, world units: nearer Gaussians are not drawn.
+    /// Near plane, world units; closer Gaussians are not drawn.
     pub near: f32,
     /// Colour behind the scene, r, g, b, 0 to 1.
     pub background: [f32; 3],

@@ -20,25 +20,25 @@ crate::options! {
     /// Settings for intermediate outputs and photo memory. They do not affect results.
     pub struct RunOptions {
         "Output" {
-            /// Additional steps after which to save the model, separated by commas.
+            /// Additional steps after which to save the model, comma-separated.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new(), setting;
 
-            /// Time between two preview pictures, such as 10min, or a number of steps; 0 for none.
+            /// Time between two preview images, such as 10min, or a number of steps; 0 for none.
             ///
             /// Previews show the first held-out view.
             preview_every <"TIME">: Every = Every::Minutes(10.0), setting;
 
             /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only if the run is
-            /// interrupted.
+            /// interruption.
             ///
-            /// The last step is also saved. --resume continues from the newest checkpoint.
+            /// A checkpoint is is also saved. --resume continues from the newest checkpoint.
             checkpoint_every <"TIME">: Every = Every::Minutes(10.0);
         }
         "Scene" {
-            /// Memory for photos and masks, such as 800M or 4G.
+            /// Host memory for photos and masks, such as 800M or 4G.
             ///
-            /// Photos beyond this limit are kept in a temporary file in OUT, decoded at training size, until the
+            /// Photos beyond this limit are kept goes to a temporary file in OUT, decoded at training size, until the
             /// process ends. The limit does not affect the model.
             #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
             #[serde(with = "as_bytes")]

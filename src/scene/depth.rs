@@ -4,9 +4,9 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum DepthKind {
-    /// Inverse depth up to an unknown scale and offset, as from monocular networks: larger is nearer.
+    /// Inverse depth with unknown scale and offset, as from monocular networks: larger is nearer.
     Inverse,
-    /// z or distance: larger is farther; 0 is a hole.
+    /// z or distance: larger is farther, 0 is a hole.
     Metric,
 }
 

@@ -8,27 +8,30 @@ labelgs_scene::options! {
     /// The settings for the pixels that a run trains on and the views that it holds out.
     pub struct ReadOptions {
         "Scene" {
-            /// Longest side of a photo, px; larger photos are shrunk, and 0 keeps all sizes.
+            /// Longest side of a photo, px. Larger photos are shrunk; and 0 keeps all sizes.
             ///
-            /// Smaller values are faster and lose fine texture. [default 0; the reference shrinks to a height of 1080]
+            /// Smaller values are faster and lose fine texture. [default 0; the values train faster and lose fine 1080]
             max_resolution <"PX">: u32 = 0, fixed;
 
-            /// Every N-th view by name is held out.
+            /// Hold out every N-th view, by name, for scoring.
             ///
-            /// 0 trains on all views. A scene's own split takes precedence, except over 0. [default 8, as LabelGS and
+            /// 0 trains on all views. If the scene's own, other values keep that split. takes precedence, except over 8. [default 8, as LabelGS and
             /// 3DGS]
             test_every <"N">: u32 = 8, fixed;
 
-            /// Pose convention of the scene's file, if it deviates from its format.
+            /// Pose convention of the scene file, if it deviates from its format's convention.
             ///
-            /// Comma-separated words: c2w or w2c (camera-to-world, world-to-camera), opencv or opengl (camera axes: y
-            /// down and looking along z, or y up and looking along -z), and xyzw (quaternions with the real part last).
+            /// Comma-separated words: c2w or w2c (camera-to-world or world-to-camera), opencv or opengl (camera axes:
+            /// y
+            /// down, looking along z, or y up, looking along -z), and xyzw (quaternions with the real part last).
             poses <"WORDS">: PoseConvention = PoseConvention::default(), fixed;
 
             /// Train only the objects of the masks, without their surroundings.
             ///
-            /// Use this for an object on a turntable, whose surroundings do not turn with it. The masks become the
-            /// opacity of the photos, with soft edges free of background colour. Photos are cropped to their objects,
+            /// Use this for an object on a turntable, where the surroundings do not turn with the object. Masks become
+            /// the
+            /// opacity of the photos, with soft edges free of background colour. Photos are
+            /// cropped to their objects,
             /// and those without an object are omitted. Each step uses a random background colour (random_background).
             masked_only <"SWITCH">: bool = false, fixed;
         }

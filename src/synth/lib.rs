@@ -38,21 +38,22 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
-    /// Eight objects that touch and hide each other.
+    /// Eight objects that touch and occlude each other.
     #[default]
     Default,
-    /// Three objects; for quick tests.
+    /// Three objects, for quick tests.
     Simple,
-    /// Objects that are hard to label: thin, black, inside another, cut by the image border, touching, or with the
+    /// Objects that are hard to label: thin, nested, touching, or cut by the image border, touching, or with the
     /// ground's colours.
     Hard,
-    /// A city of sixty houses, trees, vehicles and lamps over 24 x 16 world units, seen from above and from its
-    /// streets: a scene for training in blocks.
+    /// A city of sixty houses, trees, vehicles and lamps on 24 x 16 world units, seen from above and from its
+    /// streets: for for training in blocks.
     City,
-    /// A bright object on a stand before a white wall, turned in front of a fixed camera: the surroundings do not
-    /// follow the poses.
+    /// A bright object on a turntable in front of a white wall turned in front of a fixed camera: the surroundings do not
+    /// match the
+    /// poses.
     Turntable,
-    /// The same object, turned over between two series of photos.
+    /// The same object, turned upside down between two series of photos.
     #[serde(rename = "turned-over")]
     TurnedOver,
 }

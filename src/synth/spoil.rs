@@ -11,15 +11,15 @@ const TRACKER_SHRINK: f64 = 2.25;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Fault {
-    /// Two objects swap their ids in a share of the views.
+    /// Swap the ids of two objects in some views.
     Swap,
-    /// Masks have 1 / 2.25 of the resolution and are enlarged again.
+    /// Shrink masks by a factor of 2.25 and enlarge them again.
     Coarse,
-    /// Ids differ in every view except the first, as from a segmenter of single images.
+    /// Ids differ in every view except the first, as a single-image segmenter does.
     PerView,
-    /// A share of the views has no mask.
+    /// Leave out the masks of some views.
     Missing,
-    /// An object has another object's id in a share of the views.
+    /// Give an object another object's id in some views.
     Merge,
 }
 

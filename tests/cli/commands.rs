@@ -63,7 +63,7 @@ fn the_sizes_of_a_plan_add_up_to_its_total() {
     let end: Vec<&str> = table.lines().rev().take(3).collect();
     assert!(end[2].starts_with("needed: ") && end[2].contains(" MiB at the start, of "), "{end:?}");
     assert!(end[1].starts_with("fits:    up to ") && end[1].contains(" Gaussians"), "{end:?}");
-    assert!(end[0].starts_with("lower:   half of "), "{end:?}");
+    assert!(end[0].starts_with("savings: half of "), "{end:?}");
     let plan = json(&succeeds(&[&args[..], &["--json"]].concat()));
     let sum = |key: &str| {
         let rows = plan["memory"]["buffers"].as_array().expect("buffers").iter();
@@ -102,9 +102,12 @@ fn a_plan_for_a_card_needs_no_card() {
     // Where full moments do not fit and packed ones do, it says so.
     let many = ["plan", "--gaussians", "10M", "--card", "8G", "--label-samples", "0"];
     let output = labelgs(&many);
-    assert!(output.status.code() == Some(5) && text(&output.stdout).contains("it fits with --set moments=half"));
+    assert!(
+        output.status.code() == Some(5)
+            && text(&output.stdout).contains("fits with `labelgs train --set moments=half`")
+    );
     let half = succeeds(&[&many[..], &["--moments", "half"]].concat());
-    assert!(half.contains("moments of 16 bits") && !half.contains("u_means"), "{half}");
+    assert!(half.contains("16-bit moments") && !half.contains("u_means"), "{half}");
 }
 
 /// A scene of `labelgs synth`, 96 x 72 px.

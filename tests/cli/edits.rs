@@ -359,7 +359,7 @@ fn nothing_is_written_under_a_wrong_extension() {
     }
     assert!(refused(&["convert", &none, &at("x.splat")]).contains("only read"));
     let message = refused(&["occlusion", &none, "--masks", &none, "--model", &none, "-o", &at("x.ply")]);
-    assert!(message.contains("ends in .json"), "{message}");
-    assert!(refused(&["report", &none, "-o", &at("x.png")]).contains("ends in .html"));
+    assert!(message.contains("expected the extension .json"), "{message}");
+    assert!(refused(&["report", &none, "-o", &at("x.png")]).contains("extension .html"));
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
 }

@@ -45,7 +45,7 @@ fn imported_masks_pass_the_check_until_they_are_broken() {
     let check = ["masks", "check", &masks, "--scene", &scene];
     let output = labelgs(&check);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stdout));
-    assert!(text(&output.stdout).contains("9 masks for 9 photos, 3 ids\nnothing found"));
+    assert!(text(&output.stdout).contains("9 masks for 9 photos, 3 ids\nno problems found"));
 
     let full = labelgs(&["masks", "import", &source, "--scene", &scene, "-o", &masks]);
     assert_eq!(full.status.code(), Some(2));

@@ -136,7 +136,7 @@ fn a_turntable_goes_around_an_object_that_stays_in_the_picture() {
     let alpha = read_rgba(place.path("turn/00003.alpha.png")).expect("a picture");
     assert!(alpha.rgba.iter().filter(|pixel| pixel[0] > 127).count() > 80 * 60 / 4);
     let refused = render(&["--turntable", &id, "--only", &id]);
-    assert!(stderr(&refused).contains("give it none beside --only or --without"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("no labels together with --only or --without"), "{}", stderr(&refused));
 }
 
 #[test]
@@ -163,5 +163,5 @@ fn a_sheet_shows_each_label() {
         assert!(neutral * 100 < picture.rgb().len() * 95, "{neutral} of {}", picture.rgb().len());
     }
     let refused = place.labelgs(&["list", &out, "--sheet", "sheet.pdf"]);
-    assert!(stderr(&refused).contains("ends in .html"), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("extension .html"), "{}", stderr(&refused));
 }

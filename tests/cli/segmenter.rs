@@ -72,13 +72,13 @@ fn photos_become_objects_by_a_network_alone() {
     tiny::write(&folder.join("net"));
     let make = "masks make scene --network net -o made --grid 5";
     let said = labelgs(folder, make);
-    assert!(said.contains("in 12 photos, 0 were there"), "{said}");
+    assert!(said.contains("in 12 photos; 0 were done before"), "{said}");
     // A stopped run goes on, with what it knows of the photos.
     let list = folder.join("made/nested/004.json");
     let before = std::fs::read(&list).expect("a list");
     std::fs::remove_file(&list).expect("removed");
     let said = labelgs(folder, make);
-    assert!(said.contains("in 1 photo, 11 were there"), "{said}");
+    assert!(said.contains("in 1 photo; 11 were done before"), "{said}");
     assert!(std::fs::read(&list).expect("a list") == before);
     let refused = refusal(folder, "masks make scene --network net -o made --grid 6");
     assert!(refused.contains("masks.json") && refused.contains("name a new folder"), "{refused}");
@@ -204,7 +204,7 @@ fn names_of_imported_instances_survive_a_repair() {
     std::fs::write(folder.join("instances.json"), file.to_string()).expect("written");
     let said = labelgs(folder, "masks import instances.json --scene scene -o imported");
     let next = "labelgs masks repair imported --per-view --model plain --scene scene -o repaired";
-    assert!(said.contains("ids of each photo are its own") && said.contains(next), "{said}");
+    assert!(said.contains("ids differ from photo to photo") && said.contains(next), "{said}");
     labelgs(folder, "train scene --iterations 100 -o plain");
     let said = labelgs(folder, next.strip_prefix("labelgs ").expect("a command"));
     // Held-out photos have masks too, with the same ids.

@@ -89,7 +89,7 @@ fn damaged_cameras_of_a_run_matter_to_pages_only() {
     succeeded(&convert("before.html"));
     std::fs::write(place.path("out/cameras.json"), "[{}]").expect("written");
     let plain = convert("model.ply");
-    assert!(succeeded(&plain).contains("will not say where to see it from"), "{}", stderr(&plain));
+    assert!(succeeded(&plain).contains("will have no initial view"), "{}", stderr(&plain));
     let page = convert("after.html");
     assert_eq!(page.status.code(), Some(3), "{}", stderr(&page));
     assert!(

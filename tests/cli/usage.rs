@@ -135,7 +135,7 @@ fn a_setting_is_given_once_and_by_a_known_name() {
         (&["--set", "seed=1", "--set", "seed=2"], "--set seed: is given twice; leave out one"),
         (&["--set", "label_wait=1"], "there is no setting label_wait; did you mean label_weight"),
         (&["--set", "label_weight"], "expected KEY=VALUE, such as label_weight=0.3"),
-        (&["--set", "label_rule=most"], "`most` is none of main, votes"),
+        (&["--set", "label_rule=most"], "`most` is not one of main, votes"),
         (&["--set", "label_from=soon"], "`soon` is not a whole number"),
         (&["--set", "rate_final=half"], "`half` is not a number"),
         (&["--set", "sh_degree=4"], "--set sh_degree: is 4, needs 0 to 3"),

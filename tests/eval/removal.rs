@@ -63,7 +63,7 @@ fn removals_are_scored_and_filled() {
     let told = String::from_utf8(labelgs(&args).stdout).expect("text");
     let of = result["of"].as_u64().expect("a number");
     let removed = of + added - filled.len() as u64;
-    let expected = format!("{} Gaussians: of {of} before, {removed} removed; {added} added\n", filled.len());
+    let expected = format!("{} Gaussians ({removed} of {of} removed, {added} added)\n", filled.len());
     assert!(told.ends_with(&expected), "{told}");
     assert!(std::fs::read(&closed).expect("PLY") == first, "two runs differ");
     let lit = succeeds(&args.iter().filter(|&&word| word != "--keep-shadow").copied().collect::<Vec<_>>());
@@ -101,5 +101,5 @@ fn what_is_missing_is_named() {
     (model.labels, model.label_confidence) = (None, None);
     write_model(&bare, &model).expect("written");
     let message = refused(&["eval", text(&bare), "--scene", &scene, "--masks", &masks, "--removal"], 3);
-    assert!(message.contains("has no labels to remove objects by"), "{message}");
+    assert!(message.contains("has no labels, and --removal needs them"), "{message}");
 }

@@ -233,7 +233,7 @@ fn wrong_poses_and_lonely_photos_are_reported() {
     };
     let output = check(&[]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success() && text.contains("16 photos, ") && text.contains("nothing found"), "{text}");
+    assert!(output.status.success() && text.contains("16 photos, ") && text.contains("no problems found"), "{text}");
 
     let path = scene.join("sparse/0/images.bin");
     let mut bytes = std::fs::read(&path).expect("images");

@@ -380,7 +380,7 @@ fn an_interrupted_viewer_loses_no_change() {
     assert!(place.path("model-edits/001.edits.json").is_file() && !place.path("model-edits/001.ply").exists());
     let (status, said) = server.interrupt();
     assert_eq!(status, Some(130), "{said}");
-    let line = said.lines().find(|line| line.contains("unsaved changes are in")).expect("a line");
+    let line = said.lines().find(|line| line.contains("unsaved edits are saved in")).expect("a line");
     assert!(line.contains("model-edits/001.ply") && line.contains("labelgs view model-edits/001.ply"), "{line}");
     let table = std::fs::read_to_string(place.path("model-edits/001.labels.json")).expect("a table");
     assert!(table.contains("mug"), "{table}");

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// `labelgs check`.
 #[derive(Args, Clone, Debug)]
 pub struct CheckArgs {
-    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
+    /// Scene: a folder (COLMAP, transforms.json, poses_bounds.npy, Metashape) or a .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -53,7 +53,7 @@ fn table(report: &Report) -> String {
     let views = report.views.len();
     let in_views = if views == report.photos { String::new() } else { format!(" in {}", counted(views, "view")) };
     let mut text = format!(
-        "{}{in_views}, {}, extent {:.3}; reprojection error {} px, brightest photo / darkest {}\n",
+        "{}{in_views}, {}, extent {:.3}; reprojection error {} px, brightest / darkest photo {}\n",
         counted(report.photos, "photo"),
         counted(report.points, "point"),
         report.extent,
@@ -61,9 +61,9 @@ fn table(report: &Report) -> String {
         number(report.gain_spread)
     );
     if report.findings.is_empty() {
-        return text + "nothing found\n";
+        return text + "no problems found\n";
     }
-    text += &format!("{:>12} {:>20}  what\n", "fault", "photo");
+    text += &format!("{:>12} {:>20}  details\n", "problem", "photo");
     for finding in &report.findings {
         let view = finding.view.as_deref().unwrap_or("-");
         text +=

@@ -15,16 +15,16 @@ use serde_json::json;
 pub struct CleanArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Drop Gaussians with a smaller opacity, 0 to 1.
+    /// Remove Gaussians with a lower opacity, 0 to 1.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub min_opacity: Option<f32>,
-    /// Drop Gaussians with a larger standard deviation along any axis, world units.
+    /// Remove Gaussians with a larger standard deviation along any axis, world units.
     #[arg(long, value_name = "SIZE", value_parser = distance)]
     pub max_size: Option<f64>,
-    /// Drop lonely Gaussians: farther from their eighth neighbour than this many times the median.
+    /// Remove isolated Gaussians: the distance to their eighth neighbour exceeds FACTOR times the median distance.
     #[arg(long, value_name = "FACTOR", value_parser = distance)]
     pub max_gap: Option<f64>,
-    /// Drop Gaussians with a centre outside of this box, world units.
+    /// Remove Gaussians with a centre outside of this box, world units.
     #[arg(long, value_name = "x0,y0,z0,x1,y1,z1", value_parser = corners, allow_hyphen_values = true)]
     pub inside: Option<[DVec3; 2]>,
 }
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
     let CleanArgs { min_opacity, max_size, max_gap, inside, .. } = *args;
     let (cleaned, dropped) = clean(&model, &Cleaning { min_opacity, max_size, max_gap, inside })?;
     tracing::info!(
-        "dropped {} faint, {} huge, {} outside, {} lonely Gaussians",
+        "removed {} faint, {} huge, {} outside and {} isolated Gaussians",
         dropped.faint,
         dropped.huge,
         dropped.outside,

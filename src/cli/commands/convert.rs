@@ -19,26 +19,24 @@ use std::path::{Path, PathBuf};
 /// `labelgs convert`.
 #[derive(Args, Clone, Debug)]
 pub struct ConvertArgs {
-    /// The model: a file that ends in .ply, .spz, .glb, .sog, .usda, .usdz, .splat or .html, or the folder of a `labelgs train`
-    /// run.
+    /// Model: a .ply, .spz, .glb, .sog, .usda, .usdz, .splat or .html file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
+    /// File to write; its extension decides the format. Label names go to OUT.labels.json beside it.
     #[arg(value_name = "OUT", value_parser = model_file())]
     pub output: PathBuf,
-    /// Write a file for each label instead, such as OUT_003_cup.spz: the way to keep objects apart in programs without
-    /// labels. Gaussians without a label go to OUT_000_none.spz.
+    /// Write one file per object, such as OUT_003_cup.spz, for programs that do not read labels. Gaussians without a
+    /// label go to OUT_000_none.spz.
     #[arg(long, help_heading = "Output")]
     pub per_object: bool,
-    /// Write closed meshes with colours of their corners instead, a node of a GLB for each label: surfaces for programs
-    /// that draw or collide triangles. What the cameras of the run never saw of an object is closed; objects of a model
-    /// without a run are seen from all sides.
+    /// Write closed triangle meshes with vertex colours to a GLB, one node per object. Parts that no camera of the run
+    /// saw are closed. A model without a run is treated as seen from all sides.
     #[arg(long, help_heading = "Output", conflicts_with = "per_object")]
     pub mesh: bool,
-    /// With --mesh, only these labels, such as 1,4-6,cup.
+    /// With --mesh, write only these labels, such as 1,4-6,cup.
     #[arg(long, value_name = "LABELS", value_parser = picks, help_heading = "Output", requires = "mesh")]
     pub labels: Option<Picks>,
-    /// With --mesh, cells of the grid along the longest side of an object.
+    /// With --mesh, grid cells along the longest side of an object.
     #[arg(
         long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(i64::from(CELLS_MIN)..=i64::from(CELLS_MAX)),
         default_value_t = CELLS_DEFAULT, help_heading = "Output", requires = "mesh"
@@ -54,7 +52,8 @@ pub struct ConvertArgs {
 pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
     let ConvertArgs { model, output, write, table, .. } = args.clone();
     if args.mesh && output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("glb")) {
-        return Err(Error::usage("--mesh", format!("{} is no .glb; meshes are written as GLB only", output.display())));
+        let problem = format!("{} is not a .glb file; meshes are written as GLB only", output.display());
+        return Err(Error::usage("--mesh", problem));
     }
     let edit = EditArgs { model, output, write, table };
     let (model, known) = edit.open()?;

@@ -17,11 +17,11 @@ pub(crate) fn run(context: &Context) -> Result<()> {
     match (chosen, devices.is_empty()) {
         (Ok(_), _) => Ok(()),
         (Err(_), true) => Err(Error::NoDevice(
-            "the Vulkan loader knows no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
+            "the Vulkan loader found no device; install a Vulkan 1.2 driver, such as Mesa's".into(),
         )),
         (Err(error), false) if options.device.is_some() => Err(error),
         (Err(_), false) => {
-            Err(Error::NoDevice("none of those listed meets the requirements; lines marked MISSING say why".into()))
+            Err(Error::NoDevice("no device in the list meets the requirements; see the lines marked MISSING".into()))
         }
     }
 }
@@ -56,17 +56,17 @@ fn reads(shape: &KernelShape) -> &'static str {
 
 fn to_text(device: &Capabilities, picked: Option<usize>) -> String {
     let (major, minor, patch) = device.api_version;
-    let mark = if picked == Some(device.index) { ", used unless --device says otherwise" } else { "" };
+    let mark = if picked == Some(device.index) { ", selected" } else { "" };
     let mut text =
         format!("{}: {} ({}, Vulkan {major}.{minor}.{patch}{mark})\n", device.index, device.name, kind(device));
     text += &format!("   driver  {} {}\n   uuid    {}\n", device.driver_name, device.driver_info, device.uuid_text());
     let (heap, usable) = (device.limits.heap >> 20, device.limits.plan.max_memory >> 20);
-    text += &format!("   memory  {heap} MiB, {usable} MiB may be used\n");
+    text += &format!("   memory  {heap} MiB, {usable} MiB usable\n");
     text += &needs_text(device);
     if device.missing().is_empty() {
         text += &format!("   kernels {}\n", shape_text(&KernelShape::for_device(device)));
     } else {
-        text += "   cannot be used\n";
+        text += "   not supported\n";
     }
     text
 }

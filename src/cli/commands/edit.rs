@@ -17,13 +17,13 @@ use std::path::{Path, PathBuf};
 pub struct ReplayArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// The changes: edits.json as a viewer has written it for this model.
+    /// Edits to replay: the .edits.json file that the viewer saved for this model.
     #[arg(long, value_name = "EDITS.json")]
     pub replay: PathBuf,
-    /// Scene of the model, for changes that fill holes.
+    /// Scene of the model; needed if an edit fills a hole.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Near plane, world units. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     #[command(flatten)]
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &ReplayArgs, context: &Context) -> Result<()> {
 
 /// Draws a model from the training views of the scene.
 fn sights_of(args: &ReplayArgs, model: &Gaussians, context: &Context) -> Result<Vec<Sight>> {
-    let none = || Error::usage(Setting("scene"), "is missing: the list has a removal that is filled");
+    let none = || Error::usage(Setting("scene"), "is missing: an edit in the list fills a hole");
     let scene: &Path = args.scene.as_deref().ok_or_else(none)?;
     let reading = args.reading.of_run(&args.edit.model)?;
     scene_sights((scene, &reading), (model, near_plane(&args.edit.model, args.near)?), context)

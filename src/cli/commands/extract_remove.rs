@@ -31,14 +31,14 @@ pub struct RemoveArgs {
     pub edit: EditArgs,
     #[command(flatten)]
     pub choice: ChooseArgs,
-    /// Close what no view ever saw, under and behind the objects: the surfaces around them are continued. Needs --scene,
-    /// whose training views tell what was seen.
+    /// Fill the holes that the objects leave, by extending the surrounding surfaces. Needs --scene, to find the areas
+    /// that no training view saw.
     ///
-    /// If shadows of labelled objects tell where one strong light is, the shadow of the removed ones goes from planes
-    /// around them too.
+    /// If the scene has one strong light that casts shadows of labelled objects, the shadows of the removed objects are
+    /// removed from the surrounding planes too.
     #[arg(long, requires = "scene")]
     pub fill: bool,
-    /// With --fill, leave the shadow of the removed objects.
+    /// With --fill, keep the shadows of the removed objects.
     #[arg(long, requires = "fill")]
     pub keep_shadow: bool,
 }
@@ -53,14 +53,14 @@ pub struct ExtractArgs {
     /// Which Gaussians of the labels.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
-    /// Give the copy opacities of its own, fitted to the photos of --scene and to --masks. This takes away haze around the object
-    /// that hides in the scene.
+    /// Refit the opacities of the extracted objects to the photos of --scene and to --masks. This removes haze around
+    /// them.
     #[arg(long, requires = "scene", requires = "masks")]
     pub refit: bool,
-    /// With --refit, the folder of id masks with which the labels were made.
+    /// With --refit, the folder of id masks that the labels were made from.
     #[arg(long, value_name = "DIR", requires = "refit")]
     pub masks: Option<PathBuf>,
-    /// Leave out specks: connected parts of a label that are smaller than --min-share.
+    /// Drop fragments: connected parts of an object smaller than --min-share.
     #[arg(long)]
     pub drop_specks: bool,
     /// What a speck is.
@@ -72,10 +72,10 @@ pub struct ExtractArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Connected parts")]
 pub struct GroupingArgs {
-    /// Least share of the label's Gaussians; a smaller part is a speck. The largest part never is one.
+    /// Smallest fragment to keep, as a share of the object's Gaussians (the largest fragment is always kept).
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
     pub min_share: f32,
-    /// Largest gap between the ellipsoids (two standard deviations) of connected Gaussians, world units.
+    /// Maximum gap between the ellipsoids (two standard deviations) of connected Gaussians, world units.
     #[arg(long, value_name = "DISTANCE", value_parser = distance, default_value_t = 0.0)]
     pub gap: f64,
 }
@@ -106,7 +106,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let least = args.sure.min_confidence;
     let note = match unsure {
         0 => String::new(),
-        _ => format!("; {unsure} of the object left out, with a confidence below {least} (--min-confidence)"),
+        _ => format!("; {unsure} more have a confidence below {least} (see --min-confidence)"),
     };
     let edited = Edited { note, alone: true, ..Edited::new(&part, table, of, labels) };
     edit.finish(context, &edited, json!({ "specks": specks, "unsure": unsure }))
@@ -139,8 +139,9 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
             let Filled { model, added, hidden, lit } = filled(args, scene, &model, &listed, context)?;
             let count: u64 = added.values().sum();
             tracing::info!(
-                "filled: {}; {hidden} that nobody saw are gone; {lit} lost a shadow",
-                counted(count, "new Gaussian")
+                "filled the hole with {}; removed {} that no view shows; removed a shadow from {lit}",
+                counted(count, "Gaussian"),
+                counted(hidden, "Gaussian")
             );
             (model, count, json!({ "added": added, "hidden": hidden, "lit": lit }))
         }
@@ -159,7 +160,7 @@ fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], co
     let light = if *keep_shadow { None } else { Light::of(model, &sights)? };
     if let Some(Light { towards, shade }) = light {
         let share = shade.element_sum() / 3.0;
-        tracing::info!("light from {towards:.2}; shadows have {share:.2} of the colours beside them");
+        tracing::info!("light direction {towards:.2}; shadows are {share:.2} times as bright as their surroundings");
     }
     fill(model, labels, &sights, light.as_ref())
 }
@@ -173,11 +174,7 @@ pub(super) fn scene_sights(
     let dataset = open_scene(scene, reading, None, [0.0; 3], false)?;
     let views: Vec<&View> = dataset.train.iter().collect();
     if views.is_empty() {
-        return Err(Error::data(
-            scene,
-            "",
-            "has no training view to fill from; a hole needs some that show its surroundings",
-        ));
+        return Err(Error::data(scene, "", "has no training view; filling a hole needs views of its surroundings"));
     }
     let sizes = views.iter().map(|view| (view.camera.width, view.camera.height));
     let mut engine = Engine::for_model(open_gpu(context)?, model, sizes)?;

@@ -28,7 +28,7 @@ pub enum Order {
 /// `labelgs frames`.
 #[derive(Args, Clone, Debug)]
 pub struct FramesArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the photos.
@@ -37,7 +37,7 @@ pub struct FramesArgs {
     /// Folder for frames/NNNNN.png and frames.json.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// Frames between two photos.
@@ -46,11 +46,11 @@ pub struct FramesArgs {
     /// Order of the photos.
     #[arg(long, value_name = "ORDER", value_enum, default_value = "path")]
     pub order: Order,
-    /// Follow the code of LabelGS: order by name, interpolated world-to-camera translations, intrinsics of the previous
+    /// Reproduce the LabelGS code: order by name, interpolated world-to-camera translations, intrinsics of the previous
     /// photo.
     #[arg(long, conflicts_with = "order")]
     pub compat: bool,
-    /// Include the test views in the video. The tracked masks then depend on them.
+    /// Include the held-out views in the video. The tracked masks then depend on them.
     #[arg(long)]
     pub include_test: bool,
     /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.

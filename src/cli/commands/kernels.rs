@@ -25,7 +25,7 @@ pub(crate) fn run(context: &Context) -> Result<()> {
         return Ok(());
     }
     Err(Error::Check(format!(
-        "the driver keeps registers of {} kernels in memory, which makes them slow: {}",
+        "{} kernels spill registers to memory, which makes them slow: {}",
         spilled.len(),
         spilled.join(", ")
     )))

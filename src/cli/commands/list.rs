@@ -18,13 +18,13 @@ use std::path::PathBuf;
 /// `labelgs list`.
 #[derive(Args, Clone, Debug)]
 pub struct ListArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     #[command(flatten)]
     pub table: TableArg,
-    /// Print a row per label as CSV: id, name, Gaussians, opacity, the box of the centres, and the box along the axes of
-    /// the object with its sizes and volume.
+    /// Print the list as CSV: id, name, Gaussians, opacity, bounding box of the centres, and oriented bounding box with
+    /// sizes and volume.
     #[arg(long, help_heading = "Output")]
     pub csv: bool,
     #[command(flatten)]
@@ -44,7 +44,7 @@ struct Row {
 /// Prints a row per label.
 pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
     if args.csv && context.json {
-        return Err(Error::usage("--csv", "is another form of the same list than --json; leave one of them out"));
+        return Err(Error::usage("--csv", "cannot be combined with --json; use one of them"));
     }
     let Seen { model, tally, known } = look(&args.model, &args.table)?;
     args.sheet.write(&args.model, &tally.summaries(), &known, context)?;
@@ -80,9 +80,9 @@ const COLUMNS: [Column<Row>; 7] = [
     column("x", "x", 2, |row| Some(row.summary.centre[0])),
     column("y", "y", 2, |row| Some(row.summary.centre[1])),
     column("z", "z", 2, |row| Some(row.summary.centre[2])),
-    column("long", "long", 2, |row| Some(row.oriented?.sizes[0])),
-    column("wide", "wide", 2, |row| Some(row.oriented?.sizes[1])),
-    column("thick", "thick", 2, |row| Some(row.oriented?.sizes[2])),
+    column("length", "length", 2, |row| Some(row.oriented?.sizes[0])),
+    column("width", "width", 2, |row| Some(row.oriented?.sizes[1])),
+    column("depth", "depth", 2, |row| Some(row.oriented?.sizes[2])),
 ];
 
 fn table(rows: &[Row]) -> String {

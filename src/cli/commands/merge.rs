@@ -12,13 +12,13 @@ use serde_json::json;
 pub struct MergeArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// The labels to merge, by id or by name, such as 3,5 or cup,saucer.
+    /// Labels to merge, by id or name, such as 3,5 or cup,saucer.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
-    /// Id of the result: one of --labels or a free id. Default: the smallest of --labels.
+    /// Id of the merged label: one of --labels or a free id. Default: the smallest of --labels.
     #[arg(long, value_name = "ID", value_parser = label)]
     pub into: Option<u32>,
-    /// Name of the result. Default: the name of the label with that id, or the first name among the others.
+    /// Name of the merged label. Default: the name of --into, else the first name among --labels.
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
 }

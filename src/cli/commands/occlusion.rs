@@ -22,28 +22,29 @@ use std::sync::Arc;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["depths", "model"])))]
 pub struct OcclusionArgs {
-    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
+    /// Scene: a folder (COLMAP, transforms.json, poses_bounds.npy, Metashape) or a .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder of id masks.
     #[arg(long, value_name = "DIR")]
     pub masks: PathBuf,
-    /// Folder of depth maps, one per photo by name: 16-bit PNG, EXR, NPY or PFM. Uses the paper's rule.
+    /// Folder of depth maps, named as the photos: 16-bit PNG, EXR, NPY or PFM. Applies the rule of the LabelGS paper.
     #[arg(long, value_name = "DIR", requires = "depth_kind")]
     pub depths: Option<PathBuf>,
     /// Meaning of the values in --depths.
     #[arg(long, value_name = "KIND", value_enum, requires = "depths")]
     pub depth_kind: Option<DepthKind>,
-    /// Model whose rendered depth to use: a PLY, or the folder of a `labelgs train` run.
+    /// Use the rendered depth of this model: a PLY file, or the output folder of `labelgs train`.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
     /// File to write.
     #[arg(short, long, value_name = "FILE.json", value_parser = json_file())]
     pub output: PathBuf,
-    /// Folder for a picture of each view, NAME.png: contours are white in front, black behind, grey if undecided.
+    /// Write an image of each view, NAME.png, to this folder: contours are white in front, black behind, grey if
+    /// undecided.
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,
-    /// Longest side of a picture, px. Default: the size of the photo.
+    /// Longest side of an image, px. Default: the photo size.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
     #[command(flatten)]
@@ -77,7 +78,7 @@ pub(crate) fn run(args: &OcclusionArgs, context: &Context) -> Result<()> {
     table.write(&args.output)?;
     let (pairs, views, output) = (table.pair_count(), table.views.len(), args.output.display().to_string());
     let [of, seen] = [counted(pairs, "pair"), counted(views, "view")];
-    let text = format!("{output}: {of} of an object and its occluder in {seen}\n");
+    let text = format!("{output}: {of} of object and occluder in {seen}\n");
     let kind = table.kind;
     context.show(&json!({ "schema_version": 1, "output": output, "kind": kind, "views": views, "pairs": pairs }), &text)
 }

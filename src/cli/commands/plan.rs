@@ -18,22 +18,22 @@ use std::collections::BTreeSet;
 /// `labelgs plan`.
 #[derive(Args, Clone, Debug)]
 pub struct PlanArgs {
-    /// Number of Gaussians to plan for, such as 500k or 2M.
+    /// Number of Gaussians, such as 500k or 2M.
     #[arg(long, alias = "max-gaussians", value_name = "N", value_parser = count, default_value = "1M")]
     pub gaussians: u64,
-    /// Size of a picture, px.
+    /// Image size, px.
     #[arg(long, alias = "max-resolution", value_name = "WxH", value_parser = size, default_value = "1600x1064")]
     pub size: Size,
-    /// Objects per step; 0 plans without labels.
+    /// Number of objects per step; 0 plans a run without labels.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub label_samples: u32,
     /// Degree of the spherical harmonics.
     #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=3), default_value_t = 3)]
     pub sh_degree: u32,
-    /// What the optimiser remembers of each parameter, as the setting `moments` of a training.
+    /// Precision of the optimiser's moments, as the setting `moments` of `labelgs train`.
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub moments: Moments,
-    /// Plan for a graphics card with this memory, such as 24G, instead of the device of this machine.
+    /// Plan for a GPU with this much memory, such as 24G, instead of the device of this machine.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
 }
@@ -88,7 +88,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     let (device, shape, limits) = match args.card {
         Some(memory) => {
             let (shape, limits) = card(memory);
-            (Some(format!("a graphics card with {:.1} GiB", memory as f64 / f64::from(1 << 30))), shape, limits)
+            (Some(format!("a GPU with {:.1} GiB", memory as f64 / f64::from(1 << 30))), shape, limits)
         }
         None => device(context)?,
     };
@@ -117,7 +117,7 @@ fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
         }
         Ok((_, Err(error))) | Err(error) if options.device.is_some() => Err(error),
         Ok((_, Err(_))) | Err(Error::NoDevice(_)) => {
-            tracing::warn!("no usable Vulkan device; the plan is for a software device with modest limits");
+            tracing::warn!("no usable Vulkan device; the plan assumes a CPU device with modest limits");
             Ok((None, KernelShape::new(8, true), Limits::default()))
         }
         Err(error) => Err(error),
@@ -142,7 +142,7 @@ fn to_text(subject: &Subject, (memory, plan): &(Memory, Plan)) -> Result<String>
     let (room, capacity) = (&subject.room, &subject.capacity);
     let objects = room.labels.map_or(0, |labels| labels.layers);
     Ok(format!(
-        "Training {} on pictures of {} x {} px with {} per step{}\n\
+        "Training {} on {} x {} px images with {} per step{}\n\
          device:  {}\nkernels: {}\nroom for {} (splat, tile) pairs, {} tiles of object layers\n\n\
          MEMORY at the start; pairs and tiles of object layers grow when a view needs more\n{}{}\n\
          SCRATCH ARENA of the step; buffers whose items do not overlap share bytes\n{}\n\
@@ -151,7 +151,7 @@ fn to_text(subject: &Subject, (memory, plan): &(Memory, Plan)) -> Result<String>
         room.image.0,
         room.image.1,
         counted(objects, "object"),
-        if room.half_moments { ", moments of 16 bits" } else { "" },
+        if room.half_moments { ", 16-bit moments" } else { "" },
         subject.device.as_deref().unwrap_or("none found, limits assumed"),
         shape_text(&subject.shape),
         capacity.instances,
@@ -172,7 +172,7 @@ fn votes_text(votes: &MemoryReport) -> String {
     let (own, scratch) = (rows.map(|row| row.bytes).sum::<u64>() as f64 / MIB, votes.step_pages.iter().sum::<u64>());
     let (scratch, total) = (scratch as f64 / MIB, votes.total as f64 / MIB);
     format!(
-        "\na count of votes, between steps: votes {own:.0} MiB, scratch arena {scratch:.0} MiB, total {total:.0} MiB\n"
+        "\nvote counting, between steps: votes {own:.0} MiB, scratch arena {scratch:.0} MiB, total {total:.0} MiB\n"
     )
 }
 
@@ -180,19 +180,19 @@ fn votes_text(votes: &MemoryReport) -> String {
 fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
     let room = &subject.room;
     let (needed, limit) = (memory.total() as f64 / MIB, subject.limits.max_memory as f64 / MIB);
-    let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB that may be used\n");
+    let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB available\n");
     text += &match most_gaussians(subject) {
-        0 => "fits:    no Gaussian on such pictures\n".to_owned(),
-        most => format!("fits:    up to {} with such pictures and objects\n", counted(most, "Gaussian")),
+        0 => "fits:    no Gaussians at this image size\n".to_owned(),
+        most => format!("fits:    up to {} at this image size and number of objects\n", counted(most, "Gaussian")),
     };
     if let Some(total) = subject.half_fits(memory) {
         let needed = total as f64 / MIB;
-        text += &format!("moments: it fits with --set moments=half, here --moments half: {needed:.0} MiB\n");
+        text += &format!("moments: fits with `labelgs train --set moments=half`: {needed:.0} MiB\n");
     }
     let kept = subject.limits.kept_max(memory.total());
     if kept > 0 {
         let views = kept / (6 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
-        text += &format!("photos:  {views} with masks stay there besides, in {:.0} MiB\n", kept as f64 / MIB);
+        text += &format!("photos:  {views} with masks stay resident, in {:.0} MiB\n", kept as f64 / MIB);
     }
     let half = |value: u32| (value / 2).max(1);
     let image = (half(room.image.0), half(room.image.1));
@@ -212,7 +212,7 @@ fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
     let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB);
     let savings: Vec<String> =
         shown.map(|(bytes, what)| format!("{what} saves {:.0} MiB", *bytes as f64 / MIB)).collect();
-    Ok(text + &format!("lower:   {}\n", savings.join(", ")))
+    Ok(text + &format!("savings: {}\n", savings.join(", ")))
 }
 
 /// Returns the most Gaussians that fit the device.

@@ -14,10 +14,10 @@ pub struct RecolourArgs {
     pub edit: EditArgs,
     #[command(flatten)]
     pub choice: ChooseArgs,
-    /// Colour of the labels: a name such as red, #rrggbb, or R,G,B from 0 to 1.
+    /// New colour: a name such as red, #rrggbb, or R,G,B from 0 to 1.
     #[arg(long, alias = "color", value_name = "COLOUR", value_parser = colour)]
     pub colour: [f32; 3],
-    /// Share of the new colour, 0 to 1; the rest is the old colour, which keeps light and shade.
+    /// Share of the new colour, 0 to 1. Values below 1 keep some of the original shading.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 1.0)]
     pub mix: f32,
 }

@@ -13,8 +13,8 @@ use serde_json::json;
 pub struct RelabelArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Old and new ids, all changed at once, such as 3=7,4=0. 0 means no label; a new id that is in use merges with its
-    /// label.
+    /// Old and new ids, such as 3=7,4=0, changed all at once. 0 means no label. A new id that exists already is merged
+    /// with that label.
     #[arg(long, value_name = "OLD=NEW,..", value_parser = renumbering)]
     pub map: Renumbering,
 }

@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 /// `labelgs report`.
 #[derive(Args, Clone, Debug)]
 pub struct ReportArgs {
-    /// Folder of a `labelgs train` run. Several are compared: their numbers in columns, their curves in one picture.
+    /// Output folder of `labelgs train`. Give several to compare their numbers in columns and their curves in shared
+    /// charts.
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
-    /// The page. Default: report.html in RUN, or here if there are several runs.
+    /// Page to write. Default: RUN/report.html, or report.html in the current folder for several runs.
     #[arg(short, long, value_name = "FILE", value_parser = page_file())]
     pub output: Option<PathBuf>,
 }

@@ -28,19 +28,20 @@ const HALVINGS: u32 = 5;
 pub struct SimplifyArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Scene whose training views tell what a Gaussian contributes, and whose test views score the result.
+    /// Scene of the model. Its training views measure what each Gaussian contributes, and its held-out views score the
+    /// result.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder of id masks, to score labels too.
+    /// Folder of id masks, to score labels as well.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
-    /// Keep this many Gaussians.
+    /// Reduce to this number of Gaussians.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub gaussians: Option<u64>,
-    /// Keep as few Gaussians as this loss of PSNR allows, dB.
+    /// Reduce as far as this loss of PSNR allows, dB.
     #[arg(long, value_name = "DB", value_parser = loss)]
     pub psnr_loss: Option<f64>,
-    /// Near plane, world units. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     #[command(flatten)]
@@ -121,7 +122,7 @@ fn exactly<'a>(
 ) -> Result<(Simplifier<'a>, Row)> {
     let before = simplifier.count();
     if count > before as u64 {
-        tracing::warn!("the model has {before} Gaussians, and {count} may stay: nothing changes");
+        tracing::warn!("the model has only {before} Gaussians, not more than {count}: nothing changes");
     }
     simplifier.reduce_to(usize::try_from(count).unwrap_or(usize::MAX))?;
     let row = if simplifier.count() == before { row } else { scorer.score(&simplifier.model())? };

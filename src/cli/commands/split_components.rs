@@ -15,10 +15,10 @@ use serde_json::json;
 pub struct SplitArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Labels to split, by id or by name. The largest part of a label keeps its id; the other parts get free ids.
+    /// Labels to split, by id or name. The largest part of a label keeps its id; the other parts get free ids.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
-    /// What to do with parts smaller than --min-share.
+    /// What to do with fragments smaller than --min-share.
     #[arg(long, value_name = "WHAT", value_enum, default_value = "keep")]
     pub specks: SmallParts,
     /// What is connected.

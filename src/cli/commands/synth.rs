@@ -18,26 +18,26 @@ pub struct SynthArgs {
     /// Set of objects.
     #[arg(long, value_name = "PRESET", value_enum, default_value = "default")]
     pub preset: Preset,
-    /// Size of a picture, px.
+    /// Image size, px.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x240")]
     pub size: Size,
-    /// Number of views. Default: 40; 200 of a city.
+    /// Number of views. Default: 40, or 200 for a city.
     #[arg(long, value_name = "N")]
     pub views: Option<u32>,
-    /// Number of 3D points. Default: 4000; 20000 of a city.
+    /// Number of 3D points. Default: 4000, or 20000 for a city.
     #[arg(long, value_name = "N")]
     pub points: Option<u32>,
-    /// Seed of colours, camera jitter and points.
+    /// Random seed of colours, camera jitter and points.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
-    /// Lens of the cameras: a camera model of COLMAP, with coefficients of a usual lens. With a lens that is no pinhole,
-    /// photos, poses and masks are all that is written.
+    /// Camera model of COLMAP, with typical lens coefficients. For models with distortion, only photos, poses and masks
+    /// are written.
     #[arg(long, value_name = "MODEL", default_value_t = SynthLens::default())]
     pub lens: SynthLens,
-    /// Field of view across the picture, degrees. Default: 50 in a picture of 4 : 3; EQUIRECTANGULAR shows everything.
+    /// Horizontal field of view, degrees. Default: 50 for 4:3 images; EQUIRECTANGULAR always covers everything.
     #[arg(long, value_name = "DEGREES")]
     pub fov: Option<u32>,
-    /// Photos with gains of 0.7 to 1.4 and colour casts, each its own, as of a camera that chooses its exposure.
+    /// Vary exposure (gains of 0.7 to 1.4) and white balance from photo to photo, as an automatic camera does.
     #[arg(long)]
     pub vary_exposure: bool,
 }

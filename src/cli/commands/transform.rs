@@ -14,14 +14,14 @@ use serde_json::json;
 pub struct TransformArgs {
     #[command(flatten)]
     pub edit: EditArgs,
-    /// Direction of the model that points up: x, -x, y, -y, z, -z or X,Y,Z. It is turned to -y, which viewers of 3DGS
-    /// files show as up. Colours that depend on the direction are turned along.
+    /// Up direction of the model: x, -x, y, -y, z, -z or X,Y,Z. The model is rotated so that it becomes -y, which
+    /// viewers of 3DGS files show as up. View-dependent colours are rotated too.
     #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
-    /// Factor of all lengths.
+    /// Multiply all lengths by this factor.
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     pub scale: Option<f64>,
-    /// Place that becomes 0,0,0, before the turn.
+    /// Point to move to 0,0,0, before rotation and scaling.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     pub origin: Option<DVec3>,
 }

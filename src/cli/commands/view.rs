@@ -24,21 +24,21 @@ const TOKEN: &str = "LABELGS_VIEW_TOKEN";
 /// `labelgs view`.
 #[derive(Args, Clone, Debug)]
 pub struct ViewArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Scene whose views to list and whose photos to compare with.
+    /// Scene with views and photos for comparison.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Folder of id masks, to score the label maps with.
+    /// Folder of id masks, to score label maps.
     #[arg(long, value_name = "DIR", requires = "scene")]
     pub masks: Option<PathBuf>,
-    /// Folder with the segmentation network, as for `masks make`: then a click in the page finds an object.
+    /// Folder of the segmentation network, as for `masks make`, to find objects by a click in the page.
     #[arg(long, value_name = "DIR", requires = "scene")]
     pub network: Option<PathBuf>,
     #[command(flatten)]
     pub table: TableArg,
-    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     #[command(flatten)]
@@ -51,17 +51,18 @@ pub struct ViewArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Viewer")]
 pub struct ServerArgs {
-    /// Open the page in the browser of this desktop.
+    /// Open the page in the default browser.
     #[arg(long)]
     pub open: bool,
-    /// Address or name to listen on. On another than loopback, who reaches it and has the token sees the scene.
+    /// Address or name to listen on. On any address but loopback, everyone on the network who has the token can see the
+    /// scene.
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     pub view_host: String,
-    /// Port to listen on; 0 takes a free one. With a port and a token in LABELGS_VIEW_TOKEN, an open page comes back when
-    /// the program is started again.
+    /// Port to listen on; 0 takes a free port. If you set the port here and a token in LABELGS_VIEW_TOKEN, an open page
+    /// reconnects when you restart the program.
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     pub view_port: u16,
-    /// Ask for no token. Other users of this machine may then see the scene; only on loopback.
+    /// Do not require a token; loopback only. Other users of this machine can then see the scene.
     #[arg(long)]
     pub view_no_token: bool,
 }
@@ -70,10 +71,10 @@ pub struct ServerArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Viewer")]
 pub struct WatchArgs {
-    /// Show the training in a browser: its address is printed. It can be paused, saved and stopped there.
+    /// Show the run in a browser and print the address. You can pause, save and stop the run there.
     #[arg(long)]
     pub view: bool,
-    /// Largest share of the time that viewing may take, 0 to 1, while a page is open.
+    /// Maximum share of time that viewing may take while a page is open, 0 to 1.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.2)]
     pub view_share: f32,
     #[command(flatten)]
@@ -93,7 +94,7 @@ impl ServerArgs {
         let viewer = Viewer::start(&options)?;
         if self.view_host.parse::<IpAddr>().is_ok_and(|ip| ip.is_unspecified()) {
             tracing::info!(
-                "other machines open this address with the name of this machine in place of the loopback one"
+                "on other machines, open this address with the name of this machine instead of the loopback address"
             );
         }
         if self.open {
@@ -140,7 +141,7 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     signals::note_only();
     let saved = show(&viewer, finished, gpu, &|| !signals::is_noted())?;
     if let Some(saved) = saved {
-        tracing::warn!("unsaved changes are in {} now; go on with: {}", saved.display(), words.view(&saved));
+        tracing::warn!("unsaved edits are saved in {}; to continue, run: {}", saved.display(), words.view(&saved));
     }
     Err(Error::Interrupted)
 }
@@ -157,7 +158,7 @@ fn open_browser(address: &str) {
     match command.spawn() {
         // The opener ends by itself; waiting for it leaves no dead process behind.
         Ok(mut child) => drop(std::thread::spawn(move || child.wait())),
-        Err(error) => tracing::warn!("no browser was opened ({opener}: {error}); open the printed address"),
+        Err(error) => tracing::warn!("could not open a browser ({opener}: {error}); open the printed address yourself"),
     }
 }
 

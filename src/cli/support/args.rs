@@ -13,12 +13,12 @@ pub struct GlobalArgs {
     /// Print errors only.
     #[arg(short, long, global = true, help_heading = "Output", conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print more messages; give it twice for all of them. RUST_LOG overrides it.
+    /// Print more messages; twice prints all. RUST_LOG overrides this flag.
     #[arg(short, long, global = true, help_heading = "Output", action = clap::ArgAction::Count)]
     pub verbose: u8,
-    /// Vulkan device: its number or UUID from `labelgs devices`, GPU-UUID from `nvidia-smi -L`, or a part of its name. A
-    /// list of these, with commas between, means the first that no other labelgs with a list uses. Default: LABELGS_DEVICE
-    /// if set, else the fastest kind of device.
+    /// Vulkan device: number, UUID or part of the name from `labelgs devices`, or GPU-UUID from `nvidia-smi -L`. With a
+    /// comma-separated list, labelgs uses the first free device and reserves it. Default: LABELGS_DEVICE, else the
+    /// fastest kind of device.
     #[arg(long, value_name = "DEVICE", global = true, help_heading = "Device")]
     pub device: Option<String>,
 }
@@ -27,13 +27,13 @@ pub struct GlobalArgs {
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Scene")]
 pub struct FileArgs {
-    /// Folder of the photos, where they are not where the scene lists them: a path, or a folder of the scene.
+    /// Folder of the photos, if they are not where the scene lists them: a path, or a subfolder of the scene.
     #[arg(long, value_name = "DIR")]
     pub images: Option<PathBuf>,
-    /// Largest share of missing or damaged photos, from 0 to 1. They are skipped with a warning. Default: 0.1.
+    /// Maximum share of missing or damaged photos to skip with a warning, 0 to 1. Default: 0.1.
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub max_bad_photos: Option<f32>,
-    /// Read photos and points that the scene lists outside its folder.
+    /// Also read photos and points that the scene lists outside of its folder.
     #[arg(long)]
     pub allow_outside: bool,
 }
@@ -43,8 +43,8 @@ pub struct FileArgs {
 pub struct ReadArgs {
     #[command(flatten)]
     pub files: FileArgs,
-    /// What the scene's file means by its poses, where it is not the convention of its format: words of c2w or w2c, opencv
-    /// or opengl, and xyzw, with commas between. Default: the format's; commands with a model use that of its run.
+    /// Pose convention of the scene file: a comma-separated list of c2w or w2c, opencv or opengl, and xyzw. Default:
+    /// the value of the model's run, else the convention of the format.
     #[arg(long, value_name = "WORDS", help_heading = "Scene")]
     pub poses: Option<PoseConvention>,
 }
@@ -69,15 +69,14 @@ impl ReadArgs {
 /// How a command other than `train` reads a scene.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArgs {
-    /// Hold out every N-th view by name for tests; 0 holds out none. Default: 8; `eval` and `render` use the value of
-    /// the model's run.
+    /// Hold out every N-th view, by name, for scoring; 0 holds out none. Default: 8; `eval` and `render` use the value
+    /// of the model's run.
     #[arg(long, value_name = "N", help_heading = "Scene")]
     pub test_every: Option<u32>,
-    /// Longest side of a picture, px. Default: the size of the photo; `eval` and `render` use the value of the model's
-    /// run.
+    /// Longest side of an image, px. Default: the photo size; `eval` and `render` use the value of the model's run.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
-    /// Folder of pictures named as masks: pixels above 0 are left out of votes and scores.
+    /// Folder of images, named as masks, that mark pixels to ignore: pixels above 0 count in no vote or score.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
     /// The photos show the objects of the masks alone, by the settings of the model's run.

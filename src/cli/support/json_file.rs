@@ -11,7 +11,7 @@ use std::path::PathBuf;
 /// `--json` of a command with many numbers.
 #[derive(Args, Clone, Debug, Default)]
 pub struct JsonFileArg {
-    /// Write all numbers as JSON to FILE, or to standard output without FILE.
+    /// Write all numbers as JSON to FILE, or print them without FILE.
     #[arg(id = "json_file", long = "json", value_name = "FILE", num_args = 0..=1, help_heading = "Output")]
     pub file: Option<Option<PathBuf>>,
 }

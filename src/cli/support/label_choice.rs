@@ -21,28 +21,26 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Choice of labels")]
 pub struct PromptArgs {
-    /// Choose the label with this name; upper and lower case are the same. May be given several times.
+    /// Select the label with this name, ignoring case. Repeatable.
     #[arg(long = "name", value_name = "NAME")]
     pub names: Vec<String>,
-    /// Choose the label at pixel x,y of a view; 0,0 is the top left pixel of the photo, or of the smaller photo that
-    /// --max-resolution makes. May be given several times, in any views.
+    /// Select the label at pixel x,y of a view; 0,0 is the top left pixel of the photo, after --max-resolution.
+    /// Repeatable.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
     pub at: Vec<At>,
-    /// Leave out the label at this pixel. May be given several times.
+    /// Exclude the label at this pixel. Repeatable.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
     pub not_at: Vec<At>,
-    /// Choose labels with more than half of their pixels in a box: x0 <= x < x1 and y0 <= y < y1. May be given several
-    /// times.
+    /// Select labels with more than half of their pixels inside a box: x0 <= x < x1 and y0 <= y < y1. Repeatable.
     #[arg(long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at, requires = "scene")]
     pub boxes: Vec<BoxAt>,
-    /// Choose labels with more than half of their pixels inside a mask of one view. Pixels above 0 are inside. The view
-    /// is rendered in the size of the mask.
+    /// Select labels with more than half of their pixels inside a mask of the view --view. Pixels above 0 are inside.
     #[arg(long, value_name = "FILE", requires = "view", requires = "scene")]
     pub mask: Option<PathBuf>,
-    /// Name of the view of --mask.
+    /// View that --mask belongs to.
     #[arg(long, value_name = "NAME", requires = "mask")]
     pub view: Option<String>,
-    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
 }
@@ -53,16 +51,16 @@ pub struct PromptArgs {
 #[command(group(clap::ArgGroup::new("choice").required(true).multiple(true)
     .args(["labels", "names", "at", "boxes", "mask"])))]
 pub struct ChooseArgs {
-    /// Choose labels by id or by name, such as 1,4-6,cup; 0 stands for Gaussians without a label.
+    /// Select labels by id or name, such as 1,4-6,cup; 0 is Gaussians without a label.
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Option<Picks>,
     /// The other ways.
     #[command(flatten)]
     pub prompts: PromptArgs,
-    /// Scene that has the views.
+    /// Scene with the views of --at, --box and --mask.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Longest side of a view, px. Default: the size of the photo.
+    /// Longest side of a view, px. Default: the photo size.
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Scene")]
     pub max_resolution: Option<u32>,
     #[command(flatten)]

@@ -25,11 +25,11 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Sheet")]
 pub struct SheetArgs {
-    /// Draw each label alone, from the view that shows it best: OUT.html, a page with names and numbers, or OUT.png, a picture
-    /// with ids.
+    /// Write an overview of all labels, each drawn alone from its best view: OUT.html with names and numbers, or
+    /// OUT.png with ids.
     #[arg(long, value_name = "OUT", value_parser = sheet_file())]
     pub sheet: Option<PathBuf>,
-    /// Scene with the views of --sheet. Default: the cameras of the model's run, else each label is seen from beside.
+    /// Scene with the views for --sheet. Default: the cameras of the model's run, else a side view of each label.
     #[arg(long, value_name = "SCENE", requires = "sheet")]
     pub scene: Option<PathBuf>,
 }

@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// `--memory-limit` of commands that draw.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct MemoryArg {
-    /// Limit of device memory, such as 1500M or 2G. Of a model that takes more, each picture takes the Gaussians that it may
-    /// show.
+    /// Limit of device memory, such as 1500M or 2G. For a larger model, only the Gaussians in view are loaded for each
+    /// image.
     #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
 }
@@ -63,7 +63,7 @@ impl<'a> Drawer<'a> {
 
     /// Makes one that draws the Gaussians of an index in parts.
     pub(crate) fn parts(gpu: Arc<Gpu>, model: ModelRef<'a>, index: GaussianIndex, options: SchedulerOptions) -> Self {
-        tracing::info!("the model does not fit on the device at once: each picture takes what it may show");
+        tracing::info!("the model does not fit on the device: only the Gaussians in view are loaded for each image");
         Self::Parts(Box::new(Painter::new(gpu, model, index, options)))
     }
 

@@ -23,8 +23,8 @@ use std::path::{Path, PathBuf};
 /// Source of the names of labels.
 #[derive(Args, Clone, Debug, Default)]
 pub struct TableArg {
-    /// Table with the names of labels. Default: MODEL.labels.json beside the model, labels.json of its run, or the names in the
-    /// file of the model.
+    /// File with the names of labels. Default: MODEL.labels.json beside the model, labels.json of its run, or the names
+    /// in the model file.
     #[arg(long, value_name = "FILE", help_heading = "Labels")]
     pub label_table: Option<PathBuf>,
 }
@@ -44,10 +44,10 @@ impl TableArg {
 /// Arguments of every edit of labels.
 #[derive(Args, Clone, Debug)]
 pub struct EditArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// File to write; its ending is the format. Names of its labels go to OUT.labels.json beside it.
+    /// File to write; its extension decides the format. Label names go to OUT.labels.json beside it.
     #[arg(short, long, value_name = "OUT.ply", value_parser = model_file())]
     pub output: PathBuf,
     #[command(flatten)]
@@ -93,7 +93,7 @@ impl EditArgs {
         let text = match (*of as u64 + added).checked_sub(written).filter(|_| *added > 0) {
             Some(removed) => {
                 let count = counted(written, "Gaussian");
-                format!("{output}: {count}: of {of} before, {removed} removed; {added} added\n")
+                format!("{output}: {count} ({removed} of {of} removed, {added} added)\n")
             }
             None => format!("{output}: {written} of {}{note}\n", counted(of, "Gaussian")),
         };
@@ -136,7 +136,7 @@ impl<'a> Edited<'a> {
 /// Which Gaussians an object consists of.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MinConfidenceArg {
-    /// Least label_confidence of a Gaussian of a separate object, for models that have it.
+    /// Minimum label confidence of a Gaussian to count as part of an object, for models with confidences.
     #[arg(
         long, value_name = "SHARE", value_parser = share, default_value_t = MIN_LABEL_CONFIDENCE,
         help_heading = "Labels"
@@ -169,7 +169,8 @@ impl MinConfidenceArg {
 
     /// The error of a confidence that no Gaussian of the labels has.
     pub(crate) fn nothing(&self) -> Error {
-        let problem = format!("no Gaussian of the labels has a confidence of {}; lower it", self.min_confidence);
+        let problem =
+            format!("no Gaussian of these labels has a confidence of {} or more; lower the value", self.min_confidence);
         Error::usage("--min-confidence", problem)
     }
 }
@@ -179,7 +180,7 @@ pub(crate) fn or_list<T>(found: Result<T>, model: &Path) -> Result<T> {
     found.map_err(|error| match error {
         Error::Usage { argument, problem } => Error::usage(
             argument,
-            format!("{problem} (labelgs list {} shows all)", quoted(&model.display().to_string())),
+            format!("{problem} (run `labelgs list {}` to see all)", quoted(&model.display().to_string())),
         ),
         other => other,
     })
@@ -187,7 +188,7 @@ pub(crate) fn or_list<T>(found: Result<T>, model: &Path) -> Result<T> {
 
 /// Refuses a model without labels.
 pub(crate) fn require_labels(model: &Path, has_labels: bool) -> Result<()> {
-    const PROBLEM: &str = "the model has no labels; train it with masks, or give it some with labelgs label";
+    const PROBLEM: &str = "the model has no labels; train it with masks, or run `labelgs label`";
     if has_labels { Ok(()) } else { Err(Error::data(model, "", PROBLEM)) }
 }
 

@@ -40,8 +40,8 @@ pub(crate) fn warn_of_misfit(path: &Path, model: &Gaussians, dataset: &Dataset) 
     let found = sample.agreement(|_| ());
     if let Some(why) = misfit(&found) {
         tracing::warn!(
-            "{} does not fit the photos: {why}. It is of another scene or in another frame (moved, scaled or turned): name \
-             its own scene, or bring it into the frame of this one with `labelgs transform`",
+            "{} does not match the photos: {why}. The model belongs to another scene, or is in another coordinate \
+             frame (moved, scaled or rotated). Use the model's own scene, or run `labelgs transform` on the model",
             path.display()
         );
     }
@@ -77,12 +77,12 @@ fn misfit(found: &Agreement) -> Option<String> {
         Some(colour) if colour < COLOUR_WRONG => {
             let share = 100.0 * found.in_picture;
             Some(format!(
-                "{share:.0} % of its Gaussians are in a photo on average, and their colours have nothing to do with it \
-                 (correlation {colour:.2}, usual are 0.7 to 0.9)"
+                "a photo shows {share:.0} % of the Gaussians on average, and their colours do not match (correlation \
+                 {colour:.2}, usually 0.7 to 0.9)"
             ))
         }
         None if found.in_picture < SHARE_WRONG => {
-            Some(format!("{:.1} % of its Gaussians are in a photo on average", 100.0 * found.in_picture))
+            Some(format!("a photo shows only {:.1} % of the Gaussians on average", 100.0 * found.in_picture))
         }
         _ => None,
     }

@@ -13,11 +13,10 @@ use std::path::Path;
 #[derive(Args, Clone, Copy, Debug, Default)]
 #[command(next_help_heading = "Output")]
 pub struct WriteArgs {
-    /// How labels are written: as floats in a PLY, as unsigned integers in a PLY, or not at all. Some programs refuse or
-    /// misread a PLY with integers.
+    /// Type of the labels in a PLY file, or none to write no labels.
     #[arg(long, value_name = "TYPE", value_enum, default_value = "float")]
     pub label_type: LabelType,
-    /// Version of SPZ files: 3 is read by most viewers, 4 is smaller.
+    /// SPZ version: most viewers read 3; 4 is smaller.
     #[arg(long, value_name = "VERSION", value_enum, default_value = "3")]
     pub spz_version: SpzVersion,
 }
@@ -28,7 +27,7 @@ impl WriteArgs {
         let first_view = match first_view(model) {
             // It is what a page is for; other files are as good without it.
             Err(error) if !is_page(output) => {
-                tracing::warn!("{error}; the file will not say where to see it from");
+                tracing::warn!("{error}; the file will have no initial view");
                 None
             }
             found => found?,

@@ -73,7 +73,7 @@ pub(crate) fn choose_objects(
     let files: BTreeMap<&str, PathBuf> = match files_of_photos(lists, &unique)? {
         Some(files) => unique.iter().zip(files).filter_map(|(name, file)| Some((*name, file?))).collect(),
         None => {
-            let problem = "no training view has nested masks here; check the names of the lists";
+            let problem = "no training view has nested masks in this folder; check the file names";
             return Err(Error::data(lists, "", problem));
         }
     };
@@ -99,7 +99,8 @@ pub(crate) fn choose_objects(
         let problem = match min_views {
             Some(least) => format!("no object has masks in {}; lower {}", counted(least, "view"), Setting("min_views")),
             None => {
-                "no object is found that several views confirm; make masks with more points, or less sure ones".into()
+                "no object that several views confirm; run `masks make` with a larger --grid or a lower --min-score"
+                    .into()
             }
         };
         return Err(Error::data(lists, "", problem));

@@ -59,14 +59,14 @@ pub(crate) fn json_file() -> impl TypedValueParser<Value = PathBuf> {
 
 /// Parses the path of a page to write.
 pub(crate) fn page_file() -> impl TypedValueParser<Value = PathBuf> {
-    file_of("html", "a page of HTML")
+    file_of("html", "an HTML page")
 }
 
 /// Parses the path of a sheet of labels to write.
 pub(crate) fn sheet_file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path.extension() {
         Some(ending) if ending.eq_ignore_ascii_case("html") || ending.eq_ignore_ascii_case("png") => Ok(path),
-        _ => Err("expected a name that ends in .html, a page with names and numbers, or in .png, a picture"),
+        _ => Err("expected the extension .html (a page with names and numbers) or .png (an image)"),
     })
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn sheet_file() -> impl TypedValueParser<Value = PathBuf> {
 fn file_of(ending: &'static str, what: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match path.extension() {
         Some(other) if !other.eq_ignore_ascii_case(ending) => {
-            Err(format!("this is {what}; expected a name that ends in .{ending}"))
+            Err(format!("this file is {what}; expected the extension .{ending}"))
         }
         _ => Ok(path),
     })
@@ -115,7 +115,7 @@ pub(crate) fn renumbering(text: &str) -> Result<Renumbering, String> {
         let (old, new) = part.split_once('=').ok_or_else(|| format!("`{part}` is not OLD=NEW, such as 3=7"))?;
         let (old, new) = (label(old)?, label(new)?);
         if map.insert(old, new).is_some() {
-            return Err(format!("{old} gets two new labels"));
+            return Err(format!("label {old} has two new ids"));
         }
     }
     Ok(Renumbering(map))
@@ -132,7 +132,7 @@ pub(crate) fn box_at(text: &str) -> Result<BoxAt, String> {
     let (view, corners) = in_view(text, "VIEW:x0,y0,x1,y1 in whole px, such as 004:100,60,160,120")?;
     let [x0, y0, x1, y1] = corners;
     if x0 >= x1 || y0 >= y1 {
-        return Err(format!("`{text}` is empty; the second corner is right of and below the first"));
+        return Err(format!("`{text}` is empty; the second corner must be right of and below the first"));
     }
     Ok(BoxAt { view, corners })
 }
@@ -185,7 +185,7 @@ pub(crate) fn near(text: &str) -> Result<f32, String> {
 pub(crate) fn place(text: &str) -> Result<DVec3, String> {
     numbers(text)
         .map(DVec3::from_array)
-        .ok_or_else(|| format!("`{text}` is not a place; expected X,Y,Z such as 1.5,0,-2"))
+        .ok_or_else(|| format!("`{text}` is not a point; expected X,Y,Z such as 1.5,0,-2"))
 }
 
 /// Parses a direction: an axis such as `-y`, or X,Y,Z.

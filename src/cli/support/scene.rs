@@ -112,7 +112,7 @@ pub(crate) fn find_view<'a>(dataset: &'a Dataset, name: &str) -> Result<&'a View
     found.copied().ok_or_else(|| {
         let names = || all.iter().map(|view| view.name.as_str());
         let some = || names().take(NAMED_MAX).collect::<Vec<_>>().join(", ");
-        let cure = did_you_mean(name, names()).unwrap_or_else(|| format!("they are {} ...", some()));
+        let cure = did_you_mean(name, names()).unwrap_or_else(|| format!("such as {}", some()));
         let problem = format!("no view is called {name}; the scene has {}, {cure}", counted(all.len(), "view"));
         Error::usage("name of a view", problem)
     })

@@ -16,24 +16,24 @@ use std::path::{Path, PathBuf};
 /// How a model is scored.
 #[derive(Args, Clone, Debug)]
 pub struct ScoreArgs {
-    /// Near plane, world units: nearer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Other
-    /// viewers often draw from 0.01 on; a worse score there shows Gaussians before the cameras that fog the pictures.
+    /// Near plane, world units; closer Gaussians are not drawn. Default: the value of the model's run, else 0.2. Other
+    /// viewers often use 0.01; a lower score with that value means floaters in front of the cameras.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// Gaussians of an object that is rendered alone.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
-    /// Weights of LPIPS v0.1 with VGG16, safetensors (guide, page scores): adds LPIPS. It takes seconds to minutes for a
-    /// picture.
+    /// Also compute LPIPS, with the weights of LPIPS v0.1 (VGG16) in this safetensors file (see the guide, page
+    /// scores). Takes seconds to minutes per image.
     #[arg(long, value_name = "WEIGHTS", help_heading = "Scores")]
     pub lpips: Option<PathBuf>,
-    /// New folder for a web page with ground truth, prediction and difference of every picture.
+    /// Write a web page to this new folder, with ground truth, prediction and difference of every image.
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub page: Option<PathBuf>,
-    /// Least mean PSNR, dB. Exit status 1 if it is lower.
+    /// Exit with status 1 if the mean PSNR is below this, dB.
     #[arg(long, value_name = "DB", help_heading = "Checks")]
     pub min_psnr: Option<f64>,
-    /// Least mean IoU. Exit status 1 if it is lower.
+    /// Exit with status 1 if the mean IoU is below this.
     #[arg(long, value_name = "IOU", help_heading = "Checks")]
     pub min_iou: Option<f64>,
     #[command(flatten)]
@@ -53,7 +53,7 @@ impl Watcher {
     /// Starts a watcher of `total` pictures with a page in `folder`.
     pub(crate) fn new(total: u64, folder: Option<&Path>, context: &Context) -> Result<Self> {
         let page = folder.map(Page::new).transpose()?;
-        Ok(Self { progress: Progress::new(total, "pictures", &context.global), done: 0, page })
+        Ok(Self { progress: Progress::new(total, "images", &context.global), done: 0, page })
     }
 
     /// Writes the page.

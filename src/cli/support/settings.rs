@@ -48,7 +48,7 @@ fn find(name: &str) -> Result<&'static Key, String> {
     let plain = name.trim_start_matches('-').replace('-', "_");
     Settings::keys().find(|key| key.name == plain).ok_or_else(|| {
         let cure = did_you_mean(&plain, Settings::keys().map(|key| key.name));
-        let cure = cure.unwrap_or_else(|| "labelgs train --settings lists all".to_owned());
+        let cure = cure.unwrap_or_else(|| "run `labelgs train --settings` to list all".to_owned());
         format!("there is no setting {name}; {cure}")
     })
 }
@@ -59,7 +59,7 @@ fn problem(error: &clap::Error, value: &str) -> String {
         return format!("`{value}` {problem}");
     }
     match (error.get(ContextKind::ValidValue), error.source()) {
-        (Some(ContextValue::Strings(valid)), _) => format!("`{value}` is none of {}", valid.join(", ")),
+        (Some(ContextValue::Strings(valid)), _) => format!("`{value}` is not one of {}", valid.join(", ")),
         (_, Some(source)) => source.to_string(),
         _ => error.to_string(),
     }
@@ -87,10 +87,10 @@ fn defaults() -> BTreeMap<String, String> {
     for (key, text) in [
         ("background", "black"),
         ("save_at", "none"),
-        ("poses", "that of the format"),
+        ("poses", "the convention of the format"),
         ("near", "0.2, less in a small scene"),
-        ("max_gaussians", "by the memory of the device"),
-        ("budget", "by the photos and the steps"),
+        ("max_gaussians", "by device memory"),
+        ("budget", "by photos and steps"),
     ] {
         defaults.insert(key.into(), text.into());
     }
@@ -195,8 +195,8 @@ fn values(key: &Key, arg: &Arg) -> Option<String> {
 
 /// Returns a line for each setting, by heading.
 fn table(documented: &[(&'static Key, Arg)]) -> String {
-    let mut text = "Settings of `labelgs train`: a flag, or --set KEY=VALUE. A file of --config has them by key.\n\
-         `labelgs train --settings KEY` tells more of one.\n"
+    let mut text = "Settings of `labelgs train`: flags, --set KEY=VALUE, or keys in a --config file.\n\
+         Run `labelgs train --settings KEY` for details of a setting.\n"
         .to_owned();
     let mut headings: Vec<&str> = Vec::new();
     for heading in documented.iter().filter_map(|(_, arg)| arg.get_help_heading()) {

@@ -25,16 +25,16 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Protocol {
-    /// The LabelGS paper: TRUTH/FRAME/OBJECT.png; the first frame is the prompt.
+    /// LabelGS paper: TRUTH/FRAME/OBJECT.png; the first frame is the prompt.
     Labelgs,
-    /// LERF-Mask of Gaussian Grouping: TRUTH/FRAME/PROMPT.png; objects by name.
+    /// LERF-Mask of Gaussian Grouping: TRUTH/FRAME/PROMPT.png; objects are chosen by name.
     LerfMask,
-    /// 3D-OVS: TRUTH/FRAME/CLASS.png and TRUTH/classes.txt; objects by name.
+    /// 3D-OVS: TRUTH/FRAME/CLASS.png and TRUTH/classes.txt; objects are chosen by name.
     #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
-    /// NVOS: masks, reference_image and scribbles, each with a folder per scene.
+    /// NVOS: folders masks, reference_image and scribbles, each with a subfolder per scene.
     Nvos,
-    /// TRUTH/FRAME.png or TRUTH/OBJECT/FRAME.png; the first frame is the prompt, as in SPIn-NeRF.
+    /// SPIn-NeRF and others: TRUTH/FRAME.png or TRUTH/OBJECT/FRAME.png; the first frame is the prompt.
     Binary,
 }
 
@@ -42,9 +42,9 @@ pub enum Protocol {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SelectBy {
-    /// Labels with more than half of their pixels under a mask in one view.
+    /// Labels with more than half of their pixels inside a mask of one view.
     Prompt,
-    /// The label with the object's name in labels.json.
+    /// The label that has the object's name in labels.json.
     Name,
 }
 

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Occlusion {
-    /// No occluders: every pixel outside an object's mask is expected to be black.
+    /// No occluders: all pixels outside of an object's mask should be black.
     None,
-    /// Depth of the model itself, rendered every `occlusion_every` steps. The paper uses monocular depth of a network
+    /// Depth rendered from the model every `occlusion_every` steps. The paper uses monocular depth from a network
     /// instead.
     #[default]
     Rendered,
@@ -26,9 +26,9 @@ pub enum ExposureMode {
     /// On if the brightness of reconstruction points varies between photos.
     #[default]
     Auto,
-    /// Exposures are trained.
+    /// Exposures gains for each photo.
     On,
-    /// All photos have the same exposure, as in 3DGS of 2023.
+    /// Assume the the same exposure for all photos, as 3DGS of 2023.
     Off,
 }
 
@@ -37,12 +37,12 @@ pub enum ExposureMode {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum StrategyKind {
-    /// Growth where it helps most, within a budget that rises during the run.
+    /// Add Gaussians where they help most, within a budget that rises during the run.
     #[default]
     Budget,
     /// Relocation (3DGS-MCMC): dead Gaussians become copies of others, and faint ones move at random.
     Mcmc,
-    /// Adaptive density control (3DGS): Gaussians with large gradients grow.
+    /// Adaptive density control (3DGS): Gaussians with Gaussian with a large gradients grow.
     Adc,
 }
 
@@ -51,9 +51,9 @@ pub enum StrategyKind {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum LabelRule {
-    /// The label of pixels in the step's view where the Gaussian has the largest weight; the last view wins (LabelGS).
+    /// The label of pixels where the Gaussian has the largest weight, in the view of the step; the last view wins (LabelGS).
     Main,
-    /// The label with the largest sum of weights over all views, counted every `vote_every` steps and at the end.
+    /// The label with the largest total weight over all views, counted every `vote_every` steps and at the end.
     #[default]
     Votes,
 }
@@ -66,6 +66,6 @@ pub enum Moments {
     /// Two 32-bit numbers.
     #[default]
     Full,
-    /// Two 16-bit numbers: their ratio, and the logarithm of the second moment.
+    /// Two 16-bit numbers: the moments, and the logarithm of the second moment.
     Half,
 }

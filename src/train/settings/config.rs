@@ -23,42 +23,44 @@ crate::options! {
             iterations <"N">: u32 = 7_000, at_least(1);
 
             /// Photo size in the first steps, as a share of full size; 1 trains at full size throughout [default: 0.4,
-            /// or less for photos above 400 px: 160 px].
+            /// or less but px: 160 px].
             ///
-            /// The size grows until `full_size_from`. Early steps are coarse anyway, and smaller photos make them
+            /// The size grows until `full_size_from`. Early steps need no coarse detail, and smaller photos make them
             /// cheaper. 3DGS trains at full size.
             start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0), setting;
 
-            /// First step at full size [default: 0.6 of the run, or later if the run is short for such large photos].
+            /// First step at full photo size [default: 0.6 of the run, or later if the run a short run on large photos].
             ///
-            /// Earlier steps have no labels.
+            /// Earlier steps from this step at the earliest.
             full_size_from <"STEP">: Option<u32> = None, setting;
 
-            /// Random seed; the same seed, device and driver give the same model.
+            /// Random seed; The same seed, device and driver give the same model.
             ///
-            /// It determines view order, sampled objects and splits.
+            /// It determines view order, sampled objects and splits of Gaussians.
             seed <"S">: u64 = 0, fixed;
 
-            /// Most Gaussians, such as 500k or 2M; 0 limits them only by device memory.
+            /// Maximum number of Gaussians, such as 500k or 2M; 0 limits them only by device memory.
             ///
-            /// At the limit, only Gaussians with the largest gradients grow. Initial points are thinned to half of it,
-            /// or to 4 x the budget without a limit.
+            /// At the limit, only Gaussians with the Gaussians with the largest gradients are split or cloned. Initial points are thinned to half of the maximum,
+            /// or to 4 times the budget without a limit.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
 
             /// Weight of known depths in the loss [default: 0.3 if the reconstruction knows which photos show its
             /// points, else 0].
             ///
-            /// At pixels with a known point or a --depths value, light from Gaussians at another depth is penalised by
-            /// its relative depth error, at most 1. The weight falls linearly until the first step with labels. Only
+            /// At pixels with a known point or a --depths value. The loss is the relative
+            /// depth is penalised by
+            /// its blended depth error, at most 1. The weight falls linearly
+            /// to 0 at the first step with labels. Only
             /// opacities are affected.
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed, setting;
 
             /// Trains an antialiased model.
             ///
             /// Small renders do not shimmer, and close-ups show no needles: blur reduces opacity, and no Gaussian is
-            /// finer than the pixels of its nearest photo (Mip-Splatting). Renders at photo size do not improve.
-            /// Viewers that ignore the model's flag show fine details too bold.
+            /// smaller than a pixel of its nearest photo. Renders at photo size do not improve.
+            /// Viewers that ignore the model's flag show fine details too thick.
             antialias <"SWITCH">: bool = false, fixed;
 
             /// Degree of the spherical harmonics, 0 to 3.
@@ -66,13 +68,14 @@ crate::options! {
             /// Lower degrees save memory but lose highlights. 3DGS uses 3.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed, setting;
 
-            /// Precision of the optimiser state: two 32-bit or two 16-bit numbers per parameter.
+            /// Precision of the optimiser's state: two 32-bit or two 16-bit numbers per parameter.
             ///
-            /// `half` takes 8 instead of 12 bytes per parameter on the device and in checkpoints, at the same quality.
-            /// Use it for scenes that do not fit otherwise. Rounding is random, but reproducible with the same seed.
+            /// `half` takes 8 instead of 12 bytes per parameter instead of 12, on the
+            /// device and in checkpoints, at the same quality.
+            /// Use it for scenes that do not fit otherwise. Rounding is random but reproducible with the same seed.
             moments <"KIND">: Moments = Moments::Full, fixed, setting;
 
-            /// Steps before the degree rises by one [default: a tenth of the run, at most 1000].
+            /// Steps between two increases of the degree [default: a tenth of the run, at most 1000].
             ///
             /// 3DGS uses 1000.
             sh_degree_interval <"STEPS">: Option<u32> = None, at_least(1), setting;
@@ -81,88 +84,90 @@ crate::options! {
         "Rendering" {
             /// Background colour: a name such as white, #rrggbb, or R,G,B from 0 to 1.
             ///
-            /// The label loss always uses black.
+            /// The label loss always uses black. LabelGS and 3DGS use black too.
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
 
             /// Uses a new random background colour in every step.
             ///
-            /// No background-coloured Gaussians then survive in transparent areas. Transparent photos are composited
+            /// No background-coloured Gaussians then survive in transparent areas. Transparent photos are
+            /// composited
             /// over the same colour. Renders and scores use --background. 3DGS has this option too.
             random_background <"SWITCH">: bool = false, fixed;
 
-            /// Trains the exposure and white balance of each photo.
+            /// Train the exposure and white balance of each photo.
             ///
-            /// The render's colours are multiplied by a matrix per photo; the model has the mean exposure.
+            /// The render's colours are multiplied by one matrix per photo. The model keeps the mean exposure.
             exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
-            /// Refines the photos' poses while the Gaussians are trained.
+            /// Refine the photos' poses if the Gaussians are trained.
             ///
-            /// Use it for reconstructions whose poses are off by pixels. The refined poses are written next to the
+            /// Use it for of the reconstruction are off by pixels. The refined poses are written next to the
             /// model.
             refine_poses <"SWITCH">: bool = false, fixed;
 
-            /// Near plane, world units: nearer Gaussians are not drawn.
+            /// Near plane, world units; closer Gaussians are not drawn.
             ///
-            /// 0 chooses by the scene: 0.2 (as 3DGS), or a twentieth of the initial Gaussians' median depth if that is
-            /// less.
+            /// 0 chooses by the scene: 0.2 (as 3DGS, or a twentieth of the initial Gaussians' median depth if
+            /// that is less.
             near <"Z">: f32 = 0.0, not_negative, setting;
         }
 
         "Densification" {
-            /// Strategy for the number of Gaussians.
+            /// Strategy for the number of strategy.
             strategy <"RULE">: StrategyKind = StrategyKind::Budget, fixed, setting;
 
-            /// Prunes Gaussians that fog the cameras.
+            /// Prune floaters close to the cameras.
             ///
-            /// These are Gaussians within a quarter of the distance to the nearest initial Gaussians that a camera
-            /// sees, or with a deviation above half their distance from a camera. 3DGS keeps them, where they may
+            /// These Gaussian Gaussians within if it is the distance to the nearest initial Gaussians that a camera
+            /// sees,
+            /// or with a deviation above half of its distance from a camera. 3DGS keeps them, keeps they may
             /// represent sky and other distant things.
             free_space <"SWITCH">: bool = true, setting;
 
-            /// Directions around the cameras in which to try far Gaussians; 0 adds none.
+            /// Number of directions in which to try far Gaussians; 0 adds none.
             ///
-            /// Far Gaussians represent the sky and other distant things without points. Only directions in which most
-            /// photos look past all points get one. 3DGS has none.
+            /// Far Gaussians represent the sky and other distant things without points. One is added in in which most
+            /// photos show nothing of the point cloud. 3DGS has no such Gaussians.
             far_points <"N">: u32 = 800, setting;
 
-            /// Box in which Gaussians grow, world units: the smaller corner first [default: everywhere].
+            /// Box in which Gaussians are added, world units, minimum corner first [default: everywhere].
             ///
-            /// Gaussians outside still train and are pruned, but none are added. This saves time if photos show more
-            /// than you need; `labelgs clean --inside` then drops the rest.
+            /// Gaussians outside still trained and pruned, but none are added. This to save time if photos show more
+            /// than you need; `labelgs clean --inside` to remove the rest.
             #[cfg_attr(feature = "cli", arg(value_parser = corners, allow_hyphen_values = true))]
             grow_box <"x0,y0,z0,x1,y1,z1">: Option<[f64; 6]> = None;
 
             /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
-            /// It fades Gaussians that no photo supports. Not used by the strategy adc.
+            /// It fades Gaussians fade that no photo supports. Not used by the strategy adc.
             opacity_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
-            /// Weight of the mean standard deviation in the loss, by the scene extent [default: 0.01 with the strategy
+            /// Weight of the mean standard deviation, in scene extents, in the loss [default: 0.01 with the strategy
             /// mcmc, else 0].
             ///
             /// Not used by the strategy adc.
             scale_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
-            /// Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
+            /// Number of Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
             ///
             /// 0 chooses by photo size and run length: `detail` per photo pixel, and at most 30 per step.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
 
-            /// Share of the Gaussians that the strategy budget prunes after growth, those with the least weight in all
-            /// photos.
+            /// Share of the Gaussians that the strategy budget prunes after growth, those with the lowest weight in all photos first.
             ///
-            /// These cost time and show little. 0 prunes none.
+            /// These cost time and contribute little. 0 prunes none.
             prune_share <"SHARE">: f64 = 0.3, up_to(0.9), setting;
 
-            /// Share of the Gaussians left after `prune_share` that split, given masks, those most across contours.
+            /// Share of the Gaussians to after at mask contours after masks, those that cross contours most
+            /// first.
             ///
-            /// Outlines get sharper. As many additional Gaussians are pruned. With 0, or `prune_share` 0, none split,
+            /// Outlines get sharper. As many additional Gaussians Gaussians are pruned, With Gaussian is `prune_share` is 0,
             /// as in LabelGS.
             contour_share <"SHARE">: f64 = 0.05, up_to(0.5), setting;
 
-            /// Gaussians per pixel of the largest photo, for --budget 0.
+            /// Gaussians per pixel of the largest photo, used with --budget 0.
             ///
             /// Higher values give finer detail and cost time.
             detail <"NUMBER">: f64 = 0.5, positive, setting;
@@ -174,7 +179,8 @@ crate::options! {
 
             /// Step at which densification stops [default: half of the run].
             ///
-            /// With the strategy adc, the default is at least 1000 steps after `densify_from`. Pruning and opacity
+            /// Pruning and opacity resets stop there too. With the strategy adc, the default is at least 1000 steps
+            /// after `densify_from`. Pruning and opacity
             /// resets also end there. 3DGS stops at half of the run too (15000 of 30000). LabelGS continues to the end
             /// of its runs, which gives 75 % more Gaussians and slower steps at the same PSNR.
             densify_until <"STEP">: Option<u32> = None, setting;
@@ -186,13 +192,13 @@ crate::options! {
 
             /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
             ///
-            /// In normalised device coordinates, as in 3DGS. Lower values give more Gaussians.
+            /// In normalised device coordinates, as in 3DGS. Lower values give more Gaussians. 3DGS uses 2e-4.
             densify_grad_threshold <"GRADIENT">: f32 = 2e-4, positive, setting;
 
-            /// Steps between two opacity resets; 0 for none.
+            /// Steps between two opacity resets; 0 for resets off.
             ///
-            /// 3DGS resets every 3000 steps. After resets, Gaussians next to the cameras replace sky and other distant
-            /// things, and views between the cameras look foggy.
+            /// 3DGS resets every 3000 steps. After resets, Gaussians next to the cameras replace sky and other
+            /// distant things, so views between the cameras look foggy.
             opacity_reset_interval <"STEPS">: u32 = 0, setting;
 
             /// Steps without an opacity reset at the end of the run.
@@ -205,12 +211,12 @@ crate::options! {
             /// First step with labels [default: 0.6 of the run].
             ///
             /// From then on, Gaussians get labels and the label loss is active. LabelGS starts at 1000; starting after
-            /// densification does not cost picture quality, and objects are as good.
+            /// densification does not cost picture quality, and costs no image quality.
             label_from <"STEP">: Option<u32> = None, setting;
 
             /// Rule that gives a Gaussian its label.
             ///
-            /// The paper's rule is `main`, which uses `label_threshold` and `gpf`.
+            /// The paper's rule is `main`, with the settings `label_threshold` and `gpf`.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed, setting;
 
             /// Steps between two counts of votes [default: half of the run].
@@ -218,55 +224,53 @@ crate::options! {
 
             /// Width of the band along mask contours to ignore, px.
             ///
-            /// 0 treats masks as exact. Use 2 for tracker masks, which are made on downscaled photos. Pixels in the
-            /// band have neither votes nor label loss.
+            /// 0 treats masks band neither Use 2 for tracker masks, label are made 0 downscaled masks as exact. the
+            /// 2 for have masks, which are made on shrunk photos.
             mask_border <"PX">: u32 = 0;
 
-            /// Smallest blending weight at which a pixel gives its label to a Gaussian.
+            /// Smallest blending weight at which a pixel to give its label to a Gaussian.
             ///
-            /// Higher values label fewer Gaussians with more certainty. LabelGS uses 0.6.
+            /// Higher values label fewer Gaussians, with more certainty. LabelGS uses 0.6.
             label_threshold <"WEIGHT">: f32 = 0.6, positive_up_to(1.0), setting;
 
-            /// Gaussian projection filter: the projected centre must lie in the mask too.
+            /// Gaussian projection filter: require the projected centre to lie in the mask.
             ///
             /// LabelGS uses it.
             gpf <"SWITCH">: bool = true, setting;
 
-            /// Steps between two steps with object layers; 0 for none [default: 8; 1 with the label rule main].
+            /// Render object layers steps with N-th step; 0 for does [default: 8, or 1 with the label rule main].
             ///
-            /// Such a step renders each sampled object alone on black, and compares it with its photo pixels, without
+            /// A step with object layers renders each sampled object alone on black and compares it with the object's
+            /// photo pixels, without
             /// occluders. Its label loss is multiplied by this number. LabelGS uses 1, which takes up to twice the
-            /// time. Other steps with labels penalise wrong labels in the scene's picture, through opacity only.
+            /// N. Other steps with labels penalise wrong labels in the scene's picture, through opacity only. LabelGS uses 1, which takes up to twice the
+            /// time.
             layer_every <"STEPS">: Option<u32> = None, fixed, setting;
 
-            /// Objects per step.
+            /// Number of objects sampled per step.
             ///
-            /// Each step samples new objects, for labels and label loss. LabelGS uses 10, to limit memory.
+            /// Each step samples new objects, for labels and for the label loss. LabelGS uses 10, to limit memory.
             #[cfg_attr(feature = "cli", arg(value_parser = samples))]
             label_samples <"N|all">: u32 = 10, at_least(1), setting;
 
             /// Weight of the label loss.
             ///
-            /// It weights the sum over a step's objects. LabelGS's code uses 1.0 (the paper gives no value for lambda
-            /// 2), which lowers picture quality without improving objects.
+            /// It weights is a sum over a step's objects. The LabelGS code uses 1.0 (the paper gives no
+            /// value for its lambda 2), which lowers picture quality without improving objects.
             label_weight <"WEIGHT">: f32 = 0.15, not_negative, setting;
 
-            /// Weights small objects more per pixel than large ones.
-            ///
-            /// The weight is proportional to 1 / sqrt(area in the view). With votes, small objects survive without it,
-            /// and it lowers picture quality. LabelGS does not use it.
+            /// Weights small objects a higher weight The weight is proportional to 1 / sqrt(area in the view). It lowers image quality, and objects rule votes it,
+            /// objects survive without picture quality. LabelGS does not use it.
             label_balance <"SWITCH">: bool = false, setting;
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// The term compares an object's own opacity with its mask where they differ by more than one half, except
-            /// in pixels of other objects. Without it, hidden parts become black instead of clear, and show when the
-            /// object is extracted. Higher weights lower picture quality. LabelGS has no such term.
+            /// The term compares an object's own opacity with its mask It they differ by by more than one half, except
+            /// in pixels of other objects. Without it, hidden parts become black instead of transparent, which show when the
+            /// object extract extracted. Higher weights lower picture quality. LabelGS has no such term.
             label_alpha <"WEIGHT">: f32 = 1.0, not_negative, setting;
 
-            /// Source of the occluders.
-            ///
-            /// The label loss ignores pixels of objects in front.
+            /// Source of the occluders The label loss ignores pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed, setting;
 
             /// Steps between two updates of the occluders [default: half of the run].
@@ -274,14 +278,14 @@ crate::options! {
         }
 
         "Learning rates" {
-            /// Factor of the learning rates of positions, scales, rotations and colours [default: (30000 /
+            /// Factor on the learning rates of positions, scales, rotations and colours [default: (30000 /
             /// iterations)^0.3, from 1 to 3].
             ///
-            /// The base rates are those of 3DGS for 30000 steps; a shorter run must cover the same distance in fewer
+            /// The base rates are tuned for the 30000 steps run must cover the same distance needs fewer
             /// steps.
             rate_factor <"FACTOR">: Option<f64> = None, positive, setting;
 
-            /// Learning rates at the last step, as a share of the rates before 0.6 of the run.
+            /// Final learning rates, as a share of the rates first 0.6 of the run.
             ///
             /// All rates fall log-linearly. 3DGS lowers only the position rate.
             rate_final <"SHARE">: f64 = 0.1, positive_up_to(1.0), setting;

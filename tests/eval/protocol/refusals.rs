@@ -79,7 +79,7 @@ fn the_command_line_refuses_before_a_device_is_needed() {
     columns_file(&Path::new(&truth).join("a/cup.png"), 0..1);
     columns_file(&Path::new(&truth).join("b/cup.png"), 0..1);
     says(&["--protocol", "3d-ovs"], 3, "classes.txt");
-    says(&["--protocol", "nvos", "--compat"], 2, "no published scorer of nvos");
+    says(&["--protocol", "nvos", "--compat"], 2, "there is no published scorer of nvos");
     says(&["--protocol", "labelgs", "--objects", "cup,mug"], 2, "no object mug; it has cup");
     says(&["--protocol", "lerf-mask"], 3, "no labels.json");
     let entry = LabelEntry { name: Some("spoon".into()), ..LabelEntry::new(3) };

@@ -22,29 +22,29 @@ use std::path::{Path, PathBuf};
 /// `labelgs ablate`.
 #[derive(Args, Clone, Debug)]
 pub struct AblateArgs {
-    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
+    /// Scene: a folder (COLMAP, transforms.json, poses_bounds.npy, Metashape) or a .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder of id masks, to train and to score with.
+    /// Folder of id masks for training and scoring.
     #[arg(long, value_name = "DIR")]
     pub masks: PathBuf,
-    /// Folder of masks tracked on the photos alone, for the variant paper-no-dov.
+    /// Folder of masks tracked on the photos only, for the variant paper-no-dov.
     #[arg(long, value_name = "DIR")]
     pub masks_without_dov: Option<PathBuf>,
-    /// Folder of masks to score with. Default: those of --masks.
+    /// Folder of masks for scoring. Default: --masks.
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
-    /// Folder for ablation.json, report.html and the runs, VARIANT-SEED.
+    /// Folder for ablation.json, report.html and a run VARIANT-SEED for each training.
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// Variants, with commas between: no-labels, paper, paper-no-dov, paper-no-gpf, paper-no-oam, paper-votes, ours,
+    /// Comma-separated variants: no-labels, paper, paper-no-dov, paper-no-gpf, paper-no-oam, paper-votes, ours,
     /// ours-no-oam. Default: all.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub rows: Vec<String>,
-    /// Another variant, NAME=FLAGS of `labelgs train`. May be given several times.
+    /// Add a variant: NAME=FLAGS, with flags of `labelgs train`. Repeatable.
     #[arg(long = "row", value_name = "NAME=FLAGS")]
     pub own_rows: Vec<String>,
-    /// Number of runs of each variant; their seeds are 0, 1, ...
+    /// Number of runs per variant, with seeds 0, 1, ...
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     pub seeds: u64,
     /// Flags of `labelgs train` for all variants, after `--`.

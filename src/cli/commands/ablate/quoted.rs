@@ -16,7 +16,7 @@ const ROWS: [Row; 4] = [
 
 /// Returns the results as text.
 pub(super) fn table() -> String {
-    let mut text = "\nquoted from the paper, on other scenes: mIoU / PSNR of the objects\n".to_owned();
+    let mut text = "\nfrom the LabelGS paper, on other scenes: mIoU / PSNR of the objects\n".to_owned();
     text += &format!("{:>24}", "");
     SETS.iter().for_each(|set| text += &format!(" {set:>14}"));
     for (name, cells) in ROWS {

@@ -31,7 +31,7 @@ pub(super) fn table(rows: &[(&str, &[Outcome])]) -> String {
             text += &format!(" {:>width$}", cell(&values, digits));
         }
     }
-    text + if several { "\nmean and half the range over the seeds\n" } else { "\n" }
+    text + if several { "\nmean ± half of the range over the seeds\n" } else { "\n" }
 }
 
 fn cell(values: &[f64], digits: usize) -> String {

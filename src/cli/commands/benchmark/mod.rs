@@ -27,7 +27,7 @@ use table::tables;
 /// `labelgs benchmark`.
 #[derive(Args, Clone, Debug)]
 pub struct BenchmarkArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene of the benchmark.
@@ -39,13 +39,13 @@ pub struct BenchmarkArgs {
     /// Folder with the benchmark's masks of this scene.
     #[arg(long, value_name = "DIR")]
     pub truth: PathBuf,
-    /// How objects are chosen. Default: the rule of the benchmark, which is by name for lerf-mask and 3d-ovs.
+    /// How to select the labels of an object. Default: name for lerf-mask and 3d-ovs, prompt for the others.
     #[arg(long, value_name = "HOW", value_enum)]
     pub by: Option<SelectBy>,
-    /// Score only these objects, names with commas between.
+    /// Score only these objects, comma-separated names.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub objects: Vec<String>,
-    /// Follow the published scorer, mistakes included; only for labelgs and lerf-mask.
+    /// Reproduce the published scorer with its mistakes; only for labelgs and lerf-mask.
     #[arg(long)]
     pub compat: bool,
     #[command(flatten)]
@@ -60,7 +60,8 @@ pub struct BenchmarkArgs {
 pub(crate) fn run(args: &BenchmarkArgs, context: &Context) -> Result<()> {
     let protocol = args.protocol;
     if args.compat && !protocol.has_scorer() {
-        let problem = format!("no published scorer of {} is known; it is for labelgs and lerf-mask", protocol.name());
+        let name = protocol.name();
+        let problem = format!("there is no published scorer of {name}; use this flag with labelgs or lerf-mask");
         return Err(Error::usage("--compat", problem));
     }
     let root = protocol.root(&args.truth);
@@ -145,7 +146,7 @@ fn read_names(args: &BenchmarkArgs, layout: &Layout) -> Result<Option<LabelTable
     };
     let own: Vec<&str> = table.labels.iter().filter_map(|entry| entry.name.as_deref()).collect();
     let problem = format!(
-        "names none of the benchmark's objects ({}); it names {}",
+        "contains no object of the benchmark ({}); its names are {}",
         named.join(", "),
         if own.is_empty() { "none".to_owned() } else { own.join(", ") }
     );

@@ -7,7 +7,7 @@ use crate::eval::protocol::score::PairScores;
 const COLUMNS: [Column<PairScores>; 7] = [
     column("IoU", "IoU", SHARE, |row| row.iou),
     column("by colour", "IoU by colour", SHARE, |row| row.iou_colour),
-    column("bIoU", "IoU of boundaries", SHARE, |row| row.boundary_iou),
+    column("bIoU", "Boundary IoU", SHARE, |row| row.boundary_iou),
     column("accuracy", "Accuracy", SHARE, |row| row.accuracy),
     column("PSNR", "PSNR, dB", DB, |row| row.psnr),
     column("SSIM", "SSIM", SHARE, |row| row.ssim),
@@ -16,7 +16,7 @@ const COLUMNS: [Column<PairScores>; 7] = [
 
 /// Returns the table of objects with averages, then everything that is missing.
 pub(super) fn tables(report: &Report) -> Parts {
-    let compat = if report.compat { ", by the published scorer's ways" } else { "" };
+    let compat = if report.compat { ", as the published scorer" } else { "" };
     let labels = report.objects.values().map(|object| {
         let labels: Vec<String> = object.labels.iter().map(u32::to_string).collect();
         if labels.is_empty() { "none".to_owned() } else { labels.join(",") }
@@ -28,11 +28,11 @@ pub(super) fn tables(report: &Report) -> Parts {
     let mut parts = vec![Part::Title(format!("{}{compat}", report.protocol)), Part::Table(table)];
     let mut note = |text: String| parts.push(Part::Note(text));
     if report.lpips == "no weights" {
-        note("LPIPS: no weights".to_owned());
+        note("LPIPS: no weights (see --lpips)".to_owned());
     }
     let head = &report.headline;
     note(format!("headline: {} {} over {}", head.key, number(head.iou, SHARE), head.average));
-    note(format!("{} pairs of object and frame", report.mean.pair_count));
+    note(format!("{} object-frame pairs", report.mean.pair_count));
     report.rules.iter().for_each(|rule| note(format!("rule: {rule}")));
     report.missing.iter().for_each(|absent| note(absence("missing", absent)));
     report.empty.iter().for_each(|absent| note(absence("empty", absent)));

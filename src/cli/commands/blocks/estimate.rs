@@ -16,7 +16,7 @@ pub struct EstimateArgs {
     /// Gaussians of the whole scene, such as 100M.
     #[arg(long, value_name = "N", value_parser = count)]
     pub gaussians: u64,
-    /// Gaussians of its coarse model. Default: a quarter.
+    /// Gaussians of the coarse model. Default: a quarter of --gaussians.
     #[arg(long, value_name = "N", value_parser = count)]
     pub coarse: Option<u64>,
     /// Number of photos.
@@ -25,19 +25,19 @@ pub struct EstimateArgs {
     /// Size of a photo, px.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1600x1064")]
     pub size: Size,
-    /// Memory of a card, such as 24G.
+    /// GPU memory, such as 24G.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: u64,
-    /// Largest label of the masks; 0 for a scene without masks.
+    /// Largest label id in the masks; 0 for a scene without masks.
     #[arg(long, value_name = "ID", default_value_t = 255)]
     pub labels: u32,
-    /// Steps of a block of up to 300 views; more views have more in proportion.
+    /// Steps for a block of up to 300 views; larger blocks get proportionally more.
     #[arg(long, value_name = "N", default_value_t = 30_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: u32,
-    /// Measured time of a step on photos of this size, ms, for the time that the blocks take.
+    /// Measured time of a step at this photo size, ms, to estimate the training time.
     #[arg(long, value_name = "MS", requires = "step_gaussians")]
     pub step_ms: Option<f64>,
-    /// Gaussians with which it was measured.
+    /// Number of Gaussians in the measurement of --step-ms.
     #[arg(long, value_name = "N", value_parser = count, requires = "step_ms")]
     pub step_gaussians: Option<u64>,
 }
@@ -63,11 +63,11 @@ fn hours(found: &Estimate) -> Option<f64> {
 
 fn to_text(found: &Estimate) -> String {
     let time = match hours(found) {
-        Some(hours) => format!("{hours:.1} hours a block, {:.0} card hours together", hours * found.blocks as f64),
-        None => "an unknown time: give --step-ms".to_owned(),
+        Some(hours) => format!("{hours:.1} hours per block, {:.0} GPU hours in total", hours * found.blocks as f64),
+        None => "unknown time (see --step-ms)".to_owned(),
     };
     format!(
-        "{}, each of {}, {} frozen ones around it and {}\n{} MiB on the card, {} MiB on the host\n\
+        "{}, each with {}, {} frozen Gaussians around it, and {}\n{} MiB of GPU memory, {} MiB of host memory\n\
          {}, {time}\n",
         counted(found.blocks, "block"),
         counted(found.gaussians, "Gaussian"),

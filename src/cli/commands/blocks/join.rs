@@ -12,20 +12,20 @@ pub struct JoinArgs {
     /// Folder that `labelgs blocks split` wrote.
     #[arg(value_name = "BLOCKS")]
     pub blocks: PathBuf,
-    /// Folder of the trainings: a folder for each block, with its name.
+    /// Folder of the trained blocks: a run per block, named after the block.
     #[arg(short, long, value_name = "DIR")]
     pub models: PathBuf,
-    /// Folder of the merged model, which other commands take as that of a run.
+    /// Folder for the joined model; other commands accept it like a run.
     #[arg(short, long, value_name = "CITY")]
     pub output: PathBuf,
-    /// Take the coarse Gaussians where a block has no finished training.
+    /// Use the coarse Gaussians for blocks without a finished run.
     #[arg(long)]
     pub allow_missing: bool,
-    /// Masks whose ids agree within a block only: a folder for each block, with its name. Objects get one id where blocks
-    /// share photos.
+    /// Folder of masks whose ids match within a block only: a subfolder per block, named after the block. Ids are
+    /// matched in photos that blocks share.
     #[arg(long, value_name = "DIR", requires = "scene")]
     pub block_masks: Option<PathBuf>,
-    /// Scene of the photos, for --block-masks.
+    /// Scene with the photos of --block-masks.
     #[arg(long, value_name = "SCENE", requires = "block_masks")]
     pub scene: Option<PathBuf>,
 }
@@ -43,9 +43,9 @@ pub(super) fn run(args: &JoinArgs, context: &Context) -> Result<()> {
 fn sentence(merged: &MergeResult) -> String {
     let (model, all, coarse) = (merged.model.display(), merged.gaussians(), merged.coarse);
     let blocks = merged.blocks.len();
-    let mut text = format!("{model}: {all} Gaussians, {coarse} of them coarse, the others of {blocks} blocks\n");
+    let mut text = format!("{model}: {all} Gaussians, {coarse} of them coarse, the rest from {blocks} blocks\n");
     if merged.devices.len() > 1 {
-        text += &format!("trained on {}: another device makes other bits\n", merged.devices.join("; "));
+        text += &format!("trained on {}; other devices give slightly different results\n", merged.devices.join("; "));
     }
     text
 }

@@ -11,15 +11,15 @@ use clap::Subcommand;
 /// The commands for blocks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum BlocksVerb {
-    /// Show on paper how many blocks a scene takes, before anything is trained.
+    /// Estimate the number of blocks of a scene before training anything.
     ///
     /// Example: labelgs blocks estimate --gaussians 100M --views 5000 --card 24G
     Estimate(estimate::EstimateArgs),
-    /// Write a folder for each block, for `labelgs train --block`, and show Gaussians, memory and time of each.
+    /// Write a folder per block for `labelgs train --block`, and show its Gaussians, memory and time.
     ///
     /// Example: labelgs blocks split scene --model coarse --card 24G -o blocks
     Split(split::SplitArgs),
-    /// Join the trained models of the blocks into one.
+    /// Join the trained blocks into one model.
     ///
     /// Example: labelgs blocks join blocks --models models -o city
     Join(join::JoinArgs),

@@ -15,37 +15,38 @@ use std::path::PathBuf;
 /// `labelgs blocks split`.
 #[derive(Args, Clone, Debug)]
 pub struct SplitArgs {
-    /// Folder or file of the scene.
+    /// Scene: a folder or a file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder of a training of the whole scene, of low resolution or few Gaussians.
+    /// Run of the whole scene at low resolution or with few Gaussians.
     #[arg(long, value_name = "COARSE")]
     pub model: PathBuf,
     /// New folder for the blocks.
     #[arg(short, long, value_name = "BLOCKS", required_unless_present = "dry_run")]
     pub output: Option<PathBuf>,
-    /// Show the blocks, with Gaussians, memory and time of each, and write nothing.
+    /// Only show the blocks with their Gaussians, memory and time; write nothing.
     #[arg(long, conflicts_with = "output")]
     pub dry_run: bool,
-    /// Memory of the card that trains the blocks, such as 24G.
+    /// Memory of the GPU that trains the blocks, such as 24G.
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub card: u64,
-    /// Gaussians of the whole scene at the end of growth, such as 40M. Default: four times those of the coarse model.
+    /// Gaussians of the whole scene after densification, such as 40M. Default: four times the coarse model.
     #[arg(long, value_name = "N", value_parser = count)]
     pub gaussians: Option<u64>,
-    /// Fewest blocks, whatever the card.
+    /// Minimum number of blocks.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub blocks: usize,
-    /// Most views of a block; those that show most of it are taken.
+    /// Maximum number of views per block; the views that show most of the block are used.
     #[arg(long, value_name = "N", default_value_t = PlanOptions::default().max_views)]
     pub max_views: usize,
-    /// Longest side of the photos in the trainings of the blocks, px; 0 for their full size.
+    /// Longest side of the photos in block training, px; 0 keeps the full size.
     #[arg(long, value_name = "PX", default_value_t = 0)]
     pub max_resolution: u32,
-    /// Steps of a block of up to 300 views; more views have more in proportion. Default: those of the coarse training.
+    /// Steps for a block of up to 300 views; larger blocks get proportionally more. Default: the steps of the coarse
+    /// run.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub iterations: Option<u32>,
-    /// Direction of the scene that points up: x, -x, y, -y, z, -z or X,Y,Z. Default: that of the cameras.
+    /// Up direction of the scene: x, -x, y, -y, z, -z or X,Y,Z. Default: the mean up direction of the cameras.
     #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
     pub up: Option<DVec3>,
     #[command(flatten)]
@@ -98,9 +99,9 @@ fn to_text(plan: &Plan, rows: &[BlockRow]) -> String {
     }
     let trained = || rows.iter().filter(|block| block.trained);
     let hours = trained().map(|block| block.minutes).sum::<Option<f64>>().map(|minutes| minutes / 60.0);
-    let hours = hours.map_or("an unknown time".to_owned(), |hours| format!("{hours:.2} card hours"));
+    let hours = hours.map_or("unknown time".to_owned(), |hours| format!("{hours:.2} GPU hours"));
     text + &format!(
-        "{}, {hours} at the pace of the coarse training; {} coarse\n",
+        "{}, {hours} at the speed of the coarse run; {} coarse\n",
         counted(trained().count(), "block"),
         if plan.far == 1 { "1 far Gaussian stays".to_owned() } else { format!("{} far Gaussians stay", plan.far) }
     )

@@ -96,7 +96,7 @@ impl Job<'_> {
         let model = open_model(&args.model)?;
         warn_of_misfit(&args.model, &model, self.dataset)?;
         if args.removal && model.labels.is_none() {
-            let problem = "has no labels to remove objects by; train it with masks, or give it some with labelgs label";
+            let problem = "has no labels, and --removal needs them; train it with masks, or run `labelgs label`";
             return Err(Error::data(&args.model, "", problem));
         }
         let train = if args.removal { train_with_masks(args, self.dataset)? } else { Vec::new() };
@@ -128,7 +128,7 @@ impl Job<'_> {
         let args = self.args;
         for (flag, typed) in [("--removal", args.removal), ("--refine-poses", args.refine_poses)] {
             if typed {
-                let problem = "needs the whole model in the memory of the device, and it does not fit; leave it out";
+                let problem = "needs the whole model in device memory, and the model does not fit; omit this flag";
                 return Err(Error::usage(flag, problem));
             }
         }
@@ -156,7 +156,7 @@ impl Job<'_> {
 fn train_with_masks<'a>(args: &EvalArgs, dataset: &'a Dataset) -> Result<Vec<&'a View>> {
     let train: Vec<&View> = dataset.train.iter().filter(|view| view.mask.is_some()).collect();
     if train.is_empty() {
-        let problem = "no training view has a mask; --removal shows the paper's rule, which needs some";
+        let problem = "no training view has a mask; --removal needs masks for the paper's rule";
         return Err(Error::data(args.masks.clone().unwrap_or_default(), "", problem));
     }
     Ok(train)
@@ -169,8 +169,8 @@ fn without(folder: &Path, id: u32, view: &View) -> Result<Option<Photo>> {
     let (width, height) = (view.camera.width, view.camera.height);
     if (picture.width, picture.height) != (width, height) {
         let problem = format!(
-            "has {} x {} px, and view {} has {width} x {height} px; a photo without an object has the pixels of the \
-             view, so score without --max-resolution",
+            "has {} x {} px, and view {} has {width} x {height} px; they must be equal, so score without \
+             --max-resolution",
             picture.width, picture.height, view.name
         );
         return Err(Error::data(file, "", problem));
@@ -200,9 +200,9 @@ impl Folders {
     /// Logs what objects are compared with: hidden parts cost a score that counts them.
     fn tell(&self) {
         match &self.amodal {
-            Some(folder) => tracing::info!("whole objects are compared with their outlines in {}", folder.display()),
+            Some(folder) => tracing::info!("whole objects are scored against the outlines in {}", folder.display()),
             None => {
-                tracing::info!("whole objects are compared with their visible masks; --amodal DIR has whole outlines")
+                tracing::info!("objects are scored against their visible masks; use --amodal DIR for whole outlines")
             }
         }
     }

@@ -8,19 +8,19 @@ use crate::files::label_table::LabelTable;
 
 const VIEWS: [Column<MeanScores>; 4] = [
     column("PSNR", "PSNR, dB", DB, |row| row.psnr),
-    column("corrected", "PSNR corrected, dB", DB, |row| row.psnr_corrected),
+    column("corrected", "PSNR after colour correction, dB", DB, |row| row.psnr_corrected),
     column("SSIM", "SSIM", SHARE, |row| row.ssim),
     column("LPIPS", "LPIPS", SHARE, |row| row.lpips),
 ];
 const OBJECTS: [Column<ObjectScores>; 8] = [
     column("IoU", "IoU of the label map", SHARE, |row| row.iou_map),
-    column("bIoU", "IoU of boundaries", SHARE, |row| row.boundary_iou),
+    column("bIoU", "Boundary IoU", SHARE, |row| row.boundary_iou),
     column("whole", "IoU of the whole object", SHARE, |row| row.iou_object),
-    column("paper", "IoU of the paper", SHARE, |row| row.paper_iou),
+    column("paper", "IoU as in the LabelGS paper", SHARE, |row| row.paper_iou),
     column("PSNR", "PSNR alone, dB", DB, |row| row.object_psnr),
     column("SSIM", "SSIM alone", SHARE, |row| row.object_ssim),
-    column("hidden", "IoU where hidden", SHARE, |row| row.iou_hidden),
-    column("dB hidden", "PSNR where hidden, dB", DB, |row| row.psnr_hidden),
+    column("hidden", "IoU of hidden parts", SHARE, |row| row.iou_hidden),
+    column("dB hidden", "PSNR of hidden parts, dB", DB, |row| row.psnr_hidden),
 ];
 const PLACES: [Column<PlaceScore>; 2] = [
     column("PSNR", "PSNR, dB", DB, |row| Some(row.psnr)),
@@ -57,7 +57,7 @@ const HOLES: [Column<ObjectRemoval>; 3] = [
 pub(super) fn tables(scores: &Scores, names: Option<&LabelTable>) -> Parts {
     let mut parts = Vec::new();
     if scores.refined_poses {
-        parts.push(Part::Note("Poses are refined by the model.".to_owned()));
+        parts.push(Part::Note("Poses were aligned with the model.".to_owned()));
     }
     let mean = &scores.mean;
     let views: Vec<(String, MeanScores)> =
@@ -79,7 +79,7 @@ pub(super) fn tables(scores: &Scores, names: Option<&LabelTable>) -> Parts {
     parts.push(Part::Table(Table::new("object", &OBJECTS, rows.chain([("mean".to_owned(), &mean.objects)]))));
     if mean.specks.is_some() {
         let count = number(mean.specks, 1);
-        parts.push(Part::Note(format!("Fragments of the label map that masks do not have: {count} in a view.")));
+        parts.push(Part::Note(format!("Extra fragments in the label map, not in the masks: {count} per view.")));
     }
     parts.extend(removals(scores, &title));
     Parts(parts)
@@ -105,11 +105,11 @@ fn removals(scores: &Scores, title: &impl Fn(u32) -> String) -> Vec<Part> {
     };
     let heading = |text: &str| Part::Title(text.to_owned());
     vec![
-        heading("PSNR at the place of a removed object, against photos without it"),
+        heading("PSNR where an object was removed, against photos without it"),
         table(&REMOVED),
-        heading("the same, against photos without it but with its shadow"),
+        heading("the same, against photos that keep its shadow"),
         table(&SHADOWED),
-        heading("what a removal leaves: shares of the object, and of its area the hole"),
+        heading("remains after removal, as shares of the object, and hole, as a share of its area"),
         table(&LEFT),
         heading("PSNR in the holes"),
         table(&HOLES),

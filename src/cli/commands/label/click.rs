@@ -23,18 +23,18 @@ use std::time::Instant;
 #[command(next_help_heading = "Clicks")]
 #[command(group = ArgGroup::new("places").args(["click", "area"]).multiple(true).requires("network").conflicts_with("masks"))]
 pub struct ClickArgs {
-    /// Label what a network sees at pixel x,y of a view, and keep all other labels; 0,0 is the top left pixel of the photo, or of
-    /// the smaller photo that --max-resolution makes. More clicks, also in other views, are on the same object.
+    /// Label the object that a network finds at pixel x,y of a view, and keep all other labels; 0,0 is the top left
+    /// pixel of the photo, after --max-resolution. Repeat it for more clicks on the same object, in any view.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at)]
     pub click: Vec<At>,
-    /// A pixel that does not belong to the object. May be given several times.
+    /// Mark a pixel that does not belong to the object. Repeatable.
     #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "places")]
     pub not: Vec<At>,
-    /// Label what a network sees in a box of a view: first column and row, and one past the last. With clicks it is around the
-    /// same object.
+    /// Label the object that a network finds in a box of a view: x0 <= x < x1 and y0 <= y < y1. You can combine it with
+    /// clicks on the same object.
     #[arg(id = "area", long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at)]
     pub area: Option<BoxAt>,
-    /// Folder with the segmentation network, as for `masks make`.
+    /// Folder of the segmentation network, as for `masks make`.
     #[arg(long, value_name = "DIR", requires = "places")]
     pub network: Option<PathBuf>,
     /// Name of the object.
@@ -50,7 +50,7 @@ pub(super) fn run(args: &LabelArgs, scene: &Path, context: &Context) -> Result<(
     let hints = hints(&args.clicks, &typed, &photos)?;
     let start = Instant::now();
     let mut clicking = ObjectFinder::new(open_gpu(context)?, &model, &photos, near)?;
-    let stage = Stage::new("asking the network", 0);
+    let stage = Stage::new("running the network", 0);
     let (mut questions, mut before) = (0, 0);
     let rows = clicking.object(&hints, &mut |progress| {
         if let Progress::Asked { done, .. } = progress {
@@ -68,9 +68,9 @@ pub(super) fn run(args: &LabelArgs, scene: &Path, context: &Context) -> Result<(
     let (output, seconds) = (args.output.display().to_string(), start.elapsed().as_secs_f64());
     let name = args.clicks.name.as_ref().map_or(String::new(), |name| format!(" ({name})"));
     let text = format!(
-        "{output}: {} are object {label}{name}, by {} in {seconds:.1} s\n",
+        "{output}: {} are now object {label}{name}, after {} in {seconds:.1} s\n",
         counted(count, "Gaussian"),
-        counted(questions, "question")
+        counted(questions, "prompt")
     );
     context.show(
         &json!({ "schema_version": 1, "output": output, "label": label, "gaussians": count, "seconds": seconds }),

@@ -24,7 +24,7 @@ pub(super) fn run(args: &LabelArgs, labelled: &Path, context: &Context) -> Resul
     export_model(&args.output, &model, table.as_ref(), args.write.options(labelled, &args.output)?)?;
     let output = args.output.display().to_string();
     let text = format!(
-        "{output}: {}: {same} at the same place as one of {}, {near} near one; {none} found none and have no label\n",
+        "{output}: {}: {same} match {} exactly, {near} match a nearby one, {none} match nothing and get no label\n",
         counted(model.len(), "Gaussian"),
         labelled.display(),
     );

@@ -33,18 +33,18 @@ use std::time::Instant;
     .args(["scene", "masks", "per_view", "rule", "mask_border", "min_confidence", "near"])
     .args(["test_every", "max_resolution", "ignore", "poses"]))]
 pub struct LabelArgs {
-    /// The model, of any trainer: a PLY, or the folder of a `labelgs train` run. Masks replace existing labels.
+    /// Model of any trainer: a PLY file, or the output folder of `labelgs train`. Masks replace existing labels.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene with the cameras of the masks.
     #[arg(long, value_name = "SCENE", required_unless_present = "like")]
     pub scene: Option<PathBuf>,
-    /// Folder of id masks, one per view by name; or that of `masks make`, or lists that Segment Anything wrote: then all views
-    /// together choose which of the nested masks are objects.
+    /// Folder of id masks, named as the views. From the folder of `masks make`, or from Segment Anything's mask lists,
+    /// the objects are chosen among the nested masks by agreement of all views.
     #[arg(long, value_name = "DIR", required_unless_present_any = ["places", "like", "strokes"])]
     pub masks: Option<PathBuf>,
-    /// The ids of each view are its own, as from a segmenter of single photos: they are made to agree first, as by
-    /// `masks repair`.
+    /// Match the ids between views first, as `masks repair` does. Use it for masks of a single-image segmenter, whose
+    /// ids differ in each view.
     #[arg(long)]
     pub per_view: bool,
     /// File to write.
@@ -54,25 +54,25 @@ pub struct LabelArgs {
     pub write: WriteArgs,
     #[command(flatten)]
     pub clicks: click::ClickArgs,
-    /// Instead of masks, another model with labels, of which MODEL is a copy that a program has changed: Gaussians may be gone,
-    /// merged, sorted or rounded. Each gets the label of the one at its place, else of the nearest there. Needs no device.
+    /// Copy labels from this labelled model, if MODEL is a copy of it that another program sorted, rounded, thinned or
+    /// merged. Each Gaussian gets the label at its position, else the label of the nearest Gaussian. Needs no device.
     #[arg(long, value_name = "LABELLED", conflicts_with_all = ["views", "ClickArgs", "FileArgs", "strokes"])]
     pub like: Option<PathBuf>,
-    /// File of lines over photos, on objects and on what belongs to none, instead of masks. Their objects get the labels and names of
-    /// the file, and other labels stay.
+    /// Label objects from strokes over photos, on objects and on background, listed in this file. Labels and names come
+    /// from the file; other labels are kept.
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["masks", "places"], help_heading = "Strokes")]
     pub strokes: Option<PathBuf>,
-    /// How a Gaussian gets its label: by the votes of all views, or as in the paper's training, from the last view in
-    /// which it is the main Gaussian of a pixel.
+    /// How to label a Gaussian: by votes of all views, or as in the paper, by the last view in which it dominates a
+    /// pixel.
     #[arg(long, value_name = "RULE", value_enum, default_value = "votes", help_heading = "Labels")]
     pub rule: LabelRule,
-    /// Ignore the votes of pixels within this distance of a mask's contour, px; 2 suits masks of trackers.
+    /// Ignore pixels this close to a mask contour, px. Use 2 for tracker masks.
     #[arg(long, value_name = "PX", default_value_t = 0, help_heading = "Labels")]
     pub mask_border: u32,
-    /// Least share of a Gaussian's votes that its label needs; below, the Gaussian gets no label.
+    /// Minimum share of votes for a label; Gaussians below it get no label.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, help_heading = "Labels")]
     pub min_confidence: f32,
-    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are ignored. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// How the scene is read. Test views have no votes.
@@ -101,7 +101,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         return Err(Error::data(
             folder,
             "",
-            "no training view has a mask here; check the names of the masks and --test-every",
+            "no training view has a mask in this folder; check the names of the masks and --test-every",
         ));
     }
     warn_of_misfit(&args.model, &model, &dataset)?;
@@ -144,7 +144,7 @@ fn finish(
     let (output, gaussians) = (args.output.display().to_string(), model.len());
     let objects = || rows.iter().filter(|row| row.label != 0);
     let text = format!(
-        "{output}: {} of {} belong to {}, by {} in {seconds:.1} s\n",
+        "{output}: {} of {} belong to {}, from {} in {seconds:.1} s\n",
         objects().map(|row| row.count).sum::<u64>(),
         counted(gaussians, "Gaussian"),
         counted(objects().count(), "object"),

@@ -41,7 +41,7 @@ pub(super) fn run(args: &LabelArgs, (scene, path): (&Path, &Path), context: &Con
     let mut rows = summarise(&model);
     rows.retain(|row| labels.contains(&row.label));
     let text = format!(
-        "{output}: {} belong to {}, by {} in {seconds:.1} s\n",
+        "{output}: {} belong to {}, from {} in {seconds:.1} s\n",
         counted(rows.iter().map(|row| row.count).sum::<u64>(), "Gaussian"),
         counted(rows.len(), "object"),
         counted(strokes.len(), "stroke")

@@ -16,7 +16,7 @@ pub struct CheckArgs {
     /// Folder of id masks.
     #[arg(value_name = "MASKS")]
     pub masks: PathBuf,
-    /// Scene whose photos the masks belong to.
+    /// Scene with the photos of the masks.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -43,9 +43,9 @@ fn table(args: &CheckArgs, report: &Report) -> String {
     let (masks, photos, ids) = (report.masks, report.photos, report.ids.len());
     let mut text = format!("{}: {masks} masks for {photos} photos, {ids} ids\n", args.masks.display());
     if report.findings.is_empty() {
-        return text + "nothing found\n";
+        return text + "no problems found\n";
     }
-    text += &format!("{:>12} {:>16} {:>6}  what\n", "problem", "photo", "id");
+    text += &format!("{:>12} {:>16} {:>6}  details\n", "problem", "photo", "id");
     report.findings.iter().for_each(|finding| text += &line(finding));
     text
 }

@@ -17,16 +17,16 @@ use std::path::{Path, PathBuf};
 /// `labelgs masks collect`.
 #[derive(Args, Clone, Debug)]
 pub struct CollectArgs {
-    /// Folder of id images, PNG, named as the frames: NNNNN.png.
+    /// Folder of tracked id images, PNG, named as the frames: NNNNN.png.
     #[arg(value_name = "TRACKED")]
     pub tracked: PathBuf,
-    /// The frames.json of `labelgs frames`.
+    /// File frames.json of `labelgs frames`.
     #[arg(long, value_name = "FILE")]
     pub frames: PathBuf,
-    /// Folder for the masks, named as the photos.
+    /// Folder for the masks, which get the names of the photos.
     #[arg(short, long, value_name = "MASKS")]
     pub output: PathBuf,
-    /// Scene of the photos; needed if they were taken through lenses: masks are bent like their photos.
+    /// Scene of the photos; needed if their lenses distort, because masks must match the original photos.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     #[command(flatten)]
@@ -81,7 +81,7 @@ fn windows_of(args: &CollectArgs, video: &Frames) -> Result<BTreeMap<String, Win
     let found = match &args.scene {
         Some(scene) => windows(scene, &args.read.lookup())?,
         None if video.lenses => {
-            return Err(Error::usage("--scene", "is needed: the photos of this video were taken through lenses"));
+            return Err(Error::usage("--scene", "is needed: the photos of this video have lens distortion"));
         }
         None => return Ok(BTreeMap::new()),
     };
@@ -98,7 +98,7 @@ fn ids_of(source: &Path, frame: &Frame) -> Result<LabelMap> {
     let (found, expected) = ((ids.width, ids.height), (frame.camera.width, frame.camera.height));
     if !same_aspect(found, expected) {
         let problem = format!(
-            "has {} x {} px and its frame {} x {} px, which is another shape; track the frames in their own size",
+            "has {} x {} px and its frame {} x {} px, with another aspect ratio; track frames at their original size",
             found.0, found.1, expected.0, expected.1
         );
         return Err(Error::data(source, "", problem));

@@ -12,25 +12,25 @@ use std::path::PathBuf;
 /// `labelgs masks import`.
 #[derive(Args, Clone, Debug)]
 pub struct ImportArgs {
-    /// Folder with the masks, or the folder of a tool or data set that holds it; or a JSON of COCO.
+    /// Folder of masks, the output folder of a tool or data set that contains it, or a COCO JSON file.
     #[arg(value_name = "MASKS")]
     pub folder: PathBuf,
-    /// Scene whose photos the masks belong to.
+    /// Scene with the photos of the masks.
     #[arg(long, value_name = "SCENE")]
     pub scene: PathBuf,
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Format of the masks; auto fails if two formats fit.
+    /// Format of the masks.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "auto")]
     pub format: Format,
-    /// The pred.json of DEVA. Default: pred.json in MASKS, if it exists.
+    /// File pred.json of DEVA. Default: MASKS/pred.json, if it exists.
     #[arg(long, value_name = "FILE")]
     pub pred: Option<PathBuf>,
-    /// Owner of pixels that two masks share, where masks show one object each.
+    /// Which mask gets pixels that several masks cover, in formats with one object per mask.
     #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
     pub overlap: Overlap,
-    /// What makes two masks one object, where masks show one object each.
+    /// Which masks belong to the same object, in formats with one object per mask.
     #[arg(long, value_name = "RULE", value_enum, default_value = "auto")]
     pub object_per: ObjectPer,
     #[command(flatten)]
@@ -70,7 +70,7 @@ fn warn(done: &ImportSummary) {
     let listed = |names: &[String]| names.join(", ");
     if !done.masks_without_photo.is_empty() {
         let names = &done.masks_without_photo;
-        tracing::warn!("{} masks belong to no photo and were left out: {}", names.len(), listed(names));
+        tracing::warn!("{} masks belong to no photo and were skipped: {}", names.len(), listed(names));
     }
     if !done.photos_without_mask.is_empty() {
         let names = &done.photos_without_mask;
@@ -96,12 +96,12 @@ fn meaning(objects: &Objects, args: &ImportArgs) -> String {
         ObjectPer::Mask => {
             let [scene, masks] = [&args.scene, &args.output].map(|path| quoted(&path.to_string_lossy()));
             format!(
-                "ids of each photo are its own ({why}; --object-per). To make them agree:\n  \
+                "ids differ from photo to photo ({why}; see --object-per). To match them, run:\n  \
                  labelgs train {scene} -o plain\n  \
                  labelgs masks repair {masks} --per-view --model plain --scene {scene} -o repaired\n"
             )
         }
-        ObjectPer::Track => format!("masks of one track are one object ({why})\n"),
-        _ => format!("masks of one name are one object ({why})\n"),
+        ObjectPer::Track => format!("masks with the same track id are one object ({why})\n"),
+        _ => format!("masks with the same name are one object ({why})\n"),
     }
 }

@@ -38,25 +38,25 @@ pub struct MakeArgs {
     /// Scene with the photos.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder with the segmentation network as ONNX, the encoder and the decoder: `encoder.onnx` and `decoder.onnx`, as
-    /// exported from Segment Anything, MobileSAM, EdgeSAM or SAM 2.
+    /// Folder of the segmentation network with `encoder.onnx` and `decoder.onnx`, exported from Segment Anything,
+    /// MobileSAM, EdgeSAM or SAM 2.
     #[arg(long, value_name = "DIR")]
     pub network: PathBuf,
-    /// Folder to write: nested/ has all masks of each photo, objects/, parts/ and wholes/ an id picture of each level. Photos
-    /// that have their masks there are left out, so that a stopped run goes on.
+    /// Folder to write: nested/ gets all masks of each photo, and objects/, parts/ and wholes/ get an id image per
+    /// level. Photos that have masks there are skipped, so you can resume an interrupted run.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Points per side of a photo at which the network is asked.
+    /// Number of prompt points along each side of a photo.
     #[arg(long, value_name = "N", default_value_t = GRID, value_parser = clap::value_parser!(u16).range(1..=128))]
     pub grid: u16,
-    /// Least score of a mask by the network's own word.
+    /// Minimum mask quality, as predicted by the network.
     #[arg(long, value_name = "SHARE", default_value_t = MIN_SCORE, value_parser = share)]
     pub min_score: f32,
-    /// Least stability of a mask: its area where the network is surer, over that where it is less sure.
+    /// Minimum stability of a mask: its area at a strict threshold divided by its area at a loose threshold.
     #[arg(long, value_name = "SHARE", default_value_t = MIN_STABILITY, value_parser = share)]
     pub min_stability: f32,
-    /// Threads. Default: as many as there are processors, fewer where memory is short: a photo takes about 400 MB, and each thread
-    /// 60 MB.
+    /// Number of threads. Default: one per CPU core, fewer if memory is short. A photo takes about 400 MB, and each
+    /// thread 60 MB.
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
     #[command(flatten)]
@@ -136,11 +136,11 @@ pub(in crate::cli) fn make(args: &MakeArgs, context: &Context) -> Result<(Value,
     }
     drop(progress);
     if !empty.is_empty() {
-        tracing::warn!("nothing was found in {}: {}", counted(empty.len(), "photo"), empty.join(", "));
+        tracing::warn!("no masks found in {}: {}", counted(empty.len(), "photo"), empty.join(", "));
     }
     let output = args.output.display().to_string();
     let left = files.len() - made;
-    let text = format!("{output}: {} in {}, {left} were there\n", counted(masks, "mask"), counted(made, "photo"));
+    let text = format!("{output}: {} in {}; {left} were done before\n", counted(masks, "mask"), counted(made, "photo"));
     Ok((json!({ "schema_version": 1, "output": output, "photos": made, "left": left, "masks": masks }), text))
 }
 
@@ -160,7 +160,7 @@ fn remember(args: &MakeArgs, network: &Network) -> Result<()> {
     }
     let before: Made = read::json(&path, "how masks were made")?;
     if before != made {
-        let problem = "these masks were made by another network or with other options; name a new folder";
+        let problem = "these masks were made by another network or with other options; use a new folder";
         return Err(Error::data(&path, "", problem));
     }
     Ok(())

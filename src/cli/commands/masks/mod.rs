@@ -23,33 +23,32 @@ use std::path::{Component, Path, PathBuf};
 /// The commands for masks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum MasksVerb {
-    /// Report missing, misnamed, inverted and nearly empty masks, wrong sizes, and ids that come and go. Exit status 1
-    /// if there are any.
+    /// Find problems in masks: missing, misnamed, inverted, nearly empty or wrongly sized masks, and ids that come and
+    /// go. Exits with status 1 if there are any.
     ///
     /// Example: labelgs masks check scene/masks --scene scene
     Check(check::CheckArgs),
-    /// Convert masks of trackers and data sets to one id picture per photo, with labels.json.
+    /// Convert masks of trackers and data sets to one id image per photo, with labels.json.
     ///
     /// Example: labelgs masks import scene/masks --scene scene -o imported
     Import(import::ImportArgs),
-    /// Find masks in each photo by a segmentation network whose weights you name: an id picture for each photo, with ids of
-    /// its own.
+    /// Make masks of each photo with a segmentation network that you provide. Ids differ from photo to photo.
     ///
     /// Example: labelgs masks make scene --network mobile_sam -o made
     Make(make::MakeArgs),
-    /// Write masks whose ids agree in all views, with the help of a trained model.
+    /// Make the ids of masks agree in all views, using a trained model.
     ///
     /// Example: labelgs masks repair scene/masks --model out --scene scene -o repaired
     Repair(repair::RepairArgs),
-    /// Write masks of video frames whose ids agree from frame to frame, where each frame has ids of its own.
+    /// Make the ids of masks agree from frame to frame of a video, by overlap.
     ///
     /// Example: labelgs masks track scene/masks -o tracked
     Track(track::TrackArgs),
-    /// Write the masks of the photos, from the output of a tracker on the video of `labelgs frames`.
+    /// Collect the masks of the photos from the output of a tracker on the video of `labelgs frames`.
     ///
     /// Example: labelgs masks collect tracked --frames video/frames.json -o collected
     Collect(collect::CollectArgs),
-    /// Write masks with the faults of a tracker, to test what a method does with them.
+    /// Add typical tracker faults to masks, for robustness tests.
     ///
     /// Example: labelgs masks spoil scene/masks --fault swap -o spoilt
     Spoil(spoil::SpoilArgs),

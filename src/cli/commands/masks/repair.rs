@@ -21,11 +21,11 @@ use std::path::{Path, PathBuf};
 /// `labelgs masks repair`.
 #[derive(Args, Clone, Debug)]
 pub struct RepairArgs {
-    /// Folder of id masks; or that of `masks make`, or lists that Segment Anything wrote: then all views together choose which
-    /// of the nested masks are objects.
+    /// Folder of id masks. From the folder of `masks make`, or from Segment Anything's mask lists, the objects are
+    /// chosen among the nested masks by agreement of all views.
     #[arg(value_name = "MASKS")]
     pub masks: PathBuf,
-    /// A model of the scene, of any trainer, with or without labels. It shows which masks belong to one object.
+    /// Model of the scene, of any trainer, with or without labels. It tells which masks show the same object.
     #[arg(long, value_name = "MODEL")]
     pub model: PathBuf,
     /// Scene of the masks.
@@ -34,17 +34,16 @@ pub struct RepairArgs {
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// The ids of each view are its own, as from a segmenter of single photos.
+    /// Treat the ids of each view as independent. Use it for masks of a single-image segmenter.
     #[arg(long)]
     pub per_view: bool,
-    /// Least number of views with a mask of an object; objects in fewer views are left out. Default: 2, and 3 for objects among
-    /// nested masks.
+    /// Minimum number of views with a mask of an object; other objects are dropped. Default: 2, or 3 with nested masks.
     #[arg(long, value_name = "N")]
     pub min_views: Option<usize>,
-    /// Make masks for photos without one, except those that are held out.
+    /// Also make masks for photos without one, except held-out photos.
     #[arg(long)]
     pub make_missing: bool,
-    /// Near plane, world units: nearer Gaussians are not seen. Default: the value of the model's run, else 0.2.
+    /// Near plane, world units; closer Gaussians are ignored. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
     /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their outlines.
@@ -81,7 +80,7 @@ pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Va
         return Err(Error::data(
             &args.masks,
             "",
-            "no training view has a mask here; check the names of the masks and --test-every",
+            "no training view has a mask in this folder; check the names of the masks and --test-every",
         ));
     }
     warn_of_misfit(&args.model, &model, &dataset)?;
@@ -170,21 +169,21 @@ fn report(views: &[&View], masks: &[Option<LabelMap>], repairs: &Repairs, args: 
     let mut text = String::new();
     // Ids of single views mean nothing, so that nearly all of them change.
     for &((view, id), new) in renamed.iter().filter(|_| !args.per_view) {
-        text += &format!("{}: {id} is {new}\n", name(view));
+        text += &format!("{}: id {id} becomes {new}\n", name(view));
     }
     for ((view, id), parts) in divided {
         let parts: Vec<String> = parts.iter().map(u16::to_string).collect();
-        text += &format!("{}: {id} is {}\n", name(*view), parts.join(" and "));
+        text += &format!("{}: id {id} is divided into {}\n", name(*view), parts.join(" and "));
     }
     for &(view, id) in left_out.iter().filter(|_| !args.per_view) {
         let least = args.min_views.unwrap_or(OBJECT_VIEWS_MIN);
-        text += &format!("{}: {id} is left out, fewer than {least} views show the object\n", name(view));
+        text += &format!("{}: id {id} is dropped, fewer than {least} views show the object\n", name(view));
     }
     for &(view, id) in filled {
-        text += &format!("{}: {id} was missing\n", name(view));
+        text += &format!("{}: id {id} is filled in\n", name(view));
     }
     text += &format!(
-        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} left out, {} objects filled in, {} masks made\n",
+        "{}: {} objects in {} masks; {} masks renamed, {} divided, {} dropped, {} filled in, {} new masks\n",
         args.output.display(),
         objects.len(),
         masks.iter().flatten().count(),

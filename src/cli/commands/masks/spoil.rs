@@ -20,13 +20,13 @@ pub struct SpoilArgs {
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Fault to add.
+    /// Type of fault.
     #[arg(long, value_name = "FAULT", value_enum)]
     pub fault: Fault,
-    /// Share of the views with the fault.
+    /// Share of views to change.
     #[arg(long, value_name = "SHARE", default_value_t = 0.1)]
     pub share: f64,
-    /// Seed that draws the views.
+    /// Random seed for the choice of views.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
     pub seed: u64,
 }

@@ -16,16 +16,16 @@ use std::path::PathBuf;
 /// `labelgs masks track`.
 #[derive(Args, Clone, Debug)]
 pub struct TrackArgs {
-    /// Folder of id images, PNG, one per frame, in the order of their names; ids need not agree between frames.
+    /// Folder of id images, PNG, one per frame, in name order. Ids may differ from frame to frame.
     #[arg(value_name = "SEGMENTED")]
     pub segmented: PathBuf,
     /// Folder to write; must be new or empty.
     #[arg(short, long, value_name = "TRACKED")]
     pub output: PathBuf,
-    /// Least intersection over union of an object's regions in two frames.
+    /// Minimum IoU of an object between two frames.
     #[arg(long, value_name = "IOU", value_parser = share, default_value_t = 0.1)]
     pub min_overlap: f32,
-    /// Most frames in a row without the object before its id is dropped.
+    /// Number of frames without the object after which its id is dropped.
     #[arg(long, value_name = "FRAMES", default_value_t = 5)]
     pub memory: usize,
 }

@@ -27,38 +27,37 @@ pub struct ProfileArgs {
     /// Scene to time.
     #[arg(value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Use the scene of `labelgs synth` and its masks instead of SCENE.
+    /// Use the scene and masks of `labelgs synth` instead of SCENE.
     #[arg(long)]
     pub synthetic: bool,
     /// Folder of id masks.
     #[arg(long, value_name = "DIR", conflicts_with = "synthetic")]
     pub masks: Option<PathBuf>,
-    /// Use --synthetic without masks.
+    /// Use --synthetic without its masks.
     #[arg(long, requires = "synthetic")]
     pub no_masks: bool,
     /// Which steps, and how.
     #[command(flatten)]
     pub window: Window,
-    /// Start from this model, a PLY or the folder of a `labelgs train` run, instead of the scene's points.
+    /// Start from this model, a PLY file or the output folder of `labelgs train`, instead of the scene's points.
     #[arg(long, value_name = "MODEL")]
     pub model: Option<PathBuf>,
-    /// Time steps as the schedule of a run has them: the first ones are of small photos without labels and without bands
-    /// of colour.
+    /// Follow the schedule of a run: early steps use small photos, no labels and a low degree of spherical harmonics.
     #[arg(long)]
     pub as_scheduled: bool,
-    /// Settings in TOML, such as config.toml of an earlier run.
+    /// Settings file (TOML), such as config.toml of an earlier run.
     #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
     pub config: Option<PathBuf>,
     /// How the scene is read.
     #[command(flatten)]
     pub reading: SceneArgs,
-    /// Compare two files of --json instead. Exit status 1 if a stage became slower beyond noise.
+    /// Compare two --json files instead of measuring. Exits with status 1 if a stage got slower beyond noise.
     #[arg(
         long, help_heading = "Comparison", value_names = ["OLD.json", "NEW.json"], num_args = 2,
         conflicts_with_all = ["scene", "synthetic", "model"]
     )]
     pub compare: Option<Vec<PathBuf>>,
-    /// Share by which a median may grow in --compare.
+    /// Allowed growth of a median in --compare, as a share.
     #[arg(
         long, value_name = "SHARE", value_parser = share, default_value_t = 0.05, requires = "compare",
         help_heading = "Comparison"
@@ -225,7 +224,7 @@ fn workers(gpu: &Gpu) -> Result<Option<Workers>> {
             Ok(count) => (count.max(1), NAME),
             Err(_) => return Err(Error::usage(NAME, format!("is {text}, needs a whole number of threads"))),
         },
-        None => (std::thread::available_parallelism().map_or(1, usize::from), "processors of this machine"),
+        None => (std::thread::available_parallelism().map_or(1, usize::from), "CPU cores of this machine"),
     };
     Ok(Some(Workers { count: count.min(MOST), source }))
 }

@@ -25,17 +25,17 @@ pub(crate) struct Workers {
 /// Which steps are timed, and how.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Window {
-    /// Steps to time.
+    /// Number of steps to time.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     pub steps: u32,
-    /// Steps before the clock starts.
+    /// Number of warm-up steps before timing.
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub warm_up: u32,
-    /// Train this many steps first, to measure a trained scene. The steps after them, which are timed, have photos of full
-    /// size, all bands of colour and, with masks, labels, as at the end of a run.
+    /// Train this many steps before timing. The timed steps then use full-size photos, the full degree of spherical
+    /// harmonics and, with masks, labels, as at the end of a run.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub from_step: u32,
-    /// Let passes overlap as in training. The time of a pass is then what it adds.
+    /// Let passes overlap as in training. The time of a pass is then the time that it adds.
     #[arg(long)]
     pub overlap: bool,
 }
@@ -210,7 +210,7 @@ impl Profile {
         let before = self.from_step + self.warm_up;
         let mut text = format!(
             "device:  {} ({})\nkernels: {}\nsteps {} to {} of a training: {}\n{}, {} at the end; \
-             {} count for the passes, {} first runs of a recording do not; \
+             pass times from {}, without {} first runs of a recording; \
              {}\n\n",
             self.device,
             self.driver,
@@ -233,12 +233,12 @@ impl Profile {
             }
         }
         text += &format!("\n{:<34} {:>16} {:>10} {:>10}\n", "per step", "median", "p90", "mean");
-        text += &spread_line("sum of the passes' timestamps, ms", self.passes_ms, 3);
-        text += &spread_line("host's clock, steps in flight, ms", self.pipeline_ms, 3);
+        text += &spread_line("sum of pass timestamps, ms", self.passes_ms, 3);
+        text += &spread_line("host clock, steps in flight, ms", self.pipeline_ms, 3);
         if let Some(cpu) = self.processor_ms {
-            text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "processor time, all threads, ms", "", "");
+            text += &format!("{:<34} {:>16} {:>10} {cpu:>10.3}\n", "CPU time, all threads, ms", "", "");
         }
-        let moved = [("bytes from the host", self.bytes_to_device), ("bytes to the host", self.bytes_from_device)];
+        let moved = [("bytes to the device", self.bytes_to_device), ("bytes from the device", self.bytes_from_device)];
         moved.iter().for_each(|(name, bytes)| text += &format!("{name:<34} {:>16} {:>10} {bytes:>10.0}\n", "", ""));
         COUNTERS.iter().for_each(|(key, name, _)| text += &spread_line(name, self.counters[key], 0));
         text + "\n" + &self.per_pair_text()
@@ -253,8 +253,8 @@ impl Profile {
         format!(
             "per (pixel, splat) pair walked, ns: blend forward {blend_forward:.3}, blend backward {blend_backward:.3}, \
              {whose}\n\
-             pairs walked per pixel: {:.1}, of which {:.1} % have a weight; the fuller half of the tiles walks {:.3} of \
-             the mean\n",
+             pairs walked per pixel: {:.1}, of which {:.1} % contribute; the busier half of the tiles walks {:.3} \
+             times the mean\n",
             self.counters["pairs_walked"].mean / self.timed.pixels,
             self.contributing_share * 100.0,
             self.balance_of_halves

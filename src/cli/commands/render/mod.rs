@@ -29,30 +29,31 @@ use std::path::PathBuf;
 #[derive(Args, Clone, Debug)]
 #[command(group(clap::ArgGroup::new("from").required(true).args(["scene", "camera", "path", "turntable"])))]
 pub struct RenderArgs {
-    /// The model: a PLY, SPZ, GLB, SOG, USD or .splat, or the folder of a `labelgs train` run.
+    /// Model: a PLY, SPZ, GLB, SOG, USD or .splat file, or the output folder of `labelgs train`.
     #[arg(value_name = "MODEL")]
     pub model: PathBuf,
-    /// Scene whose cameras to use.
+    /// Scene with the cameras.
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Which views: test, train, all, or names with commas between.
+    /// Views: test, train, all, or comma-separated names.
     #[arg(long, value_name = "VIEWS", default_value = "test",
         conflicts_with_all = ["camera", "path", "turntable"])]
     pub views: String,
-    /// Camera to use instead of a scene: JSON with w2c (4 x 4), fx, fy, cx, cy, W, H.
+    /// Camera file to use instead of a scene: JSON with w2c (4 x 4), fx, fy, cx, cy, W, H.
     #[arg(long, value_name = "CAM.json")]
     pub camera: Option<PathBuf>,
-    /// Folder for the pictures, NAME.WHAT.png or .exr; of --path and --turntable 00000.WHAT.png and so on, or a video, CLIP.mp4,
-    /// which ffmpeg makes.
+    /// Folder for the images, NAME.WHAT.png or .exr (00000.WHAT.png and so on with --path and --turntable). With --path
+    /// or --turntable also a video, CLIP.mp4, which needs ffmpeg.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Pictures to write of each view, with commas between.
+    /// Comma-separated kinds of image to write.
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', default_value = "rgb")]
     pub what: Vec<PictureKind>,
-    /// Render only these labels, such as 1,4-6,cup, or those that --name, --at, --box and --mask choose.
+    /// Render only these labels, such as 1,4-6,cup, or without a value the labels selected by --name, --at, --box and
+    /// --mask.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1, conflicts_with = "without")]
     pub only: Option<Option<Picks>>,
-    /// Render all but these labels, or all but those that --name, --at, --box and --mask choose.
+    /// Render all but these labels, or without a value all but the labels selected by --name, --at, --box and --mask.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
     pub without: Option<Option<Picks>>,
     /// Gaussians of `--only`.
@@ -63,7 +64,7 @@ pub struct RenderArgs {
     pub prompts: PromptArgs,
     #[command(flatten)]
     pub table: TableArg,
-    /// File format.
+    /// File format of the images.
     #[arg(long, value_name = "FORMAT", value_enum, default_value = "png", help_heading = "Output")]
     pub format: Format,
     /// Colour behind the scene: a name such as white, #rrggbb, or R,G,B from 0 to 1.
@@ -150,12 +151,12 @@ fn numbered(args: &RenderArgs, cameras: Vec<Camera>) -> Vec<(String, Camera)> {
 /// Refuses what no video can be made of, before any work.
 fn check_video(args: &RenderArgs, shots: &Shots) -> Result<()> {
     if shots.per_second.is_none() {
-        let problem = "a video needs --path or --turntable; name a folder for the pictures of single views";
+        let problem = "a video needs --path or --turntable; use a folder for images of single views";
         return Err(Error::usage("--output", problem));
     }
     kind_of_video(&args.what)?;
     if args.format == Format::Exr {
-        return Err(Error::usage("--format", "a video has 8-bit colours; name a folder in -o for exr"));
+        return Err(Error::usage("--format", "a video has 8-bit colours; use a folder as -o for EXR"));
     }
     video::find_encoder(&args.output).map(drop)
 }
@@ -198,8 +199,8 @@ fn wide_labels(args: &RenderArgs, largest: Option<u32>) -> Result<bool> {
     let Some(label) = largest.filter(|&label| label > LABEL_MAX) else { return Ok(false) };
     if args.format == Format::Png && args.what.contains(&PictureKind::Labels) {
         let problem = format!(
-            "the model has label {label}, and a 16-bit PNG has no place for ids above {LABEL_MAX}; use --format exr, which \
-             writes 32-bit ids, or give the labels smaller ids with `labelgs relabel`"
+            "the model has label {label}, and a 16-bit PNG holds ids up to {LABEL_MAX}; use --format exr for 32-bit \
+             ids, or run `labelgs relabel` to assign smaller ids"
         );
         return Err(Error::usage("--format", problem));
     }
@@ -252,7 +253,7 @@ fn chosen(args: &RenderArgs) -> Result<Option<Choice<'_>>> {
     let turned = args.motion.turntable.as_ref().and_then(Option::as_ref);
     let alone = [("--turntable", turned.map(Some)), ("--only", args.only.as_ref().map(Option::as_ref))];
     if turned.is_some() && (args.only.is_some() || args.without.is_some()) {
-        let problem = "has labels, which are drawn alone; give it none beside --only or --without";
+        let problem = "takes no labels together with --only or --without; use --turntable without a value";
         return Err(Error::usage("--turntable", problem));
     }
     if let Some((flag, picks)) = alone.into_iter().find_map(|(flag, picks)| Some((flag, picks?))) {
@@ -262,8 +263,7 @@ fn chosen(args: &RenderArgs) -> Result<Option<Choice<'_>>> {
         Some(picks) => Ok(Some(Choice { flag: "--without", picks: picks.as_ref(), alone: false })),
         None if args.prompts.is_empty() => Ok(None),
         None => {
-            let problem = "or --without is needed: it says what to do with the labels that --name, --at, --box or \
-                           --mask choose";
+            let problem = "or --without is needed, to say what to do with the labels of --name, --at, --box and --mask";
             Err(Error::usage("--only", problem))
         }
     }

@@ -28,14 +28,14 @@ const RAISED: f64 = 0.35;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Video")]
 pub struct MotionArgs {
-    /// Move the camera along a smooth path through keyframes: JSON with schema_version, fps, and keyframes of a time in seconds and
-    /// a camera as of --camera.
+    /// Move the camera smoothly through the keyframes of this JSON file: schema_version, fps, and keyframes with a time
+    /// in seconds and a camera as for --camera.
     #[arg(long, value_name = "PATH.json")]
     pub path: Option<PathBuf>,
-    /// Move the camera once around these labels, drawn alone; without labels around all that is drawn.
+    /// Move the camera once around these labels, drawn alone, or without a value around the whole render.
     #[arg(long, value_name = "LABELS", value_parser = picks, num_args = 0..=1)]
     pub turntable: Option<Option<Picks>>,
-    /// Length of --turntable, s.
+    /// Duration of --turntable, s.
     #[arg(long, value_name = "S", value_parser = seconds, default_value = "6",
         conflicts_with_all = ["scene", "camera", "path"])]
     pub seconds: f64,
@@ -43,7 +43,7 @@ pub struct MotionArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=240), default_value_t = 30,
         conflicts_with_all = ["scene", "camera", "path"])]
     pub fps: u32,
-    /// Size of a picture of --turntable, px.
+    /// Image size of --turntable, px.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "960x540",
         conflicts_with_all = ["scene", "camera", "path"])]
     pub size: Size,
@@ -57,13 +57,14 @@ pub(super) fn is_video(path: &Path) -> bool {
 /// Returns the kind of picture in a video; fails for several, and for values that are no colours.
 pub(super) fn kind_of_video(what: &[PictureKind]) -> Result<PictureKind> {
     match what {
-        [PictureKind::TopId | PictureKind::TopWeight] => {
-            Err(Error::usage("--what", "top-id and top-weight are no pictures; name a folder in -o, with --format exr"))
-        }
+        [PictureKind::TopId | PictureKind::TopWeight] => Err(Error::usage(
+            "--what",
+            "top-id and top-weight cannot be a video; use a folder as -o, with --format exr",
+        )),
         [one] => Ok(*one),
         _ => Err(Error::usage(
             "--what",
-            "a video shows one kind of picture; name one, or a folder in -o for all of them",
+            "a video shows one kind of image; choose one, or use a folder as -o for all of them",
         )),
     }
 }

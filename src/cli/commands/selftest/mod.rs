@@ -14,8 +14,8 @@ use std::path::PathBuf;
 /// `labelgs selftest`.
 #[derive(Args, Clone, Debug)]
 pub struct SelftestArgs {
-    /// Write a report of this device to FILE, to send to the authors: the device and its driver, the checks, what the
-    /// driver's compiler makes of every kernel, and the times of training steps. Nothing in it is private.
+    /// Write a device report to FILE, to send to the authors: GPU and driver, test results, compiler statistics and
+    /// step times. It contains nothing personal.
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub report: Option<PathBuf>,
 }
@@ -46,7 +46,7 @@ fn checked(context: &Context, checks: &mut Vec<Check>) -> Result<()> {
             "check against float64",
             "error",
             "seconds",
-            "(1 is the largest error allowed)"
+            "(relative to the tolerance: 1 is the maximum)"
         ))?;
     }
     let mut printed = Ok(());

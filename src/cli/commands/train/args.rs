@@ -16,21 +16,21 @@ use std::path::{Path, PathBuf};
 /// `labelgs train`.
 #[derive(Args, Clone, Debug)]
 pub struct TrainArgs {
-    /// List all settings, or tell all of one, and train nothing.
+    /// List all settings, or describe the setting KEY, without training.
     #[arg(long, value_name = "KEY", num_args = 0..=1, exclusive = true, help_heading = "Settings")]
     pub settings: Option<Option<String>>,
-    /// Folder of the scene (COLMAP, transforms.json, poses_bounds.npy, Metashape), or one .json, .npy or .xml file.
+    /// Scene: a folder (COLMAP, transforms.json, poses_bounds.npy, Metashape) or a .json, .npy or .xml file.
     #[arg(value_name = "SCENE")]
     pub scene: PathBuf,
-    /// Folder for the model, its settings and the logs of the run.
+    /// Output folder for the model, settings and logs.
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// Folder of id masks, one per view by name. Without masks the model has no labels.
+    /// Folder of id masks, named as the photos. Without masks, the model has no labels.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
-    /// Folder with a segmentation network, as for `masks make`, for a scene without masks: a model is trained in
-    /// OUT/plain, masks are made in OUT/masks, all views choose objects among them, and the model is trained on with these, for
-    /// a third of the steps. With --resume, a stopped run goes on in the stage where it was.
+    /// For a scene without masks, make them with the segmentation network in this folder, as for `masks make`. labelgs
+    /// trains a model in OUT/plain, makes masks in OUT/masks, chooses objects by agreement of all views, and continues
+    /// training with these masks for a third of the steps. With --resume, an interrupted run resumes in its stage.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["masks", "block", "occluders"])]
     pub network: Option<PathBuf>,
     /// How it trains.
@@ -44,47 +44,46 @@ pub struct TrainArgs {
 /// Flags of a training, without scene and folder.
 #[derive(Args, Clone, Debug)]
 pub struct TrainFlags {
-    /// Go on from the newest checkpoint in OUT, with its settings and masks. Without a checkpoint, start at step 1.
+    /// Resume from the newest checkpoint in OUT, with its settings and masks. Without a checkpoint, start at step 1.
     #[arg(long)]
     pub resume: bool,
-    /// Reopen a lost device and go on from the newest checkpoint, as long as each attempt makes a new checkpoint. Names
-    /// the pass that lost the device; this costs some time.
+    /// If the device is lost, reopen it and resume from the newest checkpoint, as long as each attempt reaches a new
+    /// checkpoint. Errors then name the pass that lost the device, which costs some time.
     #[arg(long, help_heading = "Device")]
     pub restart: bool,
-    /// File of occluders, as written by `labelgs occlusion` or an earlier run. Default: the depth of the model itself
-    /// shows which object hides which.
+    /// File of occluders from `labelgs occlusion` or an earlier run. Default: occluders are found from rendered depth.
     #[arg(long, value_name = "FILE", help_heading = "Labels")]
     pub occluders: Option<PathBuf>,
-    /// Start from this model, of any trainer, in place of the scene's points: a file of any format, or the folder of a
-    /// run. All bands of colour and the full size of the photos count from the first step.
+    /// Start from this model of any trainer instead of the scene's points: a model file or a run. Photos have full size
+    /// and spherical harmonics their full degree from the first step.
     #[arg(long, value_name = "MODEL", help_heading = "Training")]
     pub init: Option<PathBuf>,
-    /// Train this block of the scene alone: a folder that `labelgs blocks split` wrote. It decides the views, the first
-    /// model, steps, seed and number of Gaussians. Flags override what it decides.
+    /// Train only this block of the scene: a folder from `labelgs blocks split`. The block sets the views, the initial
+    /// model, and the default steps, seed and number of Gaussians.
     #[arg(long, value_name = "DIR", conflicts_with = "init", help_heading = "Training")]
     pub block: Option<PathBuf>,
-    /// Folder of pictures named as masks: pixels above 0 are left out of the loss and of votes.
+    /// Folder of images, named as masks, that mark pixels to ignore: pixels above 0 count in no loss or vote.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub ignore: Option<PathBuf>,
-    /// Folder of depth maps that the training is held to, one per photo by name, world units along the axis of the camera:
-    /// EXR, NPY or PFM. Default: the points of the reconstruction.
+    /// Folder of depth maps for supervision, named as the photos, in world units along the camera axis: EXR, NPY or
+    /// PFM. Default: the depths of the reconstruction's points.
     #[arg(long, value_name = "DIR", help_heading = "Scene")]
     pub depths: Option<PathBuf>,
-    /// Settings in TOML, such as config.toml of an earlier run. Flags and --set override them.
+    /// Settings file (TOML), such as config.toml of an earlier run. Flags and --set override it.
     #[arg(long, value_name = "FILE.toml", help_heading = "Settings")]
     pub config: Option<PathBuf>,
-    /// Set what has no flag, such as label_weight=0.3; --settings lists it. May be given several times.
+    /// Change a setting that has no flag, such as label_weight=0.3; --settings lists them. Repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment, help_heading = "Settings")]
     pub sets: Vec<Assignment>,
-    /// Limit of device memory, such as 1500M or 2G. It bounds the number of Gaussians.
+    /// Limit of device memory, such as 1500M or 2G. It limits the number of Gaussians.
     #[arg(long, value_name = "SIZE", value_parser = bytes, help_heading = "Device")]
     pub memory_limit: Option<u64>,
     #[command(flatten)]
     pub files: FileArgs,
-    /// Start from settings for a length and a level of detail: draft for a first look, standard, best, or paper for those
-    /// of LabelGS.
+    /// Preset of length and level of detail: draft for a first look, standard, best, or paper for the settings of
+    /// LabelGS.
     ///
-    /// Flags and --set override them. Those of the paper are, where ours differ:
+    /// Flags and --set override the preset. The paper's settings are, where ours differ:
     #[arg(long, value_name = "NAME", conflicts_with = "config", hide_possible_values = true)]
     pub preset: Option<Preset>,
     #[command(flatten)]

@@ -41,7 +41,7 @@ pub(crate) fn train(request: Request, context: &Context) -> Result<Summary> {
 /// Trains with progress on the terminal and in a browser.
 fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
     let viewer = args.watch.server.start(args.watch.view_share)?;
-    tracing::info!("the training is shown at {}", viewer.address());
+    tracing::info!("view this run at {}", viewer.address());
     let words = TypedOptions { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
     let mut terminal = Terminal { context, progress: None };
     let title = args.output.display().to_string();
@@ -114,7 +114,7 @@ fn sentence(summary: &Summary) -> String {
             mean.ssim.unwrap_or(f64::NAN)
         );
         if let Some(iou) = mean.objects.iou_map {
-            text += &format!(", IoU of labels {iou:.3}");
+            text += &format!(", label IoU {iou:.3}");
         }
     }
     text + "\n"
