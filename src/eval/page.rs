@@ -44,7 +44,7 @@ impl Page {
             // Escaped by `Figure::markup`.
             (PreEscaped(&self.figures))
         };
-        let body = html! { (summary) (section("Pictures", &pictures)) };
+        let body = html! { (summary) (section("Images", &pictures)) };
         let page = page("Scores", &html! { p.quiet { "A labelgs model compared with its ground truth." } }, &body);
         atomic::write(&path, |out| out.write_all(page.as_bytes()))?;
         Ok(path)

@@ -71,8 +71,10 @@ pub fn page(title: &str, tiles: &[Tile]) -> Result<String> {
         }
     };
     let lead = html! {
-        p.quiet { "Each label alone, from the view that shows it best. Sizes are along x, y and z in world units. The edge has the colour \
-                   of the label in label maps." }
+        p.quiet {
+            "Each label alone, from its best view. Sizes are along x, y and z, in world units. The edge has the \
+             colour of the label in label maps."
+        }
     };
     Ok(whole_page(title, &lead, &body))
 }

@@ -75,7 +75,7 @@ impl Chosen {
             }
             Choose::Flood { from, pixel, tolerance, how } => {
                 let first = painter.surface(from, *pixel, source)?.row;
-                let none = || Error::usage("place", "what is here is locked; unlock it first");
+                let none = || Error::usage("point", "everything here is locked; unlock it first");
                 let first = Some(first).filter(|&row| is_free[row]).ok_or_else(none)?;
                 (self.nearby(model)?.flood(model, first, *tolerance, &is_free), *how)
             }
@@ -159,6 +159,6 @@ fn hit(
     let pixels: Vec<usize> = (0..rendered.top_id.len()).into_par_iter().filter(is_hit).collect();
     let rows: BTreeSet<usize> =
         pixels.iter().filter_map(|&pixel| usize::try_from(rendered.top_id[pixel]).ok()).collect();
-    let none = || Error::usage("stroke", "nothing of the model is here");
+    let none = || Error::usage("stroke", "there is no Gaussian here");
     if rows.is_empty() { Err(none()) } else { Ok(rows.into_iter().map(|row| source.row(row)).collect()) }
 }

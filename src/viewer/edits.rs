@@ -120,7 +120,7 @@ impl<'a> Work<'a> {
 
     /// Takes the last change back.
     pub(super) fn undo(&mut self) -> Result<()> {
-        let none = || Error::usage("undo", "there is no change to take back");
+        let none = || Error::usage("undo", "there is no edit to undo");
         let last = self.done.pop().ok_or_else(none)?;
         let kept = self.done.iter().enumerate().rev().find_map(|(at, done)| Some((at + 1, done.after.clone()?)));
         let (from, mut now) = match kept {
@@ -143,7 +143,7 @@ impl<'a> Work<'a> {
 
     /// Makes the change again that was taken back last.
     pub(super) fn redo(&mut self, sights: &mut Sights) -> Result<()> {
-        let none = || Error::usage("redo", "there is no change to make again");
+        let none = || Error::usage("redo", "there is no edit to redo");
         let edit = self.undone.last().cloned().ok_or_else(none)?;
         self.make(edit, sights)?;
         self.undone.pop();
@@ -175,7 +175,7 @@ impl<'a> Work<'a> {
 
     /// Returns once why the list of changes could not be written.
     pub(super) fn take_problem(&mut self) -> Option<String> {
-        self.problem.take().map(|error| format!("{error}. The changes are in memory only"))
+        self.problem.take().map(|error| format!("{error}. The edits are in memory only"))
     }
 
     fn list(&self) -> EditsFile {
@@ -194,7 +194,7 @@ impl<'a> Work<'a> {
     /// Writes the model as it is now, and the list of changes, in case it could not be written before. Returns a sentence
     /// for the page.
     pub(super) fn write(&mut self) -> Result<String> {
-        let none = || Error::usage("write", "nothing has changed; the model is in its file");
+        let none = || Error::usage("save", "there are no unsaved edits");
         let (path, _) = self.output.clone().filter(|_| self.is_changed()).ok_or_else(none)?;
         // As the command line writes it, so that a replay has the same bytes.
         let options = WriteOptions { first_view: self.first_view, ..WriteOptions::default() };

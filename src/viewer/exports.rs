@@ -34,9 +34,9 @@ pub(super) fn export(
     };
     if part.is_empty() {
         let problem = if export.chosen {
-            "no Gaussian is chosen".to_owned()
+            "no Gaussians are selected".to_owned()
         } else {
-            format!("have no Gaussian of a confidence of {MIN_LABEL_CONFIDENCE}")
+            format!("have no Gaussian with a confidence of {MIN_LABEL_CONFIDENCE} or more")
         };
         return Err(Error::usage("labels", problem));
     }
@@ -55,11 +55,11 @@ pub(super) fn free_path(folder: &Path, name: &str, ending: &str) -> Result<PathB
     let is_plain = |letter: char| letter.is_alphanumeric() || " -_.".contains(letter);
     let name = name.trim();
     if name.is_empty() || name.starts_with('.') || name.len() > NAME_MAX || !name.chars().all(is_plain) {
-        let problem = format!("a file has letters, digits, spaces, -, _ and . in its name, at most {NAME_MAX} bytes");
+        let problem = format!("use letters, digits, spaces, -, _ and . in a file name, at most {NAME_MAX} bytes");
         return Err(Error::usage("name", problem));
     }
     if !formats().iter().any(|(_, known)| *known == ending) {
-        return Err(Error::usage("file", format!("{ending} is no extension of a format that is written")));
+        return Err(Error::usage("file", format!("{ending} is not the extension of an output format")));
     }
     let mut taken = BTreeSet::new();
     loop {

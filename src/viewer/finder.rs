@@ -222,7 +222,7 @@ fn place(spot: Spot, photos: &Photos, clicking: &mut ObjectFinder) -> Result<(us
             Ok((view, shares.iter().map(|share| [along(share[0], width), along(share[1], height)]).collect()))
         }
         Spot::Surface(points, eye) => {
-            let none = || Error::usage("place", "no photo sees this place; try another one");
+            let none = || Error::usage("point", "no photo shows this point; try another one");
             clicking.nearest(&points, eye)?.ok_or_else(none)
         }
     }

@@ -102,7 +102,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
                 Err(error) if !is_refused => {
                     is_refused = true;
                     tracing::error!(
-                        "the changes cannot be saved: {error}. The page is still there; a second signal ends it"
+                        "cannot save the edits: {error}. The page keeps running; press Ctrl-C again to exit without saving"
                     );
                 }
                 Err(_) => {}

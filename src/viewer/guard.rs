@@ -111,7 +111,7 @@ fn checked(token: &str) -> Result<String> {
         return Ok(token.to_owned());
     }
     let problem =
-        format!("expected at least {TOKEN_MIN} letters, digits, - and _, such as what `openssl rand -hex 16` prints");
+        format!("expected at least {TOKEN_MIN} letters, digits, - and _, such as the output of `openssl rand -hex 16`");
     Err(Error::usage("the token of the viewer", problem))
 }
 

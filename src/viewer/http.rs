@@ -120,7 +120,7 @@ pub(super) fn answer(stream: &mut TcpStream, status: &str, kind: &str, more: &st
 /// Sends a file to be kept, under its own name.
 pub(super) fn send(stream: &mut TcpStream, path: &Path) {
     let opened = read::open(path).and_then(|file| Ok((file.get_ref().length().map_err(Error::read(path))?, file)));
-    let Ok((length, file)) = opened else { return say(stream, "404 Not Found", "The file is not there any more.") };
+    let Ok((length, file)) = opened else { return say(stream, "404 Not Found", "The file no longer exists.") };
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let coded: String = name.bytes().map(|byte| format!("%{byte:02X}")).collect();
     let more = format!("Content-Disposition: attachment; filename*=UTF-8''{coded}\r\n");

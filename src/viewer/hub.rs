@@ -116,7 +116,7 @@ impl Hub {
                 }
             }
             other if tasks.len() < TASKS_MAX => tasks.push_back((id, other)),
-            _ => client.reply(r#"{"kind":"problem","text":"Too many requests wait. Try again."}"#.into()),
+            _ => client.reply(r#"{"kind":"problem","text":"Too many requests. Try again."}"#.into()),
         }
         self.wake.notify_all();
     }

@@ -48,7 +48,7 @@ impl Object {
         (model, version): (&Gaussians, u64),
     ) -> Result<()> {
         if matches!(pointed, Pointed::Click(_, false)) && !self.is_there() {
-            return Err(Error::usage("place", "click on the object first, then on what does not belong to it"));
+            return Err(Error::usage("point", "click the object first, then exclude what does not belong to it"));
         }
         if self.sent != Some(version) {
             self.finder.set_model(model.clone());
@@ -95,7 +95,7 @@ impl Object {
 
     /// Returns the change that makes a label of it.
     pub(super) fn edit(&self, name: &str) -> Result<Edit> {
-        let none = || Error::usage("object", "none was found yet");
+        let none = || Error::usage("object", "no object was found yet");
         let rows = Rows::from_mask(self.rows().ok_or_else(none)?);
         let name = Some(name.trim().to_owned()).filter(|name| !name.is_empty());
         Ok(Edit::Assign { rows, label: None, name })
@@ -124,7 +124,7 @@ pub(super) fn pointed(
         Find::Click { from, pixel, on } => Some(Pointed::Click(at(from, &[*pixel])?, *on)),
         Find::Box { from, corners: [x0, y0, x1, y1] } => {
             if x0 >= x1 || y0 >= y1 {
-                return Err(Error::usage("corners", "are those of an empty box"));
+                return Err(Error::usage("box", "is empty; drag a larger one"));
             }
             let pixels = match from {
                 Viewpoint::View(_) => vec![[*x0, *y0], [*x1, *y1]],

@@ -79,7 +79,7 @@ impl Painter {
 
     fn draw(&mut self, hub: &Hub, id: ClientId, look: &Look, source: &mut dyn Source) -> Result<Frame> {
         if look.panes.is_empty() || look.panes.len() > 2 {
-            return Err(Error::usage("panes", "are one or two"));
+            return Err(Error::usage("panes", "must be one or two"));
         }
         let start = Instant::now();
         let views = Arc::clone(&self.views);
@@ -87,7 +87,10 @@ impl Painter {
         if let Some([width, height]) = look.size {
             let pixels = u64::from(width) * u64::from(height);
             if pixels == 0 || pixels > PIXELS_MAX {
-                return Err(Error::usage("size", format!("{width} x {height} px is none, or more than {PIXELS_MAX}")));
+                return Err(Error::usage(
+                    "size",
+                    format!("{width} x {height} px is empty, or more than {PIXELS_MAX} pixels"),
+                ));
             }
             full = full.resized(width, height);
         }
@@ -185,7 +188,7 @@ impl Painter {
     pub(super) fn surface(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<Surface> {
         let (small, scale, rendered) = self.seen(from, Parts { depth: true, ..Parts::MAIN }, None, source)?;
         let index = index_of(&small, scale, pixel)?;
-        let none = || Error::usage("place", "nothing of the model is here");
+        let none = || Error::usage("point", "there is no Gaussian here");
         let depth = f64::from(rendered.depth_at(index).ok_or_else(none)?);
         let row = source.row(usize::try_from(rendered.top_id[index]).map_err(|_| none())?);
         let place = small.unproject(small.pixel_centre(index), depth);
@@ -211,7 +214,7 @@ impl Painter {
         };
         let points: Vec<_> = pixels.iter().filter_map(point).collect();
         if points.is_empty() {
-            return Err(Error::usage("place", "nothing of the model is here"));
+            return Err(Error::usage("point", "there is no Gaussian here"));
         }
         Ok(Spot::Surface(points, full.centre()))
     }
@@ -228,7 +231,7 @@ fn index_of(small: &Camera, scale: [f64; 2], pixel: [u32; 2]) -> Result<usize> {
     let along = |axis: usize| ((f64::from(pixel[axis]) + 0.5) * scale[axis]) as u32;
     let (x, y) = (along(0), along(1));
     if x >= small.width || y >= small.height {
-        let problem = format!("{}, {} is outside of the picture", pixel[0], pixel[1]);
+        let problem = format!("{}, {} is outside of the image", pixel[0], pixel[1]);
         return Err(Error::usage("pixel", problem));
     }
     Ok(y as usize * small.width as usize + x as usize)
@@ -245,7 +248,8 @@ fn camera<'a>(views: &'a Views, from: &Viewpoint) -> Result<(Camera, Option<&'a 
             let camera = camera_of(Path::new("camera"), file)?;
             let pixels = u64::from(camera.width) * u64::from(camera.height);
             if pixels > PIXELS_MAX {
-                let problem = format!("{} x {} px are too many; at most {PIXELS_MAX}", camera.width, camera.height);
+                let problem =
+                    format!("{} x {} px is too large; the maximum is {PIXELS_MAX} pixels", camera.width, camera.height);
                 return Err(Error::usage("camera", problem));
             }
             Ok((camera, None))

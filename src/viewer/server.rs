@@ -18,12 +18,16 @@ const CONNECTIONS_MAX: usize = 64;
 /// Opens the port and starts to serve. Returns the rules, which know the address.
 pub(super) fn start(host: &str, port: u16, token: &Token, hub: &Arc<Hub>) -> Result<Guard> {
     let failed = |error: &dyn std::fmt::Display| {
-        Error::usage(Setting("view_host"), format!("cannot listen on {host}, port {port}: {error}; choose another one"))
+        Error::usage(
+            Setting("view_host"),
+            format!("cannot listen on {host}, port {port}: {error}; choose another address"),
+        )
     };
     let address = (host, port).to_socket_addrs().map_err(|error| failed(&error))?.next();
     let address = address.ok_or_else(|| failed(&"the name has no address"))?;
     if *token == Token::Off && !address.ip().is_loopback() {
-        let problem = format!("without it anyone who reaches {host} could watch and change the model; leave it on");
+        let problem =
+            format!("without a token, everyone who reaches {host} could view and edit the model; use a token");
         return Err(Error::usage(Setting("view_no_token"), problem));
     }
     let listener = TcpListener::bind(address).map_err(|error| match error.kind() {
@@ -37,7 +41,7 @@ pub(super) fn start(host: &str, port: u16, token: &Token, hub: &Arc<Hub>) -> Res
     let guard = Guard::new(address, host, token)?;
     let (rules, hub) = (guard.clone(), Arc::clone(hub));
     let spawned = std::thread::Builder::new().name("viewer".into()).spawn(move || accept(&listener, &rules, &hub));
-    spawned.map_err(|error| Error::Bug(format!("no thread for the viewer: {error}")))?;
+    spawned.map_err(|error| Error::Bug(format!("cannot start a thread for the viewer: {error}")))?;
     Ok(guard)
 }
 
@@ -90,16 +94,16 @@ fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
     let is_named = host.is_some_and(|host| !host.is_empty());
     let is_proven = is_named && guard.is_proven(head.value("token"), head.header("Cookie"));
     if !is_proven && !guard.knows_host(host) {
-        let text = "This server does not have that name. Open the printed address, with its token.";
+        let text = "This server does not accept this host name. Open the printed address, with its token.";
         return say(&mut stream, "403 Forbidden", text);
     }
     let is_socket = head.path == "/socket";
     if !Guard::is_same_origin(head.header("Origin"), host, is_socket) {
-        return say(&mut stream, "403 Forbidden", "Another page may not ask this server.");
+        return say(&mut stream, "403 Forbidden", "Requests from other pages are refused.");
     }
     let is_upload = head.method == "POST" && head.path == "/open";
     if head.method != "GET" && !is_upload {
-        return say(&mut stream, "405 Method Not Allowed", "Only GET is answered.");
+        return say(&mut stream, "405 Method Not Allowed", "Only GET requests are allowed.");
     }
     if head.path == "/" && head.value("token").is_some() {
         return enter(&mut stream, guard, &head);
@@ -116,7 +120,7 @@ fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
 /// Turns the token of the address into a cookie and takes it out of the address.
 fn enter(stream: &mut TcpStream, guard: &Guard, head: &Head) {
     if !guard.knows_token(head.value("token")) {
-        return say(stream, "401 Unauthorized", "The token is not that of this server. Open the printed address.");
+        return say(stream, "401 Unauthorized", "The token is wrong. Open the printed address.");
     }
     let more = format!("{}Location: /\r\n", guard.set_cookie().unwrap_or_default());
     answer(stream, "303 See Other", "text/plain; charset=utf-8", &more, b"");
@@ -124,7 +128,7 @@ fn enter(stream: &mut TcpStream, guard: &Guard, head: &Head) {
 
 fn open_socket(mut stream: TcpStream, head: &Head, hub: &Arc<Hub>) {
     let Some(text) = socket::handshake(head) else {
-        return say(&mut stream, "400 Bad Request", "A WebSocket is expected here.");
+        return say(&mut stream, "400 Bad Request", "Expected a WebSocket request.");
     };
     let Some(id) = hub.join() else {
         return say(&mut stream, "503 Service Unavailable", "Too many pages are open. Close one.");
@@ -139,14 +143,14 @@ fn open_socket(mut stream: TcpStream, head: &Head, hub: &Arc<Hub>) {
 fn open_model(stream: &mut TcpStream, head: &Head, hub: &Hub) {
     let (name, ending) = head.value("name").and_then(|name| name.rsplit_once('.')).unwrap_or_default();
     let Some(folder) = hub.folder() else {
-        return say(stream, "409 Conflict", "A training has its own model.");
+        return say(stream, "409 Conflict", "You cannot open another model during training.");
     };
     let received = free_path(&folder, name, &format!(".{}", ending.to_lowercase()))
         .and_then(|path| http::receive(stream, head, &path).map(|()| path));
     match received {
         Ok(path) => {
             hub.note(Message::Open { path });
-            say(stream, "200 OK", "It is opened.");
+            say(stream, "200 OK", "The model is open.");
         }
         Err(error) => say(stream, "400 Bad Request", &error.to_string()),
     }
@@ -170,6 +174,6 @@ fn files(stream: &mut TcpStream, path: &str, hub: &Hub) {
     let found = asked.and_then(|(number, small)| hub.views().picture(number.parse().ok()?, small));
     match found {
         Some((kind, bytes)) => answer(stream, "200 OK", kind, "", &bytes),
-        None => say(stream, "404 Not Found", "There is no such page."),
+        None => say(stream, "404 Not Found", "Page not found."),
     }
 }

@@ -128,7 +128,7 @@ impl Session<'_> {
                 self.hub.reply(id, &json!({ "kind": "exported", "file": file, "name": name }));
                 return Ok(format!("{} in {}.", counted(count, "Gaussian"), path.display()));
             }
-            _ => return Ok("No training runs.".to_owned()),
+            _ => return Ok("No training is running.".to_owned()),
         }
         Ok(String::new())
     }
@@ -157,7 +157,9 @@ impl Session<'_> {
         self.shown = Shown::default();
         self.hub.publish("scene", &self.scene);
         self.changed()?;
-        Ok(saved.map_or(String::new(), |saved| format!("The changes of the model before are in {}.", saved.display())))
+        Ok(saved.map_or(String::new(), |saved| {
+            format!("The edits of the previous model are saved in {}.", saved.display())
+        }))
     }
 
     /// Makes a change; one of rows has those that are chosen.
@@ -181,7 +183,7 @@ impl Session<'_> {
 
     /// Does what a page asks of the object that it points at.
     fn find(&mut self, id: ClientId, find: &Find) -> Result<()> {
-        let none = || Error::usage(Setting("network"), "was not given; without one no object can be found");
+        let none = || Error::usage(Setting("network"), "is missing; finding objects needs a segmentation network");
         let object = self.object.as_mut().ok_or_else(none)?;
         let drawing = &mut self.drawing;
         let pointed = pointed(find, |from, pixels| self.painter.spot(from, pixels, drawing))?;
@@ -270,10 +272,7 @@ impl Session<'_> {
 fn sights_of<'a>(drawing: &'a mut Drawing, views: &'a [&View]) -> impl FnMut(&Gaussians) -> Result<Vec<Sight>> + 'a {
     move |model| {
         if views.is_empty() {
-            return Err(Error::usage(
-                "hole",
-                "is filled by the training views of a scene; open the model with its scene",
-            ));
+            return Err(Error::usage("hole", "needs the training views of a scene; open the model with its scene"));
         }
         drawing.engine.upload_model(model)?;
         sights(&mut drawing.engine, views, drawing.options.near)

@@ -97,7 +97,7 @@ fn read(stream: TcpStream, hub: &Hub, id: ClientId) {
         allowance = (allowance + last.elapsed().as_secs_f64() * RATE_MAX).min(RATE_MAX) - 1.0;
         last = Instant::now();
         if allowance < 0.0 {
-            tracing::warn!("a page sent more than {RATE_MAX} messages in a second; it was disconnected");
+            tracing::warn!("a page sent more than {RATE_MAX} messages per second and was disconnected");
             break;
         }
         match packet {

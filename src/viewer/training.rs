@@ -180,7 +180,7 @@ impl<'a> Watched<'a> {
                 Command::Stop => self.wish.stop = true,
             },
             _ => {
-                let text = "Labels cannot be changed while a training runs or is paused.";
+                let text = "You cannot edit labels while training is running or paused.";
                 hub.reply(id, &json!({ "kind": "problem", "text": text }));
             }
         }
@@ -259,12 +259,14 @@ impl<'a> Watched<'a> {
                 }
                 self.after_step(live)?;
                 if *is_last {
-                    self.notice("The last step is done. The model is scored and written.");
+                    self.notice("The last step is done. Scoring and writing the model ...");
                 }
             }
             Event::Paused { .. } => self.in_pause(live)?,
-            Event::Checkpoint { step, .. } => self.notice(&format!("Step {step} is saved as a checkpoint.")),
-            Event::Model { step, path } => self.notice(&format!("The model of step {step} is in {}.", path.display())),
+            Event::Checkpoint { step, .. } => self.notice(&format!("Saved a checkpoint of step {step}.")),
+            Event::Model { step, path } => {
+                self.notice(&format!("Saved the model of step {step} as {}.", path.display()))
+            }
             Event::Warning(text) => self.notice(text),
             Event::Done(summary) => {
                 let (psnr, iou) = summary

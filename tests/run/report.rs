@@ -40,10 +40,10 @@ fn a_report_is_made_anew_and_compares_runs() {
     assert!(page.contains("&lt;img src=x onerror=alert(1)&gt;&quot;'&amp;"), "the name of the object");
     assert!(page.contains("<h1>scene</h1>") && page.contains("20 of 20 steps"), "{}", &page[..2000]);
     assert!(page.contains("&lt;b&gt;bold out"), "the folder");
-    for part in ["PSNR", "Photo loss", "IoU of labels", "Step time", "growth ends", "labels begin"] {
+    for part in ["PSNR", "Photo loss", "Label IoU", "Step time", "densification ends", "labels start"] {
         assert!(page.contains(part), "{part}");
     }
-    for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned for the last model"] {
+    for part in ["--set label_rule=votes", "densify_interval", "Device memory", "planned at the end"] {
         assert!(page.contains(part), "{part}");
     }
     // A photo, render, label map, mask and difference of the one view that is held out.

@@ -431,7 +431,7 @@ fn a_server_goes_away_and_comes_back(browser: &mut Browser, place: &Place) {
     drop(server);
     browser.until(
         &tab,
-        "!document.querySelector('#veil').hidden && document.querySelector('#veil-head').textContent.includes('gone')",
+        "!document.querySelector('#veil').hidden && document.querySelector('#veil-head').textContent.includes('lost')",
     );
     let server = place.view(&["--view-no-token", "--view-port", &port]);
     browser.until(&tab, "document.querySelector('#veil').hidden");
@@ -440,7 +440,7 @@ fn a_server_goes_away_and_comes_back(browser: &mut Browser, place: &Place) {
     // Another server with a token: the page says what to do.
     drop(server);
     let server = place.view(&["--view-port", &port]);
-    browser.until(&tab, "document.querySelector('#veil-head').textContent.includes('another one')");
+    browser.until(&tab, "document.querySelector('#veil-head').textContent.includes('restarted')");
     drop(server);
     browser.kill(&tab);
     // Refused connections are complaints of the browser itself.

@@ -403,7 +403,7 @@ fn an_interrupted_viewer_loses_no_change() {
     assert!(server.child.try_wait().expect("a status").is_none(), "it waits for the change to be saved");
     std::fs::remove_file(place.path("model-edits")).expect("removed");
     let (status, said) = server.ended();
-    assert!(status == Some(130) && said.contains("cannot be saved"), "{said}");
+    assert!(status == Some(130) && said.contains("cannot save the edits"), "{said}");
     assert!(place.path("model-edits/002.ply").is_file(), "{said}");
 }
 

@@ -68,7 +68,7 @@ fn page(export: &Export, model: &str) -> String {
     let about = about.to_string().replace('<', "\\u003c");
     let title = if export.title.is_empty() { "Model" } else { export.title };
     let body = html! {
-        canvas id="picture" tabindex="0" aria-label="Picture of the model. Drag to turn it, click an object to select it." {}
+        canvas id="picture" tabindex="0" aria-label="The model. Drag to rotate it, click an object to select it." {}
         (panels(title, export.rows.len()))
         script type="application/json" id="about" { (PreEscaped(about)) }
         script type="text/plain" id="model" { (PreEscaped(model)) }
@@ -93,7 +93,7 @@ fn panels(title: &str, count: usize) -> Markup {
         }
         div.card id="chosen" role="status" hidden {
             strong id="chosen-name" {}
-            button type="button" id="alone" aria-pressed="false" { "Show alone" }
+            button type="button" id="alone" aria-pressed="false" { "Show only this" }
             button type="button" id="back" { "Back" }
         }
         footer id="foot" {
@@ -104,15 +104,15 @@ fn panels(title: &str, count: usize) -> Markup {
             details.card id="notes" {
                 summary { "Made with labelgs" }
                 p {
-                    "Values are quantised as in SPZ: positions, sizes, rotations, colours. The browser sorts Gaussians by \
-                     the depth of their centres and blends their colours in steps of 1/256; the engine blends 32-bit \
-                     floats and stops behind opaque ones. Outlines follow whole Gaussians, so they are less sharp than \
+                    "Values are quantised as in preview. Positions, sizes, rotations and colours are quantised as in SPZ files. The \
+                     browser sorts Gaussians by \
+                     the depth of their centres and blends 8-bit colours. in steps of 1/256; the itself blends 32-bit colours. Outlines follow whole Gaussians, so they are less sharp than \
                      in a label map."
                 }
-                p { (counted(count, "Gaussian")) ". " label { input type="checkbox" id="counts"; " Show the number of each object" } }
+                p { (counted(count, "Gaussian")) ". " label { input type="checkbox" id="counts"; " Show Gaussians per object" } }
             }
         }
-        div.card id="message" role="status" { "Reading the model …" }
+        div.card id="message" role="status" { "Loading the model …" }
     }
 }
 
@@ -124,7 +124,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     let (packed, _) =
         inside.ok_or_else(|| Error::data(path, "", "contains no model; only pages written by labelgs can be read"))?;
     let bytes = STANDARD.decode(packed.trim()).map_err(|error| {
-        Error::data(path, "embedded model", format!("is not base64: {error}; the page was cut short or changed"))
+        Error::data(path, "embedded model", format!("is not base64: {error}; the page is truncated or was modified"))
     })?;
     spz::read_bytes(path, &bytes)
 }

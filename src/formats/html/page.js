@@ -50,7 +50,7 @@ async function start() {
   const size = () => [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
   const rig = rigOf(model.positions, about, size());
   const states = about.labels.map(() => ({ shown: true, tinted: false }));
-  const nameOf = ({ id, name }) => name ?? (id === 0 ? 'without a label' : `label ${id}`);
+  const nameOf = ({ id, name }) => name ?? (id === 0 ? 'no label' : `label ${id}`);
   let asked = false, changed = true, chosen = null, isAlone = false;
 
   function lookOf(row) {
@@ -136,9 +136,9 @@ async function start() {
   byId('counts').addEventListener('change', (event) => document.body.classList.toggle('counted', event.target.checked));
 
   function hint(isTouch) {
-    const [move, pick] = isTouch ? ['Two fingers move and zoom.', 'Tap'] : ['Right button moves, wheel zooms.', 'Click'];
-    const twice = isTouch ? 'twice' : 'double-click';
-    byId('hint').textContent = `Drag to turn. ${move}${isLabelled ? ` ${pick} an object to select it, ${twice} to see it alone.` : ''}`;
+    const [move, pick] = isTouch ? ['Use two fingers to pan and zoom.', 'Tap'] : ['Right-drag to pan, scroll to zoom.', 'Click'];
+    const twice = isTouch ? 'double-tap' : 'double-click';
+    byId('hint').textContent = `Drag to rotate. ${move}${isLabelled ? ` ${pick} an object to select it, ${twice} to show only this object.` : ''}`;
   }
   hint(matchMedia('(pointer: coarse)').matches);
   window.addEventListener('pointerdown', ({ pointerType }) => hint(pointerType === 'touch'), true);
@@ -156,7 +156,7 @@ async function start() {
       try {
         rig.views = [{ camera: cameraOf(decodeURIComponent(found[1])) }];
       } catch {
-        fail(new Error('The camera in the address is not one of “render --camera”.'));
+        fail(new Error('The camera in the address is not a camera of “labelgs render --camera”.'));
       }
     }
     home();
@@ -170,7 +170,7 @@ async function start() {
   const full = byId('full');
   full.hidden = !document.fullscreenEnabled;
   full.addEventListener('click', () => (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
-  document.addEventListener('fullscreenchange', () => { full.textContent = document.fullscreenElement ? 'Leave full screen' : 'Full screen'; });
+  document.addEventListener('fullscreenchange', () => { full.textContent = document.fullscreenElement ? 'Exit full screen' : 'Full screen'; });
   window.addEventListener('resize', ask);
   window.addEventListener('hashchange', fromAddress);
   fromAddress();

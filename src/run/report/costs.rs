@@ -12,9 +12,9 @@ const STAGES_MAX: usize = 8;
 /// Returns both sections.
 pub(super) fn costs(runs: &[ReportedRun]) -> Markup {
     let rows = [
-        row(runs, "planned for the first model", |run| run.info.memory.planned_start.map(bytes)),
-        row(runs, "planned for the last model", |run| run.info.memory.planned_end.map(bytes)),
-        row(runs, "peak on the device", |run| run.info.memory.device_peak.map(bytes)),
+        row(runs, "planned at the start", |run| run.info.memory.planned_start.map(bytes)),
+        row(runs, "planned at the end", |run| run.info.memory.planned_end.map(bytes)),
+        row(runs, "peak on the device memory", |run| run.info.memory.device_peak.map(bytes)),
         row(runs, "peak in host memory", |run| run.info.memory.host_peak.map(bytes)),
     ];
     html! {
@@ -54,7 +54,7 @@ fn buffers(run: &ReportedRun) -> Markup {
     html! {
         @if !buffers.is_empty() {
             details {
-                summary { "The largest buffers of the last plan" }
+                summary { "Largest buffers at the end" }
                 p.quiet { "Scratch buffers share memory, so the sum may exceed the plan." }
                 (bars(buffers.iter().map(|(name, size)| (name.clone(), bytes(*size), *size as f64 / largest as f64))))
             }

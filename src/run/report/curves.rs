@@ -30,7 +30,7 @@ pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
         least_span: IOU_AXIS_MIN,
         ceiling: Some(1.0),
         digits: Digits::Fixed(SCORE),
-        ..chart("IoU of labels", "mean over objects", views_of(runs, |scored| scored.iou))
+        ..chart("Label IoU", "mean over objects", views_of(runs, |scored| scored.iou))
     });
     charts.push(Chart {
         scale: Scale::FromZero,
@@ -139,12 +139,12 @@ fn events(run: &ReportedRun) -> Vec<(u32, &'static str)> {
     let train = &run.settings.train;
     let mut events = Vec::new();
     if train.full_size_from() > 0 {
-        events.push((train.full_size_from(), "photos at full size"));
+        events.push((train.full_size_from(), "full-size photos"));
     }
     if run.info.masks.is_some() {
-        events.push((train.labels_from(), "labels begin"));
+        events.push((train.labels_from(), "labels start"));
     }
-    events.push((train.densify_until(), "growth ends"));
+    events.push((train.densify_until(), "densification ends"));
     let again = run.info.parts.iter().filter(|part| part.after > 0).take(MARKS_MAX);
     events.extend(again.map(|part| (part.after, "resumed")));
     let warned = run.history.iter().filter_map(|entry| match entry {

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use std::path::Path;
 
 /// Text for settings that the run decides itself.
-const AUTOMATIC_TEXT: &str = "by the scene and the length of the run";
+const AUTOMATIC_TEXT: &str = "automatic";
 
 /// Returns the title: the name of the scene, or of the run if the scene is unknown.
 pub(super) fn title(runs: &[ReportedRun]) -> String {
@@ -38,7 +38,7 @@ pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
     let of = run.settings.train.iterations;
     html! {
         p.quiet {
-            "labelgs training, " (state) ": " (count(run.steps().into())) " of " (count(of.into())) " steps"
+            "labelgs run, " (state) ": " (count(run.steps().into())) " of " (count(of.into())) " steps"
             @if let Some(gaussians) = run.gaussians() { ", " (count(gaussians)) " Gaussians" }
         }
     }
@@ -50,7 +50,7 @@ pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     let main = [
         row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBELS) + " dB")),
         row(runs, "SSIM", |run| run.test()?.ssim.map(score)),
-        row(runs, "IoU of labels", |run| run.test()?.iou_map.map(score)),
+        row(runs, "Label IoU", |run| run.test()?.iou_map.map(score)),
         row(runs, "Time", |run| run.seconds().map(duration)),
     ];
     if runs.len() > 1 {
@@ -61,13 +61,13 @@ pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     let unscored = runs[0].test().is_none_or(|test| test.psnr.is_none());
     html! {
         dl.numbers { @for (name, value) in tiles { div { dt { (name) } dd { (value) } } } }
-        @if unscored { p.quiet { "No scores: the run has not ended, or has no held-out views." } }
+        @if unscored { p.quiet { "No scores: the run has not finished, or has no held-out views." } }
     }
 }
 
 /// Secondary numbers.
 fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
-    let objects = "IoU of objects, visible parts";
+    let objects = "Object IoU, visible parts";
     [
         row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE))),
         row(runs, "Device memory", |run| run.info.memory.device_peak.map(bytes)),
@@ -139,7 +139,7 @@ pub(super) fn settings(runs: &[ReportedRun]) -> Markup {
         Some(value) => value,
     };
     html! {
-        @if rows.is_empty() { p { "All settings are the defaults." } }
+        @if rows.is_empty() { p { "All settings have their default values." } }
         @else {
             p.quiet { "Settings that differ from the default, by their names in config.toml." }
             div.scroll {

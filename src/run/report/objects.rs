@@ -24,7 +24,7 @@ pub(super) fn objects(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Ma
     }
     ids.sort();
     if ids.is_empty() {
-        return Ok(html! { p.quiet { "No objects: the run has no masks, or has not ended." } });
+        return Ok(html! { p.quiet { "No objects: the run has no masks, or has not finished." } });
     }
     // Objects look the same in all runs.
     let mut pictures = BTreeMap::new();

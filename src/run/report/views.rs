@@ -28,11 +28,11 @@ pub(super) fn views(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<(Mar
     let middle = figures.len() / 2;
     let first = (!figures.is_empty()).then(|| Figure { is_large: true, ..figures.remove(middle) });
     let rest = html! {
-        @if first.is_none() { p.quiet { "No pictures: the run has not ended, or has no held-out views." } }
-        @else if figures.is_empty() { p.quiet { "All pictures are at the top." } }
-        @else { p.quiet { "Other held-out views, the lowest PSNR first." } }
+        @if first.is_none() { p.quiet { "No pictures: the run has not finished, or has no held-out views." } }
+        @else if figures.is_empty() { p.quiet { "All images are at the top." } }
+        @else { p.quiet { "Other held-out views, lowest PSNR first." } }
         @for figure in &figures { (figure.markup()) }
-        @if book.is_full { p.quiet { "More pictures would make this page too large." } }
+        @if book.is_full { p.quiet { "The remaining images are left out to limit the size of this page." } }
     };
     Ok((html! { @if let Some(first) = first { (first.markup()) } }, rest))
 }

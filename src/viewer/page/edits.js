@@ -52,10 +52,10 @@ export class Edits {
     if (this.isFixed || $("export").open) return;
     const option = (value, textContent) => el("option", { value, textContent });
     const { chosen } = this;
-    const what = chosen.length === 1 ? this.labels.title(chosen[0]) : `${chosen.length} labels`;
+    const what = chosen.length === 1 ? this.labels.title(chosen[0]) : `${chosen.length} objects`;
     $("export-what").replaceChildren(
-      ...(this.isChosen() ? [option("chosen", "The chosen Gaussians")] : []),
-      ...(chosen.length > 0 ? [option("labels", what)] : []), option("all", "The whole model"),
+      ...(this.isChosen() ? [option("chosen", "Selected Gaussians")] : []),
+      ...(chosen.length > 0 ? [option("labels", what)] : []), option("all", "Whole model"),
     );
     this.suggest();
     $("export").returnValue = "no";
@@ -95,7 +95,7 @@ export class Edits {
   /** Says that a hole is being filled, which takes a while. */
   setFilling(isFilling) {
     this.isFilling = isFilling;
-    $("act-fill").textContent = isFilling ? "Filling …" : "Remove, fill";
+    $("act-fill").textContent = isFilling ? "Filling …" : "Remove and fill";
     document.body.classList.toggle("busy", isFilling);
     this.refresh();
   }

@@ -38,13 +38,13 @@ export class Labels {
 
   setShown({ hidden, solo }) {
     const isOther = hidden.join() !== this.hidden.join() || solo.join() !== this.solo.join();
-    if (isOther && !this.hasAsked && this.hasShown) toast("Another page has changed which labels are shown.");
+    if (isOther && !this.hasAsked && this.hasShown) toast("Another page changed which objects are visible.");
     this.hasAsked = false;
     this.hasShown = true;
     this.hidden = hidden;
     this.solo = solo;
     $("solo-chip").hidden = solo.length === 0;
-    $("solo-text").textContent = solo.length === 1 ? `Only ${this.title(solo[0])}` : `Only ${solo.length} labels`;
+    $("solo-text").textContent = solo.length === 1 ? `Showing only ${this.title(solo[0])}` : `Showing only ${solo.length} objects`;
     this.render();
   }
 
@@ -96,9 +96,9 @@ export class Labels {
     if (hadFocus) item?.focus({ preventScroll: true });
     const objects = this.rows.filter((row) => row.id !== 0).length;
     $("label-count").textContent = this.rows.length === 0 ? "" : rows.length === this.rows.length ? counted(this.all > this.rows.length ? this.all : objects, "object") : `${rows.length} found`;
-    const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. A training with masks gives them when growth has ended."
-      : this.rows.length === 0 ? "This model has no labels. Train it with masks, label it with labelgs label, or choose its Gaussians here with the tools at the left."
-      : rows.length === 0 ? "No label has this name or id." : "";
+    const empty = this.rows.length === 0 && this.isFixed ? "No labels yet. With masks, training assigns labels after densification."
+      : this.rows.length === 0 ? "This model has no labels. Train it with masks, run labelgs label, or select Gaussians with the tools on the left of the image."
+      : rows.length === 0 ? "No object has this name or id." : "";
     $("label-empty").textContent = empty;
     $("label-empty").hidden = !empty;
     this.list.hidden = Boolean(empty);
@@ -115,7 +115,7 @@ export class Labels {
       if (hasFocused) item.tabIndex = id === this.focused ? 0 : -1;
     }
     $("selection").hidden = this.selected.size === 0;
-    $("selection-count").textContent = this.selected.size === 1 ? this.title([...this.selected][0]) : `${this.selected.size} labels`;
+    $("selection-count").textContent = this.selected.size === 1 ? this.title([...this.selected][0]) : `${this.selected.size} objects`;
   }
 
   item_(id) { return id === undefined ? null : this.list.querySelector(`li[data-id="${Number(id)}"]`); }
@@ -138,7 +138,7 @@ export class Labels {
     const item = el("li", { className: isVisible ? "label" : "label off", tabIndex: -1, role: "option" },
       swatch, name, el("span", { className: "id", textContent: row.id === 0 ? "" : row.id }),
       button("eye", isVisible ? EYE : SHUT, isVisible ? "Hide" : "Show", false),
-      button("solo", SOLO, "Show alone", this.solo.includes(row.id)), facts);
+      button("solo", SOLO, "Show only this", this.solo.includes(row.id)), facts);
     item.dataset.id = row.id;
     return item;
   }
@@ -237,7 +237,7 @@ export class Labels {
   }
 
   send(hidden, solo) {
-    if (this.isFixed) return toast("Labels are hidden in a finished model only: a training draws all of them.", true);
+    if (this.isFixed) return toast("You can hide objects after training.", true);
     this.hasAsked = true;
     this.link.send({ kind: "show", hidden, solo });
   }

@@ -104,8 +104,8 @@ function connection(state) {
   $("state-link").textContent = words[state];
   $("state-link").className = state === "on" ? "dot on" : "dot off";
   if (state === "on") return stage.change();
-  if (state === "off") return veil("The server is gone", "The program has ended or is not reachable. Changes that were not saved are saved when it is ended by Ctrl-C; it prints their file. Started again with the same --view-port and token (LABELGS_VIEW_TOKEN), it has this page back; otherwise open the address that it prints.");
-  if (state === "token") return veil("The server is another one", "It was started anew and asks for its own token. Open the address that labelgs printed last.");
+  if (state === "off") return veil("Connection lost", "labelgs has exited or cannot be reached. On Ctrl-C it saves unsaved edits and prints the file. To reconnect this page, start labelgs again with the same --view-port and token (LABELGS_VIEW_TOKEN). Otherwise open the address that it prints.");
+  if (state === "token") return veil("The server has restarted", "It has a new token. Open the address that labelgs printed last.");
   return undefined;
 }
 
@@ -119,8 +119,8 @@ function over(message) {
   training.end();
   stage.isTraining = false;
   const scores = [message.psnr && `PSNR ${message.psnr.toFixed(2)} dB`, message.iou && `IoU ${message.iou.toFixed(3)}`].filter(Boolean).join(", ");
-  const head = message.stopped ? `Stopped after step ${message.steps}` : "The training is done";
-  veil(head, scores ? `Test views: ${scores}. ` : "", "See the model with", el("code", { textContent: message.command }));
+  const head = message.stopped ? `Stopped after step ${message.steps}` : "Training finished";
+  veil(head, scores ? `Test views: ${scores}. ` : "", "View the model with", el("code", { textContent: message.command }));
 }
 
 /** The hint for newcomers goes with the first click or motion. */
@@ -206,9 +206,9 @@ function frameLabels(ids) {
 
 function setPane(index, pane) {
   if (pane === "error") {
-    if (rig.view === null) { toast("The error needs a photo: choose a view first.", true); return stage.captions(); }
+    if (rig.view === null) { toast("The error image needs a photo. Select a view first.", true); return stage.captions(); }
   } else if (pane === "confidence" && scene?.training) {
-    toast("Confidence is known when the training has ended.", true);
+    toast("Confidence is available after training.", true);
     return stage.captions();
   }
   stage.panes[index] = pane;
@@ -223,7 +223,7 @@ function fly(isFlight) {
 
 const act = {
   home: () => { rig.home(); moved(false); },
-  level: () => { rig.level(); toast("Up is now the up of this picture."); },
+  level: () => { rig.level(); toast("The top of this image is the up direction now."); },
   copyCamera: () => copy(JSON.stringify(rig.file()), "Camera"),
   help: () => $("help").showModal(),
   choose: () => {
@@ -323,20 +323,20 @@ document.addEventListener("dragover", (event) => event.preventDefault());
 document.addEventListener("drop", (event) => {
   event.preventDefault();
   const [file] = event.dataTransfer.files;
-  if (file && !scene?.training) open(file).catch(() => toast("The file could not be sent.", true));
+  if (file && !scene?.training) open(file).catch(() => toast("Could not upload the file.", true));
 });
 
 const KEYS = [
-  ["Drag", "turn around the pivot; in flight, look around"], ["Right, middle or Shift+drag", "move across"], ["Wheel", "nearer and farther"],
-  ["Double click", "set the pivot at the depth below"], ["Click, .", "select the object, or that in the middle; Shift adds, Ctrl takes away"],
-  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "turn"], ["V", "orbit or fly"], ["F, Shift+F", "frame the selection; first camera"],
-  ["O", "find an object: click on it, right click on what is not it, drag a box; Enter keeps, Esc drops"],
-  ["Z", "choose an object by strokes on it; Ctrl+drag or right click: not this"],
-  ["R, T, B", "choose Gaussians in a rectangle, in a line, with a brush; Alt+drag turns"], ["N, U, Y", "in a ball, by like colour, in front or behind"],
-  ["G", "choose the Gaussians of the selection"], ["+, -, L", "grow, shrink, lock what is chosen"], ["Enter, Delete", "give them a label, delete them"], ["J", "measure; boxes of the selection"],
-  ["[ ]", "view before, view after"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two pictures: wipe, side by side"],
-  ["P, hold Space", "photo: bar, switch"], ["H, Shift+H, I", "hide the selection, show all, show it alone"], ["F2, M", "rename, merge"], ["Delete, Shift+Delete", "remove; remove and fill"],
-  ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, nothing, the others"], ["Ctrl+E, Ctrl+S", "export, save the model"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "leave one thing after the other"], ["C", "copy the camera"], ["K", "pause a training, or go on"],
+  ["Drag", "rotate around the pivot, or look around in fly mode"], ["Right, middle or Shift+drag", "pan"], ["Wheel", "zoom"],
+  ["Double click", "set the pivot at this point"], ["Click, .", "select the object under the pointer, or in the centre; Shift adds, Ctrl removes"],
+  ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "rotate"], ["V", "switch between orbit and fly"], ["F, Shift+F", "zoom to the selection, reset the camera"],
+  ["O", "find an object: click it or drag a box, right click excludes; Enter keeps, Esc discards"],
+  ["Z", "select an object by strokes; Ctrl+drag or right click marks background"],
+  ["R, T, B", "select Gaussians by rectangle, lasso, brush; Alt+drag rotates"], ["N, U, Y", "select by sphere, by similar colour, in front or behind"],
+  ["G", "select the Gaussians of the selected objects"], ["+, -, L", "grow, shrink, lock the selected Gaussians"], ["Enter, Delete", "assign a label to them, delete them"], ["J", "measure, and show the box of the selection"],
+  ["[ ]", "previous view, next view"], ["1 – 7", PANES.map(([, name]) => name.toLowerCase()).join(", ")], ["X, Shift+X", "two images: wipe, side by side"],
+  ["P, hold Space", "wipe to the photo, show the photo"], ["H, Shift+H, I", "hide the selection, show all, show only the selection"], ["F2, M", "rename, merge"], ["Delete, Shift+Delete", "remove, remove and fill"],
+  ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, select none, invert"], ["Ctrl+E, Ctrl+S", "export, save"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "cancel, clear, show all"], ["C", "copy the camera"], ["K", "pause or resume training"],
 ];
 $("help-keys").append(...KEYS.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
 

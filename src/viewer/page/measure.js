@@ -37,7 +37,7 @@ export class Measuring {
 
   async setLength() {
     const { distance } = this;
-    const said = await ask("How long is that?", "A length in metres. All lengths are then shown in metres; the model stays as it is.", "Set", "");
+    const said = await ask("Set the scale", "Enter the length of this line in metres. The page then shows all lengths in metres; the model does not change.", "Set", "");
     const metres = Number(said);
     if (said === null || !(metres > 0) || !(distance > 0)) return;
     this.unit = metres / distance;
@@ -66,9 +66,9 @@ export class Measuring {
   render() {
     $("measure").hidden = !this.isOn;
     const { distance } = this;
-    const button = el("button", { type: "button", textContent: "That is …", title: "Set the scale by a known length" });
+    const button = el("button", { type: "button", textContent: "Set length …", title: "Set the scale from a known length" });
     button.addEventListener("click", () => this.setLength());
-    const text = distance === null ? ["Click on the first point", "Click on the second point"][this.points.length] : this.told(distance);
+    const text = distance === null ? ["Click the first point", "Click the second point"][this.points.length] : this.told(distance);
     const cure = this.isScaled ? [el("code", { textContent: `labelgs transform MODEL --scale ${this.unit.toPrecision(5)} -o metres.ply` })] : [];
     $("measure").replaceChildren(el("span", { textContent: text }), ...(distance === null ? [] : [button, ...cure]));
     this.draw();

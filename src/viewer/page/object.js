@@ -78,14 +78,14 @@ export class Finding {
     for (const id of ["object-name", "object-keep"]) $(id).hidden = !has;
     $("object-drop").hidden = !this.isThere;
     const parts = [];
-    if (has) parts.push(`${counted(count, "Gaussian")}${asked && first ? " at first" : ""}`);
+    if (has) parts.push(`${counted(count, "Gaussian")}${asked && first ? " so far" : ""}`);
     if (asked) {
       $("object-progress").style.setProperty("--share", asked.all ? asked.done / asked.all : 0);
-      parts.push(asked.all ? `asking ${asked.done} of ${counted(asked.all, "photo")}` : "looking");
-      if (asked.left) parts.push(`about ${duration(asked.left)} for photos that are new to the network`);
+      parts.push(asked.all ? `checked ${asked.done} of ${counted(asked.all, "photo")}` : "searching");
+      if (asked.left) parts.push(`about ${duration(asked.left)} left for photos that the network has not processed yet`);
     }
-    if (parts.length === 0) parts.push("Click on an object, or drag a box around it");
-    else if (has && !asked) parts.push("click: this too · right click: not this");
+    if (parts.length === 0) parts.push("Click an object, or drag a box around it");
+    else if (has && !asked) parts.push("click adds · right click excludes");
     $("object-text").textContent = parts.join(" · ");
   }
 }

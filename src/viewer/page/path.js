@@ -89,7 +89,7 @@ export class CameraPath {
   render() {
     const { frames } = this;
     const chip = (_, index) => {
-      const made = el("button", { type: "button", textContent: `${index + 1} ×`, title: `Take keyframe ${index + 1} away` });
+      const made = el("button", { type: "button", textContent: `${index + 1} ×`, title: `Remove keyframe ${index + 1}` });
       made.addEventListener("click", () => this.take(index));
       return made;
     };

@@ -4,16 +4,16 @@ import { $, choose, counted, el, icon, svg } from "./dom.js";
 
 /** Tools by name: title, key, shapes of the icon, what the slider means, the value it starts with. */
 const TOOLS = {
-  pointer: ["Select labels", "Escape", ["M4 2.5 12.5 8l-4 .8-2 4Z"]],
-  find: ["Find an object: click on it, or drag a box around it", "O", ["M7 2.5a4.5 4.5 0 1 0 0 9 4.5 4.5 0 0 0 0-9Z", "M10.5 10.5 14 14"]],
-  strokes: ["Choose an object by strokes on it; Ctrl+drag or right click: not this", "Z", ["M2.5 11c2-5 4-6 5-4s1 4 3 1 2-3 3-3", "M4 13.5h8"], "Width", 8],
-  box: ["Choose Gaussians in a rectangle", "R", ["M2.5 3.5h11v9h-11Z"]],
-  lasso: ["Choose Gaussians in a drawn line", "T", ["M8 3c3.5 0 6 1.6 6 3.700S11.5 10.5 8 10.5 2 9 2 6.7 4.5 3 8 3Z", "M5.5 10.300c-1 1.2-.5 2.7 1 3.2"]],
-  brush: ["Choose Gaussians with a brush", "B", ["M13.5 2.5 7 9", "M6.5 8.500c-2.5 0-2 3-4 4 3 1 5.5 0 5-3Z"], "Brush", 24],
-  ball: ["Choose Gaussians in a ball around a point", "N", ["M8 2.500a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11Z", "M2.5 8c3 2 8 2 11 0"], "Radius", 60],
-  flood: ["Choose neighbours of like colour", "U", ["M3 8l5-5 5 5-5 5Z", "M13.5 10.500c.8 1.2.8 2.5 0 2.500s-.8-1.3 0-2.500Z"], "Tolerance", 24],
-  depth: ["Choose what is in front of a point; right click: behind", "Y", ["M8 2v12", "M4.5 5 2 8l2.5 3", "M11.5 5 14 8l-2.5 3"]],
-  measure: ["Measure between two points", "J", ["M2 10.5 10.5 2 14 5.5 5.5 14Z", "M5 7.500l1.5 1.5", "M7.5 5 9 6.5"]],
+  pointer: ["Select objects", "Escape", ["M4 2.5 12.5 8l-4 .8-2 4Z"]],
+  find: ["Find an object: click it, or drag a box around it", "O", ["M7 2.5a4.5 4.5 0 1 0 0 9 4.5 4.5 0 0 0 0-9Z", "M10.5 10.5 14 14"]],
+  strokes: ["Select an object by drawing strokes on it; Ctrl+drag or right click marks background", "Z", ["M2.5 11c2-5 4-6 5-4s1 4 3 1 2-3 3-3", "M4 13.5h8"], "Width", 8],
+  box: ["Select Gaussians in a rectangle", "R", ["M2.5 3.5h11v9h-11Z"]],
+  lasso: ["Select Gaussians with a lasso", "T", ["M8 3c3.5 0 6 1.6 6 3.700S11.5 10.5 8 10.5 2 9 2 6.7 4.5 3 8 3Z", "M5.5 10.300c-1 1.2-.5 2.7 1 3.2"]],
+  brush: ["Select Gaussians with a brush", "B", ["M13.5 2.5 7 9", "M6.5 8.500c-2.5 0-2 3-4 4 3 1 5.5 0 5-3Z"], "Brush", 24],
+  ball: ["Select Gaussians in a sphere around a point", "N", ["M8 2.500a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11Z", "M2.5 8c3 2 8 2 11 0"], "Radius", 60],
+  flood: ["Select connected Gaussians of similar colour", "U", ["M3 8l5-5 5 5-5 5Z", "M13.5 10.500c.8 1.2.8 2.5 0 2.500s-.8-1.3 0-2.500Z"], "Tolerance", 24],
+  depth: ["Select Gaussians in front of a point; right click: behind it", "Y", ["M8 2v12", "M4.5 5 2 8l2.5 3", "M11.5 5 14 8l-2.5 3"]],
+  measure: ["Measure the distance between two points", "J", ["M2 10.5 10.5 2 14 5.5 5.5 14Z", "M5 7.500l1.5 1.5", "M7.5 5 9 6.5"]],
 };
 
 export class Selecting {
@@ -77,9 +77,9 @@ export class Selecting {
     const { count, locked } = this.state;
     const isTool = this.isOn && this.hand === this;
     $("chosen").hidden = !isTool && count === 0;
-    const hint = { strokes: "Draw on the object; Ctrl: on what is not it", box: "Drag a rectangle", lasso: "Draw around them", brush: "Paint over them", ball: "Click on the middle", flood: "Click on a surface", depth: "Click: in front of it; right click: behind" }[this.tool];
-    const more = this.tool === "strokes" ? " · Ctrl: draw on what is not it" : "";
-    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} chosen${more}` : `${hint ?? ""}${this.tool === "strokes" ? "" : " · Shift adds, Ctrl takes away"}`;
+    const hint = { strokes: "Draw on the object; Ctrl marks background", box: "Drag a rectangle", lasso: "Draw around the Gaussians", brush: "Paint over the Gaussians", ball: "Click the centre", flood: "Click a surface", depth: "Click: in front of the point; right click: behind it" }[this.tool];
+    const more = this.tool === "strokes" ? " · Ctrl marks background" : "";
+    $("chosen-text").textContent = count > 0 ? `${counted(count, "Gaussian")} selected${more}` : `${hint ?? ""}${this.tool === "strokes" ? "" : " · Shift adds, Ctrl removes"}`;
     $("chosen-tools").hidden = count === 0;
     $("chosen-unlock").hidden = locked === 0;
     $("chosen-unlock").textContent = `Unlock ${locked}`;

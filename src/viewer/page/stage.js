@@ -272,8 +272,8 @@ export class Stage {
   legend(pane) {
     const { depths } = this.frame ?? { depths: [0, 0] };
     const scales = {
-      depth: [depths[0].toPrecision(3), `${depths[1].toPrecision(3)} away`], opacity: ["clear", "opaque"],
-      confidence: ["unsure of its label", "sure"], error: ["like the photo", "a quarter off"],
+      depth: [depths[0].toPrecision(3), `${depths[1].toPrecision(3)} away`], opacity: ["transparent", "opaque"],
+      confidence: ["uncertain label", "certain"], error: ["no error", "0.25 or more"],
     };
     const scale = pane === "depth" && !(depths[1] > 0) ? undefined : scales[pane];
     $("legend").hidden = !scale;

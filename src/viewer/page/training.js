@@ -18,9 +18,9 @@ export class Training {
       made.addEventListener("click", () => this.ask(what));
       return made;
     };
-    this.pause = button("Pause", "pause", "Hold the training after this step (K)", true);
-    this.save = button("Save now", "save", "Write a checkpoint");
-    this.stop = button("Stop and save", "stop", "Write model and checkpoint, and end");
+    this.pause = button("Pause", "pause", "Pause after this step (K)", true);
+    this.save = button("Save now", "save", "Write a checkpoint now");
+    this.stop = button("Stop and save", "stop", "Write the model and a checkpoint, then end the run");
     this.charts = Object.fromEntries(CHARTS.map(([key, name, kind]) => [key, chart(name, kind)]));
     this.share = el("input", { type: "range", min: 0, max: 90, step: 5, id: "view-share" });
     this.shown = el("output");
@@ -30,22 +30,22 @@ export class Training {
     });
     this.box.append(
       el("h2", {}, "Training ", this.head), this.progress,
-      el("div", { className: "facts-grid" }, fact("Step", "step"), fact("Time left", "left"), fact("Gaussians", "gaussians"), fact("Device memory", "memory"), fact("Per step", "speed"), fact("Test views", "score")),
+      el("div", { className: "facts-grid" }, fact("Step", "step"), fact("Time left", "left"), fact("Gaussians", "gaussians"), fact("Device memory", "memory"), fact("Per step", "speed"), fact("Test PSNR", "score")),
       ...Object.values(this.charts).map((made) => made.box),
       el("div", { className: "row wrap" }, this.pause, this.save, this.stop),
-      el("div", { className: "share" }, el("label", { htmlFor: "view-share", textContent: "Viewing", title: "Largest share of the time that viewing takes from the training" }), this.share, this.shown),
+      el("div", { className: "share" }, el("label", { htmlFor: "view-share", textContent: "Time for viewing", title: "Maximum share of time that viewing may take from training" }), this.share, this.shown),
     );
   }
 
   async ask(what) {
     if (!this.state) return;
     if (what === "stop") {
-      const said = await ask("Stop the training?", "Model and checkpoint are written. --resume goes on from there.", "Stop and save");
+      const said = await ask("Stop training?", "labelgs writes the model and a checkpoint. Run the command again with --resume to continue.", "Stop and save");
       if (said === null) return;
     }
     const isPaused = this.state.paused;
     this.link.send({ kind: "train", what: what === "pause" && isPaused ? "resume" : what });
-    if (what === "stop") toast("The training ends after this step.");
+    if (what === "stop") toast("Training stops after this step.");
   }
 
   setState(state) {
@@ -61,8 +61,8 @@ export class Training {
     gaussians.textContent = number(state.gaussians);
     memory.textContent = bytes(state.memory);
     speed.textContent = `${state.stepMs.toFixed(state.stepMs < 20 ? 1 : 0)} ms`;
-    this.pause.textContent = state.paused ? "Go on" : "Pause";
-    this.pause.title = state.paused ? "Go on with the training (K)" : "Hold the training after this step (K)";
+    this.pause.textContent = state.paused ? "Resume" : "Pause";
+    this.pause.title = state.paused ? "Resume training (K)" : "Pause after this step (K)";
     if (document.activeElement !== this.share) {
       this.share.value = Math.round(100 * state.share);
       this.shown.textContent = `${this.share.value} %`;
