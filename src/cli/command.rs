@@ -215,7 +215,7 @@ impl Command {
 }
 
 /// Commands for developers of the engine: the help lists them under a heading of their own.
-const DEVELOPERS: [&str; 4] = ["selftest", "plan", "kernels", "profile"];
+const DEVELOPER_COMMANDS: [&str; 4] = ["selftest", "plan", "kernels", "profile"];
 
 /// What `--version` prints; clap wants it to last.
 static VERSION: LazyLock<String> = LazyLock::new(version::text);
@@ -227,7 +227,7 @@ pub fn command() -> clap::Command {
 }
 
 /// `--json` after the name of a command.
-const JSON_HERE: &str = "json_here";
+const LOCAL_JSON_ARG: &str = "json_here";
 
 /// Adds `--json` to all commands that do not define it.
 fn with_json(command: clap::Command) -> clap::Command {
@@ -237,23 +237,24 @@ fn with_json(command: clap::Command) -> clap::Command {
     if command.get_arguments().any(|arg| arg.get_long() == Some("json")) {
         return command;
     }
-    let json = Arg::new(JSON_HERE).long("json").action(ArgAction::SetTrue);
+    let json = Arg::new(LOCAL_JSON_ARG).long("json").action(ArgAction::SetTrue);
     command.arg(json.help("Print the result as JSON").help_heading("Output"))
 }
 
 /// Returns true if the added `--json` was typed.
 pub(super) fn has_json(typed: &ArgMatches) -> bool {
-    let here = typed.try_get_one(JSON_HERE).is_ok_and(|flag| flag == Some(&true));
+    let here = typed.try_get_one(LOCAL_JSON_ARG).is_ok_and(|flag| flag == Some(&true));
     here || typed.subcommand().is_some_and(|(_, words)| has_json(words))
 }
 
 /// Returns the command line whose help has the developers' commands under a heading of their own.
 pub(crate) fn with_headings(root: clap::Command) -> clap::Command {
     let mut list = "Commands for developers of the engine:\n".to_owned();
-    for command in DEVELOPERS.iter().filter_map(|name| root.find_subcommand(name)) {
+    for command in DEVELOPER_COMMANDS.iter().filter_map(|name| root.find_subcommand(name)) {
         let about = command.get_about().map(ToString::to_string).unwrap_or_default();
         list += &format!("  {:<16}  {about}\n", command.get_name());
     }
-    let root = DEVELOPERS.iter().fold(root, |root, name| root.mut_subcommand(name, |command| command.hide(true)));
+    let root =
+        DEVELOPER_COMMANDS.iter().fold(root, |root, name| root.mut_subcommand(name, |command| command.hide(true)));
     root.after_help(format!("{list}\n{EXIT_STATUSES}"))
 }

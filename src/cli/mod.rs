@@ -41,7 +41,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>, commit: Option<&'static st
             log::final_error(&error);
             exit_status::exit_status(&error)
         }
-        Err(_) => exit_status::BUG,
+        Err(_) => exit_status::BUG_STATUS,
     };
     u8::try_from(status).unwrap_or(u8::MAX)
 }

@@ -4,7 +4,7 @@ use super::compared::{PictureObserver, ScoredPicture};
 use crate::files::atomic;
 use crate::files::image::write_png_rgb8;
 use crate::report::panels::heat;
-use crate::report::text::{DECIBELS, SCORE};
+use crate::report::text::{DECIBEL_DIGITS, SCORE_DIGITS};
 use crate::report::{Figure, Panel, page, section};
 use crate::scene::colour::to_byte;
 use crate::{Error, Result};
@@ -84,7 +84,7 @@ impl PictureObserver for Page {
 /// Formats a score with unit.
 fn score_text(name: &str, value: f64) -> String {
     let is_decibels = name.to_lowercase().contains("psnr");
-    if is_decibels { format!("{value:.DECIBELS$} dB") } else { format!("{value:.SCORE$}") }
+    if is_decibels { format!("{value:.DECIBEL_DIGITS$} dB") } else { format!("{value:.SCORE_DIGITS$}") }
 }
 
 /// Ground truth, prediction and difference.

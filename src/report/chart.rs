@@ -7,13 +7,13 @@ use maud::{Markup, html};
 use std::fmt::Write;
 
 /// Colours of the style sheet.
-const COLOURS: usize = 8;
+const COLOUR_COUNT: usize = 8;
 /// Most points of a curve that are drawn as dots too.
 const DOTS_MAX: usize = 24;
 
 /// Returns the class of a colour.
 pub fn colour_class(colour: usize) -> String {
-    format!("c{}", colour % COLOURS)
+    format!("c{}", colour % COLOUR_COUNT)
 }
 
 /// A vertical mark.

@@ -9,8 +9,8 @@ use labelgs_scene::{Error, Photo, Result};
 use std::io::Cursor;
 
 /// Longest side of a picture inside a page, px.
-pub const LONGEST: u32 = 800;
-const QUALITY: u8 = 85;
+pub const PANEL_SIDE_MAX: u32 = 800;
+const JPEG_QUALITY: u8 = 85;
 
 /// Returns the error of a render against its photo, the mean absolute difference of the channels, on the scale
 /// [`HEAT_COLOURS`]; black where the photo has no pixel.
@@ -44,7 +44,7 @@ pub fn encoded((width, height): (u32, u32), pixels: &[[u8; 3]], kind: Kind, long
         picture = resize(&picture, small.0, small.1, filter);
     }
     match kind {
-        Kind::Smooth => jpeg_rgb8(picture.dimensions(), picture.as_raw().as_chunks().0, QUALITY),
+        Kind::Smooth => jpeg_rgb8(picture.dimensions(), picture.as_raw().as_chunks().0, JPEG_QUALITY),
         Kind::Flat => {
             let mut out = Cursor::new(Vec::new());
             picture.write_to(&mut out, ImageFormat::Png).map_err(|error| broken(error.to_string()))?;

@@ -1,4 +1,4 @@
-//! A sheet of labels: a picture of each, alone, with what tells it from the others.
+//! A sheet of labels: an image of each label alone, with its id, name and size.
 
 use super::page::page as whole_page;
 use super::text::{count, number};
@@ -9,16 +9,16 @@ use labelgs_scene::{Result, label_colour};
 use maud::html;
 
 /// Side of a picture of a label, px.
-pub const SIDE: u32 = 192;
+pub const TILE_SIDE: u32 = 192;
 /// Colour behind labels in a picture, between the dark and the bright ones.
-const NEUTRAL: u8 = 150;
+const BACKGROUND_GREY: u8 = 150;
 /// Height of the line with the id, and space between pictures, px.
-const LINE: u32 = 24;
-const GAP: u32 = 8;
+const CAPTION_HEIGHT: u32 = 24;
+const TILE_GAP: u32 = 8;
 /// Size of a dot of a digit, px.
-const DOT: u32 = 3;
+const DIGIT_DOT_SIDE: u32 = 3;
 /// Rows of the digits 0 to 9 from the top, three dots each, the left one in the highest bit.
-const DIGITS: [[u8; 5]; 10] = [
+const DIGIT_ROWS: [[u8; 5]; 10] = [
     [0b111, 0b101, 0b101, 0b101, 0b111],
     [0b010, 0b110, 0b010, 0b010, 0b111],
     [0b111, 0b001, 0b111, 0b100, 0b111],
@@ -42,14 +42,14 @@ pub struct Tile {
     pub gaussians: u64,
     /// Its extent along x, y and z, world units.
     pub size: [f64; 3],
-    /// Its picture of [`SIDE`] x [`SIDE`] px, row-major: r, g, b and opacity.
+    /// Its picture of [`TILE_SIDE`] x [`TILE_SIDE`] px, row-major: r, g, b and opacity.
     pub pixels: Vec<[u8; 4]>,
 }
 
 /// Returns a page of labels, with the pictures inside.
 pub fn page(title: &str, tiles: &[Tile]) -> Result<String> {
     let picture = |tile: &Tile| -> Result<String> {
-        Ok(format!("data:image/png;base64,{}", STANDARD.encode(png_rgba8((SIDE, SIDE), &tile.pixels)?)))
+        Ok(format!("data:image/png;base64,{}", STANDARD.encode(png_rgba8((TILE_SIDE, TILE_SIDE), &tile.pixels)?)))
     };
     let pictures = tiles.iter().map(picture).collect::<Result<Vec<_>>>()?;
     let colour = |id: u32| {
@@ -61,7 +61,7 @@ pub fn page(title: &str, tiles: &[Tile]) -> Result<String> {
             @for (tile, picture) in tiles.iter().zip(&pictures) {
                 @let name = tile.name.as_deref().unwrap_or("–");
                 figure.label style=(colour(tile.id)) {
-                    img loading="lazy" width=(SIDE) height=(SIDE) alt=(format!("label {} {name}", tile.id)) src=(picture);
+                    img loading="lazy" width=(TILE_SIDE) height=(TILE_SIDE) alt=(format!("label {} {name}", tile.id)) src=(picture);
                     figcaption {
                         strong { (tile.id) } " " (name)
                         p.quiet { (count(tile.gaussians)) " Gaussians" br; (extent(tile.size)) }
@@ -87,9 +87,9 @@ fn extent(size: [f64; 3]) -> String {
 pub fn picture(tiles: &[Tile]) -> ((u32, u32), Vec<[u8; 3]>) {
     let count = tiles.len().max(1) as u32;
     let across = f64::from(count).sqrt().ceil() as u32;
-    let (step, fall) = (SIDE + GAP, SIDE + LINE + GAP);
-    let (width, height) = (across * step + GAP, count.div_ceil(across) * fall + GAP);
-    let mut pixels = vec![[NEUTRAL; 3]; (width * height) as usize];
+    let (step, fall) = (TILE_SIDE + TILE_GAP, TILE_SIDE + CAPTION_HEIGHT + TILE_GAP);
+    let (width, height) = (across * step + TILE_GAP, count.div_ceil(across) * fall + TILE_GAP);
+    let mut pixels = vec![[BACKGROUND_GREY; 3]; (width * height) as usize];
     let mut put = |x: u32, y: u32, [r, g, b, opacity]: [u8; 4]| {
         let over = |colour: u8, below: u8| {
             let (share, all) = (u32::from(opacity), u32::from(u8::MAX));
@@ -100,15 +100,16 @@ pub fn picture(tiles: &[Tile]) -> ((u32, u32), Vec<[u8; 3]>) {
         }
     };
     for (tile, at) in tiles.iter().zip(0..) {
-        let (left, top) = (GAP + at % across * step, GAP + at / across * fall);
+        let (left, top) = (TILE_GAP + at % across * step, TILE_GAP + at / across * fall);
         for (pixel, at) in tile.pixels.iter().zip(0..) {
-            put(left + at % SIDE, top + at / SIDE, *pixel);
+            put(left + at % TILE_SIDE, top + at / TILE_SIDE, *pixel);
         }
         let [r, g, b] = label_colour(tile.id);
-        for (x, y) in (0..LINE - GAP).flat_map(|y| (0..GAP).map(move |x| (x, y))) {
-            put(left + x, top + SIDE + GAP / 2 + y, [r, g, b, u8::MAX]);
+        for (x, y) in (0..CAPTION_HEIGHT - TILE_GAP).flat_map(|y| (0..TILE_GAP).map(move |x| (x, y))) {
+            put(left + x, top + TILE_SIDE + TILE_GAP / 2 + y, [r, g, b, u8::MAX]);
         }
-        dots(tile.id).for_each(|(x, y)| put(left + 2 * GAP + x, top + SIDE + GAP / 2 + y, [0, 0, 0, u8::MAX]));
+        dots(tile.id)
+            .for_each(|(x, y)| put(left + 2 * TILE_GAP + x, top + TILE_SIDE + TILE_GAP / 2 + y, [0, 0, 0, u8::MAX]));
     }
     ((width, height), pixels)
 }
@@ -117,12 +118,14 @@ pub fn picture(tiles: &[Tile]) -> ((u32, u32), Vec<[u8; 3]>) {
 fn dots(number: u32) -> impl Iterator<Item = (u32, u32)> {
     let digits: Vec<usize> = number.to_string().bytes().map(|digit| usize::from(digit - b'0')).collect();
     let dot = |(at, digit): (u32, usize)| {
-        let is_set = move |&(x, y): &(u32, u32)| DIGITS[digit][y as usize] >> (2 - x) & 1 == 1;
+        let is_set = move |&(x, y): &(u32, u32)| DIGIT_ROWS[digit][y as usize] >> (2 - x) & 1 == 1;
         let all = (0..5).flat_map(|y| (0..3).map(move |x| (x, y))).filter(is_set);
-        all.map(move |(x, y)| (DOT * (4 * at + x), DOT * y))
+        all.map(move |(x, y)| (DIGIT_DOT_SIDE * (4 * at + x), DIGIT_DOT_SIDE * y))
     };
     let corners = (0..).zip(digits).flat_map(dot);
-    corners.flat_map(|(x, y)| (0..DOT * DOT).map(move |part| (x + part % DOT, y + part / DOT)))
+    corners.flat_map(|(x, y)| {
+        (0..DIGIT_DOT_SIDE * DIGIT_DOT_SIDE).map(move |part| (x + part % DIGIT_DOT_SIDE, y + part / DIGIT_DOT_SIDE))
+    })
 }
 
 #[cfg(test)]
@@ -130,7 +133,7 @@ mod tests {
     use super::*;
 
     fn tile(id: u32, colour: [u8; 4]) -> Tile {
-        let pixels = vec![colour; (SIDE * SIDE) as usize];
+        let pixels = vec![colour; (TILE_SIDE * TILE_SIDE) as usize];
         Tile { id, name: Some("<cup>".into()), gaussians: 12_345, size: [1.0, 0.5, 0.25], pixels }
     }
 
@@ -151,21 +154,25 @@ mod tests {
     fn a_picture_has_each_label_over_its_id() {
         let tiles = [tile(1, [200, 0, 0, 255]), tile(20, [0, 200, 0, 128]), tile(3, [0; 4])];
         let ((width, height), pixels) = picture(&tiles);
-        assert_eq!((width, height), (2 * (SIDE + GAP) + GAP, 2 * (SIDE + LINE + GAP) + GAP));
+        assert_eq!(
+            (width, height),
+            (2 * (TILE_SIDE + TILE_GAP) + TILE_GAP, 2 * (TILE_SIDE + CAPTION_HEIGHT + TILE_GAP) + TILE_GAP)
+        );
         assert_eq!(pixels.len() as u32, width * height);
         let at = |x: u32, y: u32| pixels[(y * width + x) as usize];
-        assert_eq!(at(GAP + 5, GAP + 5), [200, 0, 0]);
+        assert_eq!(at(TILE_GAP + 5, TILE_GAP + 5), [200, 0, 0]);
         // Half over the colour behind.
-        assert_eq!(at(SIDE + 2 * GAP, GAP), [75, 175, 75]);
-        assert_eq!(at(GAP, SIDE + LINE + 2 * GAP), [NEUTRAL; 3]);
+        assert_eq!(at(TILE_SIDE + 2 * TILE_GAP, TILE_GAP), [75, 175, 75]);
+        assert_eq!(at(TILE_GAP, TILE_SIDE + CAPTION_HEIGHT + 2 * TILE_GAP), [BACKGROUND_GREY; 3]);
         // The digit 1: a column of dots in the middle, on a foot.
-        let (left, top) = (3 * GAP, GAP + SIDE + GAP / 2);
+        let (left, top) = (3 * TILE_GAP, TILE_GAP + TILE_SIDE + TILE_GAP / 2);
         let black = |x: u32, y: u32| at(left + x, top + y) == [0; 3];
-        let shape: Vec<Vec<bool>> = (0..5).map(|y| (0..3).map(|x| black(DOT * x, DOT * y)).collect()).collect();
+        let shape: Vec<Vec<bool>> =
+            (0..5).map(|y| (0..3).map(|x| black(DIGIT_DOT_SIDE * x, DIGIT_DOT_SIDE * y)).collect()).collect();
         let (no, yes) = (false, true);
         let one = [[no, yes, no], [yes, yes, no], [no, yes, no], [no, yes, no], [yes, yes, yes]];
         assert_eq!(shape, one.map(|row| row.to_vec()));
-        assert_eq!(at(GAP, top), label_colour(1));
+        assert_eq!(at(TILE_GAP, top), label_colour(1));
         // An id of many digits stays inside.
         let wide = picture(&[tile(2_147_483_647, [0; 4])]);
         assert_eq!(wide.1.len() as u32, wide.0.0 * wide.0.1);

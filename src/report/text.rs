@@ -1,17 +1,17 @@
 //! Numbers, sizes and times as text: one style for all pages.
 
 /// What stands for a missing number.
-const NONE: &str = "–";
+const MISSING_NUMBER: &str = "–";
 
 /// Returns a number with a fixed count of digits, or a dash.
 pub fn number(value: Option<f64>, digits: usize) -> String {
-    value.filter(|value| value.is_finite()).map_or(NONE.to_owned(), |value| format!("{value:.digits$}"))
+    value.filter(|value| value.is_finite()).map_or(MISSING_NUMBER.to_owned(), |value| format!("{value:.digits$}"))
 }
 
 /// Digits of decibels.
-pub const DECIBELS: usize = 2;
+pub const DECIBEL_DIGITS: usize = 2;
 /// Digits of scores from 0 to 1: SSIM, IoU, confidence.
-pub const SCORE: usize = 3;
+pub const SCORE_DIGITS: usize = 3;
 
 /// Returns a number with three significant digits, and no more than three after the point from 1 on.
 pub fn significant(value: f64) -> String {

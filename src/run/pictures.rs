@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::eval::compared::{PictureObserver, ScoredPicture};
 use crate::eval::metrics::label_iou;
 use crate::files::atomic;
-use crate::report::panels::{Kind, LONGEST, encoded, heat};
+use crate::report::panels::{Kind, PANEL_SIDE_MAX, encoded, heat};
 use crate::scene::LabelMap;
 use crate::scene::colour::to_byte;
 use crate::scene::labels::label_colours;
@@ -53,7 +53,7 @@ impl PictureObserver for WorstViews {
             return Ok(());
         }
         let size = (picture.photo.width, picture.photo.height);
-        let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind, LONGEST).map(Some);
+        let copy = |pixels: &[[u8; 3]], kind| encoded(size, pixels, kind, PANEL_SIDE_MAX).map(Some);
         let map = |map: Option<&LabelMap>| map.map_or(Ok(None), |map| copy(&label_colours(&map.ids), Kind::Flat));
         let render: Vec<[u8; 3]> = picture.rgb.iter().map(|colour| colour.map(to_byte)).collect();
         let files = vec![

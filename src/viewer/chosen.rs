@@ -1,7 +1,7 @@
 //! The Gaussians that pages have chosen by hand. They stay here; a page knows how many there are.
 
-use super::message::{Choose, Viewpoint};
-use super::painter::{Painter, SURFACE_PX, Source};
+use super::message::{SelectionChange, Viewpoint};
+use super::painter::{Painter, SURFACE_SIDE_MAX, Source};
 use crate::edit::Rows;
 use crate::edit::selection::{Combine, Nearby, Region, Shape, beyond, in_region, in_sphere};
 use crate::edit::strokes::{GraphCut, Seed};
@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
-/// Label of the object of strokes, as long as it is none of the model's.
-const OBJECT: u32 = MODEL_LABEL_MAX;
+/// Temporary label of the object of strokes.
+const STROKE_OBJECT_LABEL: u32 = MODEL_LABEL_MAX;
 
 /// What is chosen, and what cannot be.
 #[derive(Default)]
-pub(super) struct Chosen {
+pub(super) struct Selection {
     rows: Vec<bool>,
     locked: Vec<bool>,
     /// The places of the model's Gaussians, once they were asked for.
@@ -28,7 +28,7 @@ pub(super) struct Chosen {
     cutting: Option<GraphCut<Box<Gaussians>>>,
 }
 
-impl Chosen {
+impl Selection {
     pub(super) fn new(model: &Gaussians) -> Self {
         let none = vec![false; model.len()];
         Self { rows: none.clone(), locked: none, nearby: None, seeds: Vec::new(), cutting: None }
@@ -46,63 +46,63 @@ impl Chosen {
     /// Chooses as a page asks, among what is drawn and not locked.
     pub(super) fn choose(
         &mut self,
-        what: &Choose,
+        what: &SelectionChange,
         model: &Gaussians,
         is_drawn: &[bool],
         (painter, source): (&Painter, &mut dyn Source),
     ) -> Result<()> {
-        if !matches!(what, Choose::Stroke { .. }) {
+        if !matches!(what, SelectionChange::Stroke { .. }) {
             self.seeds.clear();
             self.cutting = None;
         }
         let is_free: Vec<bool> = is_drawn.iter().zip(&self.locked).map(|(&drawn, &locked)| drawn && !locked).collect();
         let (found, how) = match what {
-            Choose::Draw { from, region, through, how } => {
-                let (camera, scale, rendered) = painter.seen(from, Parts::DEPTH, Some(SURFACE_PX), source)?;
+            SelectionChange::Draw { from, region, through, how } => {
+                let (camera, scale, rendered) = painter.seen(from, Parts::DEPTH, Some(SURFACE_SIDE_MAX), source)?;
                 let points = region.points.iter().map(|[x, y]| [x * scale[0], y * scale[1]]).collect();
                 let region = Region { points, radius: region.radius * scale[0], shape: region.shape };
                 let depth = if *through { None } else { Some(rendered.mean_depth()?) };
                 (in_region(model, &camera, &region, depth.as_deref()), *how)
             }
-            Choose::Ball { from, pixel, radius, how } => {
+            SelectionChange::Ball { from, pixel, radius, how } => {
                 let spot = painter.surface(from, *pixel, source)?;
                 let size = radius * spot.depth / spot.camera.fx;
                 (in_sphere(model, spot.place, size), *how)
             }
-            Choose::Depth { from, pixel, side, how } => {
+            SelectionChange::Depth { from, pixel, side, how } => {
                 let spot = painter.surface(from, *pixel, source)?;
                 (beyond(model, &spot.camera, spot.depth, *side), *how)
             }
-            Choose::Flood { from, pixel, tolerance, how } => {
+            SelectionChange::Flood { from, pixel, tolerance, how } => {
                 let first = painter.surface(from, *pixel, source)?.row;
                 let none = || Error::usage("point", "everything here is locked; unlock it first");
                 let first = Some(first).filter(|&row| is_free[row]).ok_or_else(none)?;
                 (self.nearby(model)?.flood(model, first, *tolerance, &is_free), *how)
             }
-            Choose::Stroke { from, points, radius, on } => {
+            SelectionChange::Stroke { from, points, radius, on } => {
                 let hit = hit(from, (points, *radius), (painter, source))?;
-                let label = if *on { OBJECT } else { UNLABELLED };
+                let label = if *on { STROKE_OBJECT_LABEL } else { UNLABELLED };
                 let seeds: Vec<Seed> = hit.into_iter().map(|row| Seed { row, label, is_on: true }).collect();
                 (self.cut(model, &seeds)?, Combine::Replace)
             }
-            Choose::Labels { labels, how } => {
+            SelectionChange::Labels { labels, how } => {
                 ((0..model.len()).map(|row| labels.contains(&model.label(row))).collect(), *how)
             }
-            Choose::Grow => {
+            SelectionChange::Grow => {
                 let before = self.rows.clone();
                 (self.nearby(model)?.grown(&before), Combine::Add)
             }
-            Choose::Shrink => {
+            SelectionChange::Shrink => {
                 let before = self.rows.clone();
                 (self.nearby(model)?.shrunk(&before), Combine::Within)
             }
-            Choose::Invert => (self.rows.iter().map(|&is_in| !is_in).collect(), Combine::Replace),
-            Choose::Nothing => (vec![false; model.len()], Combine::Replace),
-            Choose::Lock => {
+            SelectionChange::Invert => (self.rows.iter().map(|&is_in| !is_in).collect(), Combine::Replace),
+            SelectionChange::Nothing => (vec![false; model.len()], Combine::Replace),
+            SelectionChange::Lock => {
                 self.locked.iter_mut().zip(&self.rows).for_each(|(locked, &is_in)| *locked |= is_in);
                 (vec![false; model.len()], Combine::Replace)
             }
-            Choose::Unlock => {
+            SelectionChange::Unlock => {
                 self.locked.fill(false);
                 return Ok(());
             }
@@ -115,7 +115,7 @@ impl Chosen {
     /// Returns the object of the strokes. Before one is on something else, that is what they hit.
     fn cut(&mut self, model: &Gaussians, seeds: &[Seed]) -> Result<Vec<bool>> {
         self.seeds.extend(seeds);
-        let is_one_sided = self.seeds.iter().all(|seed| seed.label == OBJECT);
+        let is_one_sided = self.seeds.iter().all(|seed| seed.label == STROKE_OBJECT_LABEL);
         let mut cutting = match self.cutting.take() {
             Some(cutting) => cutting,
             None => GraphCut::new(Box::new(model.clone()))?,
@@ -125,7 +125,7 @@ impl Chosen {
         if is_one_sided {
             self.seeds.iter().for_each(|seed| rows[seed.row] = true);
         } else {
-            rows = cutting.cut()?.into_iter().map(|label| label == OBJECT).collect();
+            rows = cutting.cut()?.into_iter().map(|label| label == STROKE_OBJECT_LABEL).collect();
         }
         self.cutting = Some(cutting);
         Ok(rows)
@@ -151,7 +151,7 @@ fn hit(
     (points, radius): (&[[f64; 2]], f64),
     (painter, source): (&Painter, &mut dyn Source),
 ) -> Result<Vec<usize>> {
-    let (camera, scale, rendered) = painter.seen(from, Parts::MAIN, Some(SURFACE_PX), source)?;
+    let (camera, scale, rendered) = painter.seen(from, Parts::MAIN, Some(SURFACE_SIDE_MAX), source)?;
     let most = [f64::from(camera.width), f64::from(camera.height)].map(|side| side - 0.5);
     let points = points.iter().map(|point| [0, 1].map(|axis| (point[axis] * scale[axis]).clamp(0.0, most[axis])));
     let region = Region { shape: Shape::Along, points: points.collect(), radius: (radius * scale[0]).max(0.5) };

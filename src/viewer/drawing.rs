@@ -1,4 +1,4 @@
-//! The engine with the drawn part of a finished model.
+//! The engine with the visible part of a finished model.
 
 use super::painter::Source;
 use crate::edit::change::mix_in;
@@ -11,18 +11,18 @@ use crate::scene::{Camera, Gaussians};
 use std::collections::BTreeSet;
 
 /// Colour of chosen Gaussians, r, g, b, and its share.
-const CHOSEN: ([f64; 3], f32) = ([1.0, 0.55, 0.05], 0.7);
+const SELECTION_COLOUR: ([f64; 3], f32) = ([1.0, 0.55, 0.05], 0.7);
 
 /// Which labels are drawn.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shown {
+pub(super) struct Visibility {
     /// All but these.
     pub(super) hidden: Vec<u32>,
     /// If there are some, these alone.
     pub(super) solo: Vec<u32>,
 }
 
-impl Shown {
+impl Visibility {
     pub(super) fn is_whole(&self) -> bool {
         self.hidden.is_empty() && self.solo.is_empty()
     }
@@ -78,7 +78,7 @@ impl Drawing {
             return Ok(());
         }
         let mut part = model.picked(&rows);
-        let (colour, share) = (CHOSEN.0.map(sh0_of), CHOSEN.1);
+        let (colour, share) = (SELECTION_COLOUR.0.map(sh0_of), SELECTION_COLOUR.1);
         for (drawn, _) in rows.iter().enumerate().filter(|(_, row)| is_chosen[**row]) {
             mix_in(&mut part, drawn, colour, share);
         }

@@ -1,7 +1,7 @@
 //! Changes of a working copy. The list of them is written after each one, so that none is lost; the model when a page
 //! asks for it, and at the end.
 
-use super::Words;
+use super::ProgramCommands;
 use crate::edit::{Document, Edit, EditsFile, Sights};
 use crate::error::{Error, Result};
 use crate::files::label_table::LabelTable;
@@ -15,17 +15,17 @@ use std::path::{Path, PathBuf};
 pub(super) struct Work<'a> {
     /// The model as it was typed: the input of the command.
     typed: PathBuf,
-    words: &'a dyn Words,
+    words: &'a dyn ProgramCommands,
     now: Document,
     /// Before the first change; none without changes.
     first: Option<Document>,
-    done: Vec<Done>,
+    done: Vec<AppliedEdit>,
     /// Changes that were taken back, the last one first.
     undone: Vec<Edit>,
     folder: PathBuf,
     /// The model that the changes make, once there are some, and whether it is written.
     output: Option<(PathBuf, bool)>,
-    /// Number of changes, taken back or not, and of those of the rows.
+    /// Number of edits, undone or not, and number of edits that changed the rows.
     version: u64,
     rows_version: u64,
     /// Why the list of changes is not on the disk, if it is not.
@@ -35,7 +35,7 @@ pub(super) struct Work<'a> {
 }
 
 /// A change.
-struct Done {
+struct AppliedEdit {
     edit: Edit,
     told: String,
     /// What it made, if that took long.
@@ -44,7 +44,12 @@ struct Done {
 
 impl<'a> Work<'a> {
     /// Starts with a model. Files go to the folder `edits` of its run, or to one beside it.
-    pub(super) fn new(typed: &Path, model: Gaussians, table: Option<LabelTable>, words: &'a dyn Words) -> Self {
+    pub(super) fn new(
+        typed: &Path,
+        model: Gaussians,
+        table: Option<LabelTable>,
+        words: &'a dyn ProgramCommands,
+    ) -> Self {
         let stem = typed.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = match run_folder::find_for_model(typed) {
             Some(_) if typed.is_dir() => typed.join("edits"),
@@ -100,12 +105,12 @@ impl<'a> Work<'a> {
         !self.done.is_empty()
     }
 
-    /// Returns what tells this state from all others.
+    /// Returns a number that identifies this state.
     pub(super) fn version(&self) -> u64 {
         self.version
     }
 
-    /// Returns what tells models of other Gaussians apart.
+    /// Returns a number that identifies the rows of the model.
     pub(super) fn rows_version(&self) -> u64 {
         self.rows_version
     }
@@ -159,7 +164,7 @@ impl<'a> Work<'a> {
         self.version += 1;
         self.rows_version += u64::from(edit.changes_rows());
         let is_slow = matches!(edit, Edit::Remove { fill: true, .. });
-        self.done.push(Done { edit, told, after: is_slow.then(|| self.now.clone()) });
+        self.done.push(AppliedEdit { edit, told, after: is_slow.then(|| self.now.clone()) });
         Ok(())
     }
 
@@ -183,7 +188,7 @@ impl<'a> Work<'a> {
         EditsFile::new(&self.first.as_ref().unwrap_or(&self.now).model, edits)
     }
 
-    /// Returns the number after those of all files in the folder. An unreadable folder shows when it is written to.
+    /// Returns the first number after all files in the folder. An unreadable folder causes an error on writing.
     fn next_number(&self) -> u32 {
         let names = if self.folder.is_dir() { read::folder(&self.folder).unwrap_or_default() } else { Vec::new() };
         let numbers =
@@ -242,7 +247,7 @@ mod tests {
     use crate::edit::Rows;
 
     struct Plain;
-    impl Words for Plain {
+    impl ProgramCommands for Plain {
         fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
             format!("{} {} {}", model.display(), edits.display(), output.display())
         }

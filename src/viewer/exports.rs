@@ -1,6 +1,6 @@
 //! Files that pages ask for, written beside the changes of the model.
 
-use super::chosen::Chosen;
+use super::chosen::Selection;
 use super::edits::Work;
 use super::message::Export;
 use crate::edit::rename::keep;
@@ -20,7 +20,7 @@ const NAME_MAX: usize = 100;
 pub(super) fn export(
     export: &Export,
     work: &Work,
-    chosen: &Chosen,
+    chosen: &Selection,
     (first_view, cameras): (Option<FirstView>, &[&Camera]),
 ) -> Result<(PathBuf, usize)> {
     let model = work.model();

@@ -1,4 +1,4 @@
-//! Finds objects from places in pictures, on a thread of its own, so that pages are served meanwhile.
+//! Finds objects from points in images, on a separate thread, so that pages are served meanwhile.
 
 use super::hub::{ClientId, Hub};
 use super::message::Message;
@@ -23,24 +23,24 @@ pub(super) enum Spot {
 
 /// What a page pointed at.
 #[derive(Debug)]
-pub(super) enum Pointed {
+pub(super) enum Pointing {
     /// The object, or what does not belong to it.
     Click(Spot, bool),
     /// A box around it.
     Area(Spot),
 }
 
-/// What the thread is to do.
+/// A task of the thread.
 enum Task {
     /// Look for objects in this model.
     Model(Box<Gaussians>),
     /// Look for the object that a page means.
-    Point(ClientId, Pointed),
+    Point(ClientId, Pointing),
     /// Forget the object.
     Drop,
 }
 
-/// What is known of the object that is looked for.
+/// News about the object that is searched for.
 #[derive(Clone, Debug)]
 pub(super) enum News {
     /// Photos that were asked, of how many, and the seconds that photos take which were never asked.
@@ -60,7 +60,7 @@ pub(super) struct Finder {
 }
 
 impl Finder {
-    /// Starts the thread. It tells `hub` what it finds.
+    /// Starts the thread, which reports its results to `hub`.
     pub(super) fn new(gpu: Arc<Gpu>, photos: Photos, near: f32, hub: Arc<Hub>) -> Self {
         let (tasks, asked) = channel();
         let newest = Arc::<AtomicU64>::default();
@@ -79,7 +79,7 @@ impl Finder {
         self.send(Task::Model(Box::new(model)));
     }
 
-    pub(super) fn point(&self, client: ClientId, pointed: Pointed) {
+    pub(super) fn point(&self, client: ClientId, pointed: Pointing) {
         self.send(Task::Point(client, pointed));
     }
 
@@ -111,7 +111,7 @@ struct Work {
 
 /// The object that is looked for.
 #[derive(Default)]
-struct Wanted {
+struct SearchTarget {
     hints: Hints,
     /// Those of the last answer.
     answered: Hints,
@@ -120,7 +120,7 @@ struct Wanted {
 
 impl Work {
     fn run(&self, photos: &Photos, tasks: &Receiver<(u64, Task)>) {
-        let (mut clicking, mut wanted) = (None, Wanted::default());
+        let (mut clicking, mut wanted) = (None, SearchTarget::default());
         while let Ok((mut number, task)) = tasks.recv() {
             let mut next = Some(task);
             while let Some(task) = next {
@@ -157,7 +157,7 @@ impl Work {
         task: Task,
         photos: &'a Photos,
         clicking: &mut Option<ObjectFinder<'a>>,
-        wanted: &mut Wanted,
+        wanted: &mut SearchTarget,
     ) -> Result<()> {
         match task {
             Task::Model(model) => {
@@ -170,19 +170,19 @@ impl Work {
                 let none = || Error::Bug("no model was set".to_owned());
                 let clicking = clicking.as_mut().ok_or_else(none)?;
                 match pointed {
-                    Pointed::Click(spot, is_on) => {
+                    Pointing::Click(spot, is_on) => {
                         let (view, pixels) = place(spot, photos, clicking)?;
                         let pixel = pixels.first().copied().unwrap_or_default();
                         wanted.hints.clicks.push(Click { view, pixel, is_on });
                     }
-                    Pointed::Area(spot) => {
+                    Pointing::Area(spot) => {
                         let (view, pixels) = place(spot, photos, clicking)?;
                         wanted.hints.area = Some(Area { view, corners: around(&pixels) });
                     }
                 }
             }
             Task::Drop => {
-                *wanted = Wanted::default();
+                *wanted = SearchTarget::default();
                 clicking.iter_mut().for_each(ObjectFinder::forget);
             }
         }

@@ -1,7 +1,7 @@
 //! Shows a finished model, and changes its labels.
 
-use super::chosen::Chosen;
-use super::drawing::{Drawing, Shown};
+use super::chosen::Selection;
+use super::drawing::{Drawing, Visibility};
 use super::edits::Work;
 use super::finder::Finder;
 use super::object::Object;
@@ -9,7 +9,7 @@ use super::painter::Painter;
 use super::portraits::Portraits;
 use super::session::Session;
 use super::views::Views;
-use super::{Viewer, Words};
+use super::{ProgramCommands, Viewer};
 use crate::engine::Engine;
 use crate::error::Result;
 use crate::files::label_table::LabelTable;
@@ -26,10 +26,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Time between two looks for work.
-const TURN: Duration = Duration::from_millis(200);
+const WORK_WAIT_MAX: Duration = Duration::from_millis(200);
 
 /// What is shown.
-pub struct Finished<'a> {
+pub struct FinishedModel<'a> {
     /// The model as it was typed.
     pub path: &'a Path,
     /// The model.
@@ -41,7 +41,7 @@ pub struct Finished<'a> {
     /// Near plane and background.
     pub options: RenderOptions,
     /// Commands to show.
-    pub words: &'a dyn Words,
+    pub words: &'a dyn ProgramCommands,
     /// Photos that are asked for an object that a page points at; without them pages cannot point at objects.
     pub photos: Option<Photos>,
     /// Where the model is seen from at first, if its file or its run says it.
@@ -53,8 +53,13 @@ pub struct Finished<'a> {
 ///
 /// # Errors
 ///
-/// A device that fails. What a page asks for wrongly is told to the page.
-pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn() -> bool) -> Result<Option<PathBuf>> {
+/// A device that fails. Errors in requests are reported to the page.
+pub fn show(
+    viewer: &Viewer,
+    finished: FinishedModel,
+    gpu: Arc<Gpu>,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<PathBuf>> {
     let views = Arc::new(Views::new(finished.dataset));
     let sizes = views.list.iter().map(|posed| (posed.view.camera.width, posed.view.camera.height));
     let (hub, is_cpu) = (&*viewer.hub, gpu.is_cpu());
@@ -78,11 +83,11 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
         painter: Painter::new(Arc::clone(&views), is_cpu),
         background: finished.options.background,
         drawing: Drawing::new(engine, finished.options, &finished.model),
-        chosen: Chosen::new(&finished.model),
+        chosen: Selection::new(&finished.model),
         work: Work::new(finished.path, finished.model, finished.table, finished.words).seen_from(finished.first_view),
         object: finder.map(Object::new),
         object_label: None,
-        shown: Shown::default(),
+        shown: Visibility::default(),
         told: None,
         portraits: Portraits::default(),
         scores: Vec::new(),
@@ -108,7 +113,7 @@ pub fn show(viewer: &Viewer, finished: Finished, gpu: Arc<Gpu>, goes_on: &dyn Fn
                 Err(_) => {}
             }
         }
-        match hub.next(TURN) {
+        match hub.next(WORK_WAIT_MAX) {
             Some((id, message)) => session.hear(id, message)?,
             None => session.use_pause()?,
         }

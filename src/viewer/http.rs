@@ -16,11 +16,11 @@ const BODY_TIME: Duration = Duration::from_secs(30);
 /// Largest body, bytes.
 const BODY_BYTES_MAX: u64 = 16 << 30;
 /// Largest head, bytes.
-const HEAD_BYTES: usize = 16 << 10;
-const HEADERS: usize = 64;
+const HEAD_BYTES_MAX: usize = 16 << 10;
+const HEADERS_MAX: usize = 64;
 
 /// Nothing is loaded from elsewhere, no script or style of markup is run, and no page frames this one.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src \
+const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src \
                       'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// The head of a request.
@@ -53,7 +53,7 @@ impl Head {
 
 /// Why there is no head, as the status to answer with.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum NoHead {
+pub(super) enum HeadError {
     /// The other side is gone.
     Gone,
     /// A status and its name.
@@ -61,27 +61,27 @@ pub(super) enum NoHead {
 }
 
 /// Reads a head. Only a POST has bytes after it.
-pub(super) fn read_head(stream: &mut TcpStream) -> Result<Head, NoHead> {
+pub(super) fn read_head(stream: &mut TcpStream) -> Result<Head, HeadError> {
     let end = Instant::now() + HEAD_TIME;
     let mut bytes = Vec::new();
     let mut chunk = [0_u8; 2048];
     loop {
         let left = end.saturating_duration_since(Instant::now());
         if left.is_zero() {
-            return Err(NoHead::Status("408 Request Timeout"));
+            return Err(HeadError::Status("408 Request Timeout"));
         }
-        stream.set_read_timeout(Some(left)).map_err(|_| NoHead::Gone)?;
+        stream.set_read_timeout(Some(left)).map_err(|_| HeadError::Gone)?;
         match stream.read(&mut chunk) {
-            Ok(0) => return Err(NoHead::Gone),
+            Ok(0) => return Err(HeadError::Gone),
             Ok(count) => bytes.extend_from_slice(&chunk[..count]),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
-                return Err(NoHead::Status("408 Request Timeout"));
+                return Err(HeadError::Status("408 Request Timeout"));
             }
-            Err(_) => return Err(NoHead::Gone),
+            Err(_) => return Err(HeadError::Gone),
         }
-        if bytes.len() > HEAD_BYTES {
-            return Err(NoHead::Status("431 Request Header Fields Too Large"));
+        if bytes.len() > HEAD_BYTES_MAX {
+            return Err(HeadError::Status("431 Request Header Fields Too Large"));
         }
         if let Some(head) = parse(&bytes)? {
             return Ok(head);
@@ -90,9 +90,9 @@ pub(super) fn read_head(stream: &mut TcpStream) -> Result<Head, NoHead> {
 }
 
 /// Parses a head; none while it is incomplete.
-fn parse(bytes: &[u8]) -> Result<Option<Head>, NoHead> {
-    const BAD: NoHead = NoHead::Status("400 Bad Request");
-    let mut headers = [httparse::EMPTY_HEADER; HEADERS];
+fn parse(bytes: &[u8]) -> Result<Option<Head>, HeadError> {
+    const BAD: HeadError = HeadError::Status("400 Bad Request");
+    let mut headers = [httparse::EMPTY_HEADER; HEADERS_MAX];
     let mut request = httparse::Request::new(&mut headers);
     let length = match request.parse(bytes) {
         Ok(httparse::Status::Partial) => return Ok(None),
@@ -144,7 +144,7 @@ pub(super) fn receive(stream: &mut TcpStream, head: &Head, path: &Path) -> crate
 fn head(status: &str, kind: &str, more: &str, length: u64) -> String {
     format!(
         "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{more}Cache-Control: no-store\r\n\
-         Content-Security-Policy: {POLICY}\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
+         Content-Security-Policy: {CONTENT_POLICY}\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
          Cross-Origin-Resource-Policy: same-origin\r\nCross-Origin-Opener-Policy: same-origin\r\n\
          Connection: close\r\n\r\n"
     )
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(head.header("x"), None, "a header that occurs twice has no value");
         assert_eq!(parse(b"GET / HTTP/1.1\r\nHost"), Ok(None));
         for bad in [&b"\x00\x01\r\n\r\n"[..], b"GET / HTTP/1.1\r\n\r\nmore", b"GET / HTTP/1.1\r\nA: \xff\r\n\r\n"] {
-            assert_eq!(parse(bad), Err(NoHead::Status("400 Bad Request")));
+            assert_eq!(parse(bad), Err(HeadError::Status("400 Bad Request")));
         }
     }
 }

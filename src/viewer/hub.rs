@@ -3,7 +3,7 @@
 //! One thread owns the engine and takes messages; a thread per page reads, another writes. Nothing here grows with the
 //! time that a page is open or with what it sends.
 
-use super::message::{Frame, Look, Message};
+use super::message::{Frame, LookRequest, Message};
 use super::pace::Line;
 use super::views::Views;
 use std::collections::{BTreeMap, VecDeque};
@@ -32,7 +32,7 @@ pub(super) enum Outgoing {
 #[derive(Debug, Default)]
 struct Client {
     /// The newest request.
-    pending: Option<Look>,
+    pending: Option<LookRequest>,
     /// The request in work.
     is_in_work: bool,
     /// A frame that waits for the one on the wire.
@@ -189,7 +189,7 @@ impl Hub {
         self.wake.notify_all();
     }
 
-    /// Tells all pages, those of later too. Only the newest text of a topic counts.
+    /// Sends a message to all pages, including pages that connect later. Only the newest message of a topic counts.
     pub(super) fn publish(&self, topic: &'static str, value: &serde_json::Value) {
         let mut state = self.lock();
         let text: Arc<str> = value.to_string().into();
@@ -288,7 +288,7 @@ impl Hub {
 
 impl State {
     /// Takes the request of the page that waits longest for its turn.
-    fn next_look(&mut self) -> Option<(ClientId, Look)> {
+    fn next_look(&mut self) -> Option<(ClientId, LookRequest)> {
         let waiting = || self.clients.iter().filter(|(_, client)| client.waits()).map(|(&id, _)| id);
         let id = waiting().find(|&id| id > self.served).or_else(|| waiting().next())?;
         self.served = id;
@@ -323,7 +323,7 @@ mod tests {
     use super::*;
 
     fn look(seq: u32) -> Message {
-        Message::Look(Look { seq, from: Viewpoint::View(0), size: None, panes: Vec::new(), moving: true })
+        Message::Look(LookRequest { seq, from: Viewpoint::View(0), size: None, panes: Vec::new(), moving: true })
     }
 
     fn seq(task: Option<(ClientId, Message)>) -> Option<(ClientId, u32)> {

@@ -50,11 +50,11 @@ pub(super) enum Viewpoint {
 /// A request for a frame.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Look {
+pub(super) struct LookRequest {
     /// Number of the request, for the answer.
     pub(super) seq: u32,
     pub(super) from: Viewpoint,
-    /// Columns and rows of the picture, if it is not that of the camera.
+    /// Width and height of the image, px, if they differ from the camera's.
     #[serde(default)]
     pub(super) size: Option<[u32; 2]>,
     /// One or two pictures.
@@ -66,7 +66,7 @@ pub(super) struct Look {
 /// How a page chooses Gaussians.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "select", rename_all = "lowercase", deny_unknown_fields)]
-pub(super) enum Choose {
+pub(super) enum SelectionChange {
     /// By what is drawn over a picture.
     Draw {
         /// Camera of the full picture.
@@ -133,7 +133,7 @@ pub(super) enum Choose {
     Unlock,
 }
 
-/// What is written as a file of its own; the shown model stays.
+/// An export to a separate file; the shown model does not change.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Export {
@@ -151,7 +151,7 @@ pub(super) struct Export {
 /// What a page asks of the object that it points at.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "object", rename_all = "lowercase", deny_unknown_fields)]
-pub(super) enum Find {
+pub(super) enum ObjectRequest {
     /// It is at a pixel, or that does not belong to it.
     Click {
         /// Camera of the full picture.
@@ -196,7 +196,7 @@ pub(super) enum Command {
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum Message {
     /// A request for a frame. A newer one replaces it.
-    Look(Look),
+    Look(LookRequest),
     /// A frame was drawn.
     Ack {
         /// Number of the request.
@@ -231,7 +231,7 @@ pub(super) enum Message {
     /// Chooses Gaussians.
     Choose {
         /// How.
-        what: Choose,
+        what: SelectionChange,
     },
     /// Writes a file for the page to fetch.
     Export {
@@ -241,7 +241,7 @@ pub(super) enum Message {
     /// Points at an object, or says what becomes of it.
     Object {
         /// What.
-        what: Find,
+        what: ObjectRequest,
     },
     /// News of that object, from the thread that looks for it.
     #[serde(skip)]
@@ -297,10 +297,11 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Bytes of the header.
-    pub(super) const HEADER: usize = 36;
+    pub(super) const HEADER_BYTES: usize = 36;
 
     pub(super) fn encode(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(Self::HEADER + self.pictures.iter().map(|p| p.len() + 4).sum::<usize>());
+        let mut bytes =
+            Vec::with_capacity(Self::HEADER_BYTES + self.pictures.iter().map(|p| p.len() + 4).sum::<usize>());
         let count = self.pictures.len() as u32;
         let flags = count << 2 | u32::from(self.mapped) << 1 | u32::from(self.exact);
         let [near, far] = self.depths.map(f32::to_bits);

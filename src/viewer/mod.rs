@@ -1,8 +1,8 @@
-//! A page that shows a model, or a training that runs, in a browser of this machine.
+//! A page that shows a model or a running training in a browser.
 //!
-//! [`Viewer::start`] opens a port on loopback. [`show`] serves a finished model, whose labels the page may
-//! change; [`Watched`] is an observer that serves a training. The engine draws every picture; the page only places
-//! them. Page, scripts and styles are in the program (`page/`), and nothing is fetched from elsewhere.
+//! [`Viewer::start`] opens a port on loopback. [`show`] serves a finished model and lets the page edit its labels.
+//! [`ViewerObserver`] serves a training. The engine renders all images; the page only places them. Page, scripts and
+//! styles are part of the program (`page/`), and nothing is loaded from the network.
 //!
 //! One thread owns the engine. `server` has a thread per connection, `hub` passes requests and frames between them:
 //! the newest camera wins, one frame is in work and one on the wire. `guard` decides who may ask.
@@ -30,8 +30,8 @@ mod socket;
 mod training;
 mod views;
 
-pub use finished::{Finished, show};
-pub use training::Watched;
+pub use finished::{FinishedModel, show};
+pub use training::ViewerObserver;
 
 use crate::error::Result;
 use guard::Guard;
@@ -41,7 +41,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Time for pages to hear that the server ends.
-const FAREWELL: Duration = Duration::from_millis(500);
+const FAREWELL_TIME_MAX: Duration = Duration::from_millis(500);
 
 /// Where the server listens, and what viewing may cost.
 #[derive(Clone, Debug)]
@@ -50,29 +50,29 @@ pub struct ViewerOptions {
     pub host: String,
     /// Port; 0 takes a free one.
     pub port: u16,
-    /// What a page has to know.
+    /// The token that requests need.
     pub token: Token,
     /// Share of the time of a training that viewing may take, 0 to 1.
     pub share: f32,
 }
 
-/// The token of the printed address, without which nobody sees anything.
+/// The token of the printed address, which every request needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Token {
     /// A new one.
     New,
-    /// This one, so that a page comes back when its server does: letters, digits, `-` and `_`, at least
-    /// [`TOKEN_MIN`] of them.
+    /// This token, so that a page can reconnect to a restarted server: at least [`TOKEN_MIN`] letters, digits, `-` and
+    /// `_`.
     Given(String),
-    /// None is needed; only on loopback.
+    /// No token; only on loopback.
     Off,
 }
 
-/// Fewest characters of a token that is given.
+/// Minimum length of a given token.
 pub const TOKEN_MIN: usize = 16;
 
-/// The commands of the program, for the page to show.
-pub trait Words: Sync {
+/// Commands of the program that pages show.
+pub trait ProgramCommands: Sync {
     /// Returns the command that makes `output` of `model` by a list of edits.
     fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String;
     /// Returns the command that shows a model.
@@ -106,6 +106,6 @@ impl Viewer {
 
 impl Drop for Viewer {
     fn drop(&mut self) {
-        self.hub.close(FAREWELL);
+        self.hub.close(FAREWELL_TIME_MAX);
     }
 }

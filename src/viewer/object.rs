@@ -1,8 +1,8 @@
-//! The object that pages point at, until it becomes a label or is dropped.
+//! The object that pages point at, until it becomes a label or is discarded.
 
-use super::finder::{Finder, News, Pointed, Spot};
+use super::finder::{Finder, News, Pointing, Spot};
 use super::hub::{ClientId, Hub};
-use super::message::{Find, Viewpoint};
+use super::message::{ObjectRequest, Viewpoint};
 use crate::edit::{Edit, Rows};
 use crate::error::{Error, Result};
 use crate::scene::Gaussians;
@@ -10,20 +10,20 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Places in a box, along each side, whose surface is carried to a photo.
-const ACROSS: u32 = 16;
+const BOX_SAMPLES_PER_SIDE: u32 = 16;
 
 /// The object, and who looks for it.
 pub(super) struct Object {
     finder: Finder,
     /// Which Gaussians the finder has ([`Work::rows_version`](super::edits::Work::rows_version)).
     sent: Option<u64>,
-    found: Option<Found>,
+    found: Option<Answer>,
     /// What the finder does: photos that were asked, of how many, and seconds left.
     asked: Option<(usize, usize, Option<f64>)>,
 }
 
 /// An answer.
-struct Found {
+struct Answer {
     rows: Arc<[bool]>,
     flags: Vec<(&'static str, String)>,
     /// A better answer is on its way.
@@ -44,10 +44,10 @@ impl Object {
     pub(super) fn point(
         &mut self,
         client: ClientId,
-        pointed: Pointed,
+        pointed: Pointing,
         (model, version): (&Gaussians, u64),
     ) -> Result<()> {
-        if matches!(pointed, Pointed::Click(_, false)) && !self.is_there() {
+        if matches!(pointed, Pointing::Click(_, false)) && !self.is_there() {
             return Err(Error::usage("point", "click the object first, then exclude what does not belong to it"));
         }
         if self.sent != Some(version) {
@@ -70,7 +70,7 @@ impl Object {
         match news {
             News::Asked { done, all, left } => self.asked = Some((done, all, left)),
             News::Found { rows, flags, is_last } => {
-                self.found = Some(Found { rows, flags, is_first: !is_last });
+                self.found = Some(Answer { rows, flags, is_first: !is_last });
                 self.asked = self.asked.filter(|_| !is_last);
                 return true;
             }
@@ -117,12 +117,12 @@ impl Object {
 
 /// Returns what a page points at; `at` finds what is at pixels of a picture.
 pub(super) fn pointed(
-    find: &Find,
+    find: &ObjectRequest,
     at: impl FnOnce(&Viewpoint, &[[u32; 2]]) -> Result<Spot>,
-) -> Result<Option<Pointed>> {
+) -> Result<Option<Pointing>> {
     Ok(match find {
-        Find::Click { from, pixel, on } => Some(Pointed::Click(at(from, &[*pixel])?, *on)),
-        Find::Box { from, corners: [x0, y0, x1, y1] } => {
+        ObjectRequest::Click { from, pixel, on } => Some(Pointing::Click(at(from, &[*pixel])?, *on)),
+        ObjectRequest::Box { from, corners: [x0, y0, x1, y1] } => {
             if x0 >= x1 || y0 >= y1 {
                 return Err(Error::usage("box", "is empty; drag a larger one"));
             }
@@ -131,15 +131,15 @@ pub(super) fn pointed(
                 // Corners of a box around an object show what is behind it.
                 Viewpoint::Camera(_) => ellipse([*x0, *y0, *x1, *y1]),
             };
-            Some(Pointed::Area(at(from, &pixels)?))
+            Some(Pointing::Area(at(from, &pixels)?))
         }
-        Find::Keep { .. } | Find::Drop => None,
+        ObjectRequest::Keep { .. } | ObjectRequest::Drop => None,
     })
 }
 
 /// Returns pixels all over the ellipse in a box.
 fn ellipse([x0, y0, x1, y1]: [u32; 4]) -> Vec<[u32; 2]> {
-    let steps = || (0..=ACROSS).map(|step| 2.0 * f64::from(step) / f64::from(ACROSS) - 1.0);
+    let steps = || (0..=BOX_SAMPLES_PER_SIDE).map(|step| 2.0 * f64::from(step) / f64::from(BOX_SAMPLES_PER_SIDE) - 1.0);
     let along = |share: f64, from: u32, to: u32| {
         (f64::from(from) + (0.5 + 0.5 * share) * (f64::from(to) - f64::from(from))).round() as u32
     };

@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 /// Weight of a frame when the next one comes: about the last twenty count.
-const MEMORY: f64 = 0.95;
+const FRAME_DECAY: f64 = 0.95;
 /// Ratio of the widths of two sizes.
-const STEP: f64 = 1.12;
+const SIZE_RATIO: f64 = 1.12;
 /// Smallest size: a quarter of the width.
-const LEVELS: i32 = 12;
+const SIZE_LEVELS_MAX: i32 = 12;
 /// A picture becomes smaller if it is predicted to take longer than this share of the target.
-const TOO_LONG: f64 = 1.25;
+const SHRINK_ABOVE: f64 = 1.25;
 /// A picture becomes larger if the larger one is predicted to take less than this share of the target.
-const SHORT: f64 = 0.95;
+const GROW_BELOW: f64 = 0.95;
 
 /// A model of the time of a frame, a + b · pixels, and the size that follows from it. Splats are projected and sorted at
 /// any size, so time per pixel alone would shrink the picture further and further.
@@ -26,7 +26,7 @@ impl Pace {
     pub(super) fn note(&mut self, pixels: f64, seconds: f64) {
         let x = pixels / 1e6;
         for (sum, value) in self.sums.iter_mut().zip([1.0, x, seconds, x * x, x * seconds]) {
-            *sum = *sum * MEMORY + value;
+            *sum = *sum * FRAME_DECAY + value;
         }
     }
 
@@ -38,7 +38,7 @@ impl Pace {
         }
         let (mean_x, mean_y) = (x / n, y / n);
         let (variance, covariance) = (xx / n - mean_x * mean_x, xy / n - mean_x * mean_y);
-        // Frames of one size do not tell a from b: half of the time is then taken to be that of the pixels.
+        // Frames of one size cannot separate a from b, so half of the time is attributed to the pixels.
         let slope = if variance > 1e-4 * mean_x * mean_x { covariance / variance } else { 0.5 * mean_y / mean_x };
         // Neither part can be negative.
         let slope = slope.clamp(0.0, mean_y / mean_x);
@@ -48,9 +48,9 @@ impl Pace {
     /// Returns the share of the full width and height for a moving picture that should take `target` seconds.
     pub(super) fn scale(&mut self, full_pixels: f64, target: f64) -> f64 {
         let time = |level: i32| self.predict(full_pixels * side(level) * side(level));
-        if time(self.level) > TOO_LONG * target {
-            self.level = (self.level..LEVELS).find(|&level| time(level) <= target).unwrap_or(LEVELS);
-        } else if self.level > 0 && time(self.level - 1) < SHORT * target {
+        if time(self.level) > SHRINK_ABOVE * target {
+            self.level = (self.level..SIZE_LEVELS_MAX).find(|&level| time(level) <= target).unwrap_or(SIZE_LEVELS_MAX);
+        } else if self.level > 0 && time(self.level - 1) < GROW_BELOW * target {
             self.level -= 1;
         }
         side(self.level)
@@ -60,7 +60,7 @@ impl Pace {
 /// Returns the share of the full width at a level. `powi` may differ in its last bit from one place of the program to
 /// another.
 fn side(level: i32) -> f64 {
-    (0..level).fold(1.0, |side, _| side / STEP)
+    (0..level).fold(1.0, |side, _| side / SIZE_RATIO)
 }
 
 /// The rate of the line to a client, and whether its moving pictures are worth a lossy compression.
@@ -156,10 +156,10 @@ mod tests {
             let late = &scales[100..];
             let changes = late.windows(2).filter(|pair| pair[0] != pair[1]).count();
             assert!(changes <= 2, "a {a}, b {b}: {changes} changes in {late:?}");
-            let (scale, floor) = (late[99], side(LEVELS));
+            let (scale, floor) = (late[99], side(SIZE_LEVELS_MAX));
             let time = |scale: f64| a + b * scale * scale;
             assert!(time(scale) < 0.08 * 1.4 || scale == floor, "a {a}, b {b}: {scale}");
-            assert!(scale == 1.0 || time(scale * STEP) > 0.08 * 0.7, "a {a}, b {b}: {scale} could be larger");
+            assert!(scale == 1.0 || time(scale * SIZE_RATIO) > 0.08 * 0.7, "a {a}, b {b}: {scale} could be larger");
         }
     }
 

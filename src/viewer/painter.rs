@@ -2,10 +2,10 @@
 
 use super::finder::Spot;
 use super::hub::{ClientId, Hub};
-use super::message::{Frame, Look, PIXELS_MAX, Pane, Viewpoint};
+use super::message::{Frame, LookRequest, PIXELS_MAX, Pane, Viewpoint};
 use super::pace::Pace;
-use super::pictures::{self, Beside};
-use super::views::{Posed, Score, Views};
+use super::pictures::{self, PanelData};
+use super::views::{SceneView, Score, Views};
 use crate::error::{Error, Result};
 use crate::files::resize::bounded_size;
 use crate::render::pictures::depth_range;
@@ -18,13 +18,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Time of a moving frame, s: on a graphics card, and on a processor.
-const TARGETS: [f64; 2] = [0.04, 0.08];
+/// Time of a moving frame, s: on a GPU, and on a CPU.
+const MOVING_FRAME_SECONDS: [f64; 2] = [0.04, 0.08];
 
 /// Longest side of a picture in which the surface is looked up, px.
-pub(super) const SURFACE_PX: u32 = 1024;
+pub(super) const SURFACE_SIDE_MAX: u32 = 1024;
 
-/// What draws.
+/// A source of renders.
 pub(super) trait Source {
     /// Renders the drawn model.
     fn render(&mut self, camera: &Camera, parts: Parts) -> Result<Render>;
@@ -40,7 +40,7 @@ pub(super) trait Source {
     fn step(&self) -> u32;
 }
 
-/// What is at a pixel.
+/// The surface at a pixel.
 pub(super) struct Surface {
     /// Camera of the full picture.
     pub(super) camera: Camera,
@@ -52,7 +52,7 @@ pub(super) struct Surface {
     pub(super) row: usize,
 }
 
-/// Draws at a size that keeps up with the hand.
+/// Draws at a size that is fast enough while the camera moves.
 pub(super) struct Painter {
     pub(super) views: Arc<Views>,
     pace: Pace,
@@ -61,11 +61,11 @@ pub(super) struct Painter {
 
 impl Painter {
     pub(super) fn new(views: Arc<Views>, is_cpu: bool) -> Self {
-        Self { views, pace: Pace::default(), target: TARGETS[usize::from(is_cpu)] }
+        Self { views, pace: Pace::default(), target: MOVING_FRAME_SECONDS[usize::from(is_cpu)] }
     }
 
-    /// Draws and sends a frame. Only a broken device is an error; all else is told to the page.
-    pub(super) fn look(&mut self, hub: &Hub, id: ClientId, look: &Look, source: &mut dyn Source) -> Result<()> {
+    /// Draws and sends a frame. Only a broken device is an error; other problems are reported to the page.
+    pub(super) fn look(&mut self, hub: &Hub, id: ClientId, look: &LookRequest, source: &mut dyn Source) -> Result<()> {
         let drawn = self.draw(hub, id, look, source);
         hub.finish(id, drawn.as_ref().ok());
         match drawn {
@@ -77,7 +77,7 @@ impl Painter {
         }
     }
 
-    fn draw(&mut self, hub: &Hub, id: ClientId, look: &Look, source: &mut dyn Source) -> Result<Frame> {
+    fn draw(&mut self, hub: &Hub, id: ClientId, look: &LookRequest, source: &mut dyn Source) -> Result<Frame> {
         if look.panes.is_empty() || look.panes.len() > 2 {
             return Err(Error::usage("panes", "must be one or two"));
         }
@@ -108,7 +108,7 @@ impl Painter {
         let rendered = source.render(&camera, parts)?;
         let compares = look.panes.contains(&Pane::Error);
         let photo = posed.and_then(|posed| posed.photo.as_ref()).filter(|_| compares).map(Pixels::get).transpose()?;
-        let beside = Beside { confidence: source.confidence(), photo: photo.as_deref() };
+        let beside = PanelData { confidence: source.confidence(), photo: photo.as_deref() };
         let encode = |&pane| pictures::encode(pane, &rendered, beside, is_lossy);
         let mut encoded = look.panes.iter().map(encode).collect::<Result<Vec<_>>>()?;
         if !look.moving {
@@ -137,7 +137,7 @@ impl Painter {
         source: &mut dyn Source,
     ) -> Result<()> {
         let (seq, from, pixel) = ask;
-        match self.at(from, pixel, source) {
+        match self.describe_pixel(from, pixel, source) {
             Ok(mut found) => {
                 found["kind"] = "picked".into();
                 found["seq"] = seq.into();
@@ -152,7 +152,7 @@ impl Painter {
         }
     }
 
-    fn at(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<serde_json::Value> {
+    fn describe_pixel(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<serde_json::Value> {
         let (camera, scale, rendered) = self.seen(from, Parts::ALL, None, source)?;
         let index = index_of(&camera, scale, pixel)?;
         let drawn = usize::try_from(rendered.top_id[index]).ok();
@@ -205,7 +205,7 @@ impl Painter {
             };
             return Ok(Spot::Photo(name.clone(), pixels.iter().map(share).collect()));
         }
-        let (small, scale, rendered) = self.seen(from, Parts::DEPTH, Some(SURFACE_PX), source)?;
+        let (small, scale, rendered) = self.seen(from, Parts::DEPTH, Some(SURFACE_SIDE_MAX), source)?;
         let (width, height) = small.size();
         let point = |[x, y]: &[u32; 2]| {
             let place = DVec2::new((f64::from(*x) + 0.5) * scale[0], (f64::from(*y) + 0.5) * scale[1]);
@@ -220,7 +220,7 @@ impl Painter {
     }
 
     pub(super) fn score(&self, index: usize, source: &mut dyn Source) -> Result<Score> {
-        let posed: &Posed = self.views.get(index)?;
+        let posed: &SceneView = self.views.get(index)?;
         let parts = if posed.view.mask.is_some() { Parts::LABELS } else { Parts::COLOUR };
         Score::new(posed, &source.render(&posed.view.camera, parts)?)
     }

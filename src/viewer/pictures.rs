@@ -10,16 +10,16 @@ use crate::scene::labels::{label_colour, label_colours};
 use crate::scene::{Photo, UNLABELLED};
 
 /// Share of the label's colour in labels over colour.
-const TINT: f32 = 0.55;
+const LABEL_TINT_SHARE: f32 = 0.55;
 /// Quality of JPEGs, for moving pictures on slow lines.
-const QUALITY: u8 = 70;
+const JPEG_QUALITY: u8 = 70;
 
 /// Colours of no to full confidence.
-const CONFIDENCE: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
+const CONFIDENCE_COLOURS: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
 
 /// What panes need besides the render.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Beside<'a> {
+pub(super) struct PanelData<'a> {
     /// Confidence by row of the drawn model.
     pub(super) confidence: Option<&'a [f32]>,
     /// Photo of the view.
@@ -37,7 +37,7 @@ pub(super) fn parts(panes: &[Pane]) -> Parts {
 }
 
 /// Returns the bytes of the picture of a pane. Colour, labels, depth and opacity have the pixels that `render` writes.
-pub(super) fn encode(pane: Pane, rendered: &Render, beside: Beside, is_lossy: bool) -> Result<Vec<u8>> {
+pub(super) fn encode(pane: Pane, rendered: &Render, beside: PanelData, is_lossy: bool) -> Result<Vec<u8>> {
     let size = (rendered.width, rendered.height);
     match pane {
         Pane::Depth => return png_grey16(size, &depth_preview(&rendered.depth)),
@@ -54,7 +54,7 @@ pub(super) fn encode(pane: Pane, rendered: &Render, beside: Beside, is_lossy: bo
         Pane::Error => errors(rendered, beside.photo),
         _ => rendered.rgb.iter().map(|colour| colour.map(to_byte)).collect(),
     };
-    if is_lossy { jpeg_rgb8(size, &pixels, QUALITY) } else { png_rgb8(size, &pixels) }
+    if is_lossy { jpeg_rgb8(size, &pixels, JPEG_QUALITY) } else { png_rgb8(size, &pixels) }
 }
 
 /// Returns the label of each pixel as a PNG: its bytes from the lowest on are red, green and blue.
@@ -68,12 +68,12 @@ fn tinted((colour, &id): (&[f32; 3], &u32)) -> [u8; 3] {
         return colour.map(to_byte);
     }
     let label = label_colour(id).map(|byte| f32::from(byte) / 255.0);
-    [0, 1, 2].map(|c| to_byte(colour[c].clamp(0.0, 1.0) * (1.0 - TINT) + label[c] * TINT))
+    [0, 1, 2].map(|c| to_byte(colour[c].clamp(0.0, 1.0) * (1.0 - LABEL_TINT_SHARE) + label[c] * LABEL_TINT_SHARE))
 }
 
 fn confidence(row: i32, known: Option<&[f32]>) -> [u8; 3] {
     let row = usize::try_from(row).ok();
-    row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| colour_on_scale(&CONFIDENCE, share))
+    row.and_then(|row| known?.get(row)).map_or([0; 3], |&share| colour_on_scale(&CONFIDENCE_COLOURS, share))
 }
 
 /// Mean difference of the channels; black where the photo has no pixel. A smaller render takes the pixel of the photo

@@ -13,21 +13,21 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// Side of a picture, px.
-const SIDE: u32 = 72;
+const PORTRAIT_SIDE: u32 = 72;
 /// Most labels with a picture.
 const LABELS_MAX: usize = 512;
 /// Time for pictures before the next request is looked for, if none has come.
-const ROUND: Duration = Duration::from_millis(400);
+const ROUND_TIME_MAX: Duration = Duration::from_millis(400);
 
 /// What a label looked like in its picture, as a checksum.
-type Look = u64;
+type AppearanceHash = u64;
 
 /// The pictures that are there.
 #[derive(Debug, Default)]
 pub(super) struct Portraits {
     /// Labels and what they look like now.
-    wanted: BTreeMap<u32, Look>,
-    made: BTreeMap<u32, Look>,
+    wanted: BTreeMap<u32, AppearanceHash>,
+    made: BTreeMap<u32, AppearanceHash>,
 }
 
 impl Portraits {
@@ -61,12 +61,13 @@ impl Portraits {
         (cameras, up, near): (&[&Camera], DVec3, f32),
         hub: &Hub,
     ) -> Result<bool> {
-        let is_due = |(id, look): &(&u32, &Look)| self.made.get(id) != Some(*look);
-        let due: Vec<(u32, Look)> = self.wanted.iter().filter(is_due).map(|(&id, &look)| (id, look)).collect();
-        let end = Instant::now() + ROUND;
+        let is_due = |(id, look): &(&u32, &AppearanceHash)| self.made.get(id) != Some(*look);
+        let due: Vec<(u32, AppearanceHash)> =
+            self.wanted.iter().filter(is_due).map(|(&id, &look)| (id, look)).collect();
+        let end = Instant::now() + ROUND_TIME_MAX;
         for &(id, look) in &due {
-            let pixels = portrait(engine, (model, id), (cameras, up), (SIDE, near))?;
-            hub.set_portrait(id, png_rgba8((SIDE, SIDE), &pixels)?);
+            let pixels = portrait(engine, (model, id), (cameras, up), (PORTRAIT_SIDE, near))?;
+            hub.set_portrait(id, png_rgba8((PORTRAIT_SIDE, PORTRAIT_SIDE), &pixels)?);
             self.made.insert(id, look);
             if Instant::now() > end || hub.has_work() {
                 break;

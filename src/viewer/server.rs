@@ -2,7 +2,7 @@
 
 use super::exports::free_path;
 use super::guard::Guard;
-use super::http::{self, Head, NoHead, WRITE_TIME, answer, say};
+use super::http::{self, Head, HeadError, WRITE_TIME, answer, say};
 use super::hub::Hub;
 use super::message::Message;
 use super::{Token, page, socket};
@@ -12,7 +12,7 @@ use std::net::{TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Most connections at a time, those of WebSockets included.
+/// Maximum number of open connections, WebSockets included.
 const CONNECTIONS_MAX: usize = 64;
 
 /// Opens the port and starts to serve. Returns the rules, which know the address.
@@ -46,9 +46,9 @@ pub(super) fn start(host: &str, port: u16, token: &Token, hub: &Arc<Hub>) -> Res
 }
 
 /// Counts an open connection.
-struct Counted(Arc<AtomicUsize>);
+struct ConnectionCount(Arc<AtomicUsize>);
 
-impl Drop for Counted {
+impl Drop for ConnectionCount {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::SeqCst);
     }
@@ -65,7 +65,7 @@ fn accept(listener: &TcpListener, guard: &Guard, hub: &Arc<Hub>) {
             std::thread::sleep(std::time::Duration::from_millis(20));
             continue;
         };
-        let counted = Counted(Arc::clone(&open));
+        let counted = ConnectionCount(Arc::clone(&open));
         let is_full = open.fetch_add(1, Ordering::SeqCst) >= CONNECTIONS_MAX;
         if stream.set_write_timeout(Some(WRITE_TIME)).is_err() {
             continue;
@@ -87,8 +87,8 @@ fn accept(listener: &TcpListener, guard: &Guard, hub: &Arc<Hub>) {
 fn connection(mut stream: TcpStream, guard: &Guard, hub: &Arc<Hub>) {
     let head = match http::read_head(&mut stream) {
         Ok(head) => head,
-        Err(NoHead::Gone) => return,
-        Err(NoHead::Status(status)) => return say(&mut stream, status, status),
+        Err(HeadError::Gone) => return,
+        Err(HeadError::Status(status)) => return say(&mut stream, status, status),
     };
     let host = head.header("Host");
     let is_named = host.is_some_and(|host| !host.is_empty());

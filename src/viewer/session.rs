@@ -1,12 +1,12 @@
-//! What pages ask of a finished model: pictures, choices, changes, files.
+//! Requests of pages for a finished model: images, selections, edits, files.
 
-use super::chosen::Chosen;
-use super::drawing::{Drawing, Shown};
+use super::chosen::Selection;
+use super::drawing::{Drawing, Visibility};
 use super::edits::Work;
 use super::exports::export;
 use super::finished::frame_of;
 use super::hub::{ClientId, Hub};
-use super::message::{Find, Message};
+use super::message::{Message, ObjectRequest};
 use super::object::{Object, pointed};
 use super::painter::{Painter, Source};
 use super::portraits::Portraits;
@@ -27,17 +27,17 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A finished model, and what pages have made of it.
+/// A finished model with the edits and selections of the pages.
 pub(super) struct Session<'a> {
     pub(super) hub: &'a Hub,
     pub(super) painter: Painter,
     pub(super) drawing: Drawing,
     pub(super) work: Work<'a>,
-    pub(super) chosen: Chosen,
+    pub(super) chosen: Selection,
     pub(super) object: Option<Object>,
     /// The label with which the object is drawn until it has one.
     pub(super) object_label: Option<u32>,
-    pub(super) shown: Shown,
+    pub(super) shown: Visibility,
     /// State of the model whose labels pages know.
     pub(super) told: Option<u64>,
     pub(super) portraits: Portraits,
@@ -84,17 +84,17 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Says something to the page that has asked; to all of them if the server did.
+    /// Sends a text to the page that asked, or to all pages for a request of the server.
     fn tell(&self, id: ClientId, kind: &'static str, text: &str) {
         let message = json!({ "kind": kind, "text": text });
         if id == 0 { self.hub.publish(kind, &message) } else { self.hub.reply(id, &message) }
     }
 
-    /// Does what a page asks. Returns a sentence for it, or none.
+    /// Serves a request. Returns a sentence for the page, or an empty text.
     fn serve(&mut self, id: ClientId, message: Message) -> Result<String> {
         match message {
             Message::Show { hidden, solo } => {
-                self.shown = Shown { hidden, solo };
+                self.shown = Visibility { hidden, solo };
                 self.redraw()?;
             }
             Message::Background { colour } if colour.iter().all(|value| (0.0..=1.0).contains(value)) => {
@@ -154,7 +154,7 @@ impl Session<'_> {
             self.scene[key] = value;
         }
         self.scores.clear();
-        self.shown = Shown::default();
+        self.shown = Visibility::default();
         self.hub.publish("scene", &self.scene);
         self.changed()?;
         Ok(saved.map_or(String::new(), |saved| {
@@ -177,19 +177,19 @@ impl Session<'_> {
     /// Draws a model that has changed. What was pointed at or chosen is of the model before.
     fn changed(&mut self) -> Result<()> {
         self.object.as_mut().map(Object::drop);
-        self.chosen = Chosen::new(self.work.model());
+        self.chosen = Selection::new(self.work.model());
         self.redraw()
     }
 
     /// Does what a page asks of the object that it points at.
-    fn find(&mut self, id: ClientId, find: &Find) -> Result<()> {
+    fn find(&mut self, id: ClientId, find: &ObjectRequest) -> Result<()> {
         let none = || Error::usage(Setting("network"), "is missing; finding objects needs a segmentation network");
         let object = self.object.as_mut().ok_or_else(none)?;
         let drawing = &mut self.drawing;
         let pointed = pointed(find, |from, pixels| self.painter.spot(from, pixels, drawing))?;
         match (find, pointed) {
             (_, Some(pointed)) => object.point(id, pointed, (self.work.model(), self.work.rows_version())),
-            (Find::Keep { name }, _) => {
+            (ObjectRequest::Keep { name }, _) => {
                 let edit = object.edit(name)?;
                 self.work.apply(edit, &mut sights_of(&mut self.drawing, &self.views))?;
                 let label = self.object_label;
@@ -217,7 +217,7 @@ impl Session<'_> {
         }
         self.hub.publish("edits", &self.work.describe());
         self.hub.publish("chosen", &self.chosen.describe());
-        let Shown { hidden, solo } = &self.shown;
+        let Visibility { hidden, solo } = &self.shown;
         let background = self.drawing.options.background;
         self.hub
             .publish("shown", &json!({ "kind": "shown", "hidden": hidden, "solo": solo, "background": background }));
@@ -233,7 +233,7 @@ impl Session<'_> {
         self.shown.retain(model);
         let is_solo = !self.shown.solo.is_empty();
         let solo = self.shown.solo.iter().copied().chain(self.object_label.filter(|_| is_solo)).collect();
-        let shown = Shown { solo, hidden: self.shown.hidden.clone() };
+        let shown = Visibility { solo, hidden: self.shown.hidden.clone() };
         self.drawing.show(model, &shown.rows(model), self.chosen.mask())
     }
 

@@ -12,7 +12,7 @@ use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message as Packet, WebSocket};
 
 /// A page that says nothing for so long is gone; it sends a sign of life three times as often.
-const SILENCE: Duration = Duration::from_secs(60);
+const SILENCE_MAX: Duration = Duration::from_secs(60);
 
 /// The reading half. What the protocol would answer by itself is dropped: it could fall into the middle of a frame.
 struct ReadHalf(TcpStream);
@@ -64,7 +64,7 @@ fn config() -> WebSocketConfig {
 }
 
 fn start_writer(stream: &TcpStream, hub: &Arc<Hub>, id: ClientId) -> Option<std::thread::JoinHandle<()>> {
-    stream.set_read_timeout(Some(SILENCE)).ok()?;
+    stream.set_read_timeout(Some(SILENCE_MAX)).ok()?;
     stream.set_write_timeout(Some(WRITE_TIME)).ok()?;
     stream.set_nodelay(true).ok()?;
     let (out, hub) = (stream.try_clone().ok()?, Arc::clone(hub));

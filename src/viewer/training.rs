@@ -7,7 +7,7 @@ use super::pace::Budget;
 use super::painter::{Painter, Source};
 use super::rows::{self, Curve};
 use super::views::{Score, Views, describe_scores};
-use super::{Viewer, Words};
+use super::{ProgramCommands, Viewer};
 use crate::error::{Error, Result};
 use crate::render::{Parts, Render};
 use crate::run::{Event, Flow, LiveScene, Observer};
@@ -18,21 +18,21 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Time between two reports to the pages.
-const REPORT_EVERY: Duration = Duration::from_millis(250);
+const REPORT_INTERVAL: Duration = Duration::from_millis(250);
 /// Time between two counts of labels.
-const COUNT_EVERY: Duration = Duration::from_secs(5);
+const LABEL_COUNT_INTERVAL: Duration = Duration::from_secs(5);
 /// Rounds over the test views in a run, and the fewest and most steps between two.
-const ROUNDS: u32 = 20;
-const ROUND_STEPS: [u32; 2] = [25, 500];
+const SCORE_ROUNDS: u32 = 20;
+const STEPS_PER_SCORE_ROUND: [u32; 2] = [25, 500];
 /// Time between two events of a paused run.
-const PAUSED_TURN: Duration = Duration::from_millis(50);
+const PAUSED_WAIT_MAX: Duration = Duration::from_millis(50);
 
-/// Shows a training to pages, and lets them pause, save and stop it. Passes everything on to another observer, whose
-/// wish to stop wins.
-pub struct Watched<'a> {
+/// Shows a training to pages, and lets them pause, save and stop it. Passes all events to another observer, whose
+/// request to stop has priority.
+pub struct ViewerObserver<'a> {
     inner: &'a mut dyn Observer,
     viewer: &'a Viewer,
-    words: &'a dyn Words,
+    words: &'a dyn ProgramCommands,
     title: String,
     painter: Painter,
     budget: Budget,
@@ -42,13 +42,13 @@ pub struct Watched<'a> {
     scored_at: u32,
     scored_to: usize,
     steps: u32,
-    wish: Wish,
+    wish: RunRequests,
     pace: Pace,
 }
 
-/// What the pages asked for.
+/// Requests of the pages.
 #[derive(Default)]
-struct Wish {
+struct RunRequests {
     pause: bool,
     save: bool,
     stop: bool,
@@ -84,9 +84,9 @@ impl Source for LiveScene<'_> {
     }
 }
 
-impl<'a> Watched<'a> {
+impl<'a> ViewerObserver<'a> {
     /// Shows a run to the pages of `viewer`.
-    pub fn new(viewer: &'a Viewer, inner: &'a mut dyn Observer, title: String, words: &'a dyn Words) -> Self {
+    pub fn new(viewer: &'a Viewer, inner: &'a mut dyn Observer, title: String, words: &'a dyn ProgramCommands) -> Self {
         Self {
             inner,
             viewer,
@@ -99,7 +99,7 @@ impl<'a> Watched<'a> {
             scored_at: 0,
             scored_to: 0,
             steps: 0,
-            wish: Wish::default(),
+            wish: RunRequests::default(),
             pace: Pace { last: Instant::now(), reported: None, counted: None, step: 0.0 },
         }
     }
@@ -144,7 +144,7 @@ impl<'a> Watched<'a> {
     /// Serves the pages for a while, in a pause.
     fn in_pause(&mut self, live: &mut LiveScene) -> Result<()> {
         self.report(live, true)?;
-        match self.viewer.hub.next(PAUSED_TURN) {
+        match self.viewer.hub.next(PAUSED_WAIT_MAX) {
             Some((id, message)) => self.serve(id, message, live),
             None => self.score_one(live),
         }
@@ -192,8 +192,8 @@ impl<'a> Watched<'a> {
     fn score_one(&mut self, live: &mut LiveScene) -> Result<()> {
         let (step, views) = (live.step(), Arc::clone(&self.painter.views));
         if self.scored_to >= views.list.len() {
-            let [fewest, most] = ROUND_STEPS;
-            if step < self.scored_at + (self.steps / ROUNDS).clamp(fewest, most) || step == 0 {
+            let [fewest, most] = STEPS_PER_SCORE_ROUND;
+            if step < self.scored_at + (self.steps / SCORE_ROUNDS).clamp(fewest, most) || step == 0 {
                 return Ok(());
             }
             (self.scored_to, self.scored_at) = (0, step);
@@ -211,7 +211,7 @@ impl<'a> Watched<'a> {
 
     fn report(&mut self, live: &mut LiveScene, is_paused: bool) -> Result<()> {
         let now = Instant::now();
-        if self.pace.reported.is_some_and(|last| now - last < REPORT_EVERY) || !self.viewer.hub.is_watched() {
+        if self.pace.reported.is_some_and(|last| now - last < REPORT_INTERVAL) || !self.viewer.hub.is_watched() {
             return Ok(());
         }
         self.pace.reported = Some(now);
@@ -232,7 +232,7 @@ impl<'a> Watched<'a> {
             }),
         );
         hub.publish("curve", &self.curve.describe());
-        let is_due = self.pace.counted.is_none_or(|last| now - last > COUNT_EVERY);
+        let is_due = self.pace.counted.is_none_or(|last| now - last > LABEL_COUNT_INTERVAL);
         if is_due {
             self.pace.counted = Some(now);
             return self.timed(|watched| {
@@ -289,7 +289,7 @@ impl<'a> Watched<'a> {
     }
 }
 
-impl Observer for Watched<'_> {
+impl Observer for ViewerObserver<'_> {
     fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow> {
         let asked = self.inner.observe(event, live)?;
         match self.see(event, live) {

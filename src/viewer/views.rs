@@ -10,12 +10,12 @@ use crate::scenes::camera_json::CameraFile;
 use serde_json::{Value, json};
 
 /// Longest side of a thumbnail, px.
-const THUMB: u32 = 168;
-const THUMB_QUALITY: u8 = 80;
+const THUMBNAIL_SIDE_MAX: u32 = 168;
+const THUMBNAIL_JPEG_QUALITY: u8 = 80;
 
 /// A view and whether it is held out.
 #[derive(Clone, Debug)]
-pub(super) struct Posed {
+pub(super) struct SceneView {
     pub(super) view: View,
     pub(super) is_test: bool,
 }
@@ -30,26 +30,26 @@ pub(super) struct Score {
 /// The views of a scene, sorted by name; may be empty.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Views {
-    pub(super) list: Vec<Posed>,
+    pub(super) list: Vec<SceneView>,
 }
 
 impl Views {
     /// Takes the views of a scene. Photos and masks are shared with it.
     pub(super) fn new(dataset: &Dataset) -> Self {
-        let posed = |is_test| move |view: &View| Posed { view: view.clone(), is_test };
-        let mut list: Vec<Posed> = dataset.train.iter().map(posed(false)).collect();
+        let posed = |is_test| move |view: &View| SceneView { view: view.clone(), is_test };
+        let mut list: Vec<SceneView> = dataset.train.iter().map(posed(false)).collect();
         list.extend(dataset.test.iter().map(posed(true)));
         list.sort_by(|a, b| a.view.name.cmp(&b.view.name));
         Self { list }
     }
 
-    pub(super) fn get(&self, index: usize) -> Result<&Posed> {
+    pub(super) fn get(&self, index: usize) -> Result<&SceneView> {
         let missing = || Error::usage("view", format!("there is no view {index}; the scene has {}", self.list.len()));
         self.list.get(index).ok_or_else(missing)
     }
 
     pub(super) fn describe(&self) -> Value {
-        let row = |posed: &Posed| {
+        let row = |posed: &SceneView| {
             json!({
                 "name": posed.view.name,
                 "test": posed.is_test,
@@ -77,15 +77,15 @@ impl Views {
         if !is_small {
             return Some(("image/png", png_rgb8(size, &photo.rgb()).ok()?));
         }
-        let small = bounded_size(size, Some(THUMB));
+        let small = bounded_size(size, Some(THUMBNAIL_SIDE_MAX));
         let pixels = shrink_photo(&photo, small.0, small.1).rgb();
-        Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMB_QUALITY).ok()?))
+        Some(("image/jpeg", jpeg_rgb8(small, &pixels, THUMBNAIL_JPEG_QUALITY).ok()?))
     }
 }
 
 impl Score {
     /// Scores a render of a view in full size: PSNR, and the mean IoU of the objects of its mask.
-    pub(super) fn new(posed: &Posed, rendered: &Render) -> Result<Self> {
+    pub(super) fn new(posed: &SceneView, rendered: &Render) -> Result<Self> {
         let photo = posed.view.photo.as_ref().map(Pixels::get).transpose()?;
         // Before the first labels of a training there is nothing to compare.
         let is_labelled = rendered.labels.iter().any(|&id| id != 0);

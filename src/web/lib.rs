@@ -6,16 +6,16 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Vectors and rotations, a module of JavaScript.
-pub const ALGEBRA: &str = include_str!("algebra.js");
-/// The camera, a module that imports [`ALGEBRA`].
-pub const CAMERA: &str = include_str!("camera.js");
+pub const ALGEBRA_SCRIPT: &str = include_str!("algebra.js");
+/// The camera, a module that imports [`ALGEBRA_SCRIPT`].
+pub const CAMERA_SCRIPT: &str = include_str!("camera.js");
 /// Mouse, touch and keys that move the camera, a module.
-pub const INPUT: &str = include_str!("input.js");
+pub const INPUT_SCRIPT: &str = include_str!("input.js");
 
 /// Colours and buttons of every page in one file.
-const THEME: &str = include_str!("theme.css");
+const THEME_STYLE: &str = include_str!("theme.css");
 /// What a browser may load for a page: pictures inside it or beside it, nothing else.
-const POLICY: &str =
+const CONTENT_POLICY: &str =
     "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// Returns a page in one file. `body` and text of `title` are escaped already or by `maud`; the others come from this
@@ -28,9 +28,9 @@ pub fn page(title: &str, style: &str, body: &Markup, script: &str) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta http-equiv="Content-Security-Policy" content=(CONTENT_POLICY);
                 title { (title) " – labelgs" }
-                style { (PreEscaped(THEME)) (PreEscaped(style)) }
+                style { (PreEscaped(THEME_STYLE)) (PreEscaped(style)) }
             }
             body {
                 (body)

@@ -127,8 +127,8 @@ fn a_misspelt_object_is_answered_with_the_nearest_names() {
     table.write(&LabelTable::path_beside(&path)).expect("written");
     let out = folder.path().join("out.ply");
     for (typed, expected) in [
-        ("barell", "no label is named barell; did you mean barrel? (labelgs list "),
-        ("Red Tabel", "no label is named Red Tabel; did you mean red table? (labelgs list "),
+        ("barell", "no label is named barell; did you mean barrel? (run `labelgs list "),
+        ("Red Tabel", "no label is named Red Tabel; did you mean red table? (run `labelgs list "),
         ("xyzzy", "no label is named xyzzy; the model has 1 thing number 1, "),
         ("777", "no Gaussian has label 777; the model has 1 thing number 1, "),
     ] {
@@ -140,7 +140,7 @@ fn a_misspelt_object_is_answered_with_the_nearest_names() {
         }
     }
     let message = said(&["relabel", text(&path), "--map", "777=1", "-o", text(&out)], 2);
-    assert!(message.contains("and 194 more (labelgs list "), "{message}");
+    assert!(message.contains("and 194 more (run `labelgs list "), "{message}");
 }
 
 #[test]

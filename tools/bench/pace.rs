@@ -2,7 +2,7 @@
 
 use super::measure::{median, timed};
 use super::trained::timing_config;
-use labelgs::cli::commands::profile::timed::Timed;
+use labelgs::cli::commands::profile::timed::TimedWork;
 use labelgs::gpu::Gpu;
 use labelgs::pass::Stage;
 use labelgs::scene::{Dataset, Gaussians};
@@ -119,7 +119,7 @@ impl Pace {
     /// Describes the workload of the steps, for tables and JSON.
     pub fn about(&self) -> (String, Value) {
         let (gaussians, pairs) = (self.trainer.gaussian_count(), median(self.pairs()));
-        let timed = Timed::new(&self.reports);
+        let timed = TimedWork::new(&self.reports);
         let (width, height) = timed.size();
         let counted = |value: fn(&StepReport) -> u32| self.median(|report| f64::from(value(report)));
         let visible = counted(|report| report.report.counters.visible_count);

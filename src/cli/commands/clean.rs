@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::{corners, distance, share};
-use crate::cli::support::{Context, EditArgs, Edited};
+use crate::cli::support::{Context, EditArgs, EditResult};
 use crate::edit::clean::{Cleaning, clean};
 use clap::Args;
 use glam::DVec3;
@@ -41,5 +41,5 @@ pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
         dropped.outside,
         dropped.lonely
     );
-    args.edit.finish(context, &Edited::with_labels_of(&cleaned, known, model.len()), json!({ "dropped": dropped }))
+    args.edit.finish(context, &EditResult::with_labels_of(&cleaned, known, model.len()), json!({ "dropped": dropped }))
 }

@@ -2,7 +2,7 @@
 
 use crate::cli::support::model_edit::require_labels;
 use crate::cli::support::parsers::{Picks, model_file, picks};
-use crate::cli::support::{Context, EditArgs, Edited, TableArg, WriteArgs, open_gpu};
+use crate::cli::support::{Context, EditArgs, EditResult, TableArg, WriteArgs, open_gpu};
 use crate::edit::catalogue::Catalogue;
 use crate::edit::rename::keep;
 use crate::formats::{Mesh, export_model, write_meshes};
@@ -51,7 +51,7 @@ pub struct ConvertArgs {
 /// Writes a model in another format.
 pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
     let ConvertArgs { model, output, write, table, .. } = args.clone();
-    if args.mesh && output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("glb")) {
+    if args.mesh && output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("glb")) {
         let problem = format!("{} is not a .glb file; meshes are written as GLB only", output.display());
         return Err(Error::usage("--mesh", problem));
     }
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &ConvertArgs, context: &Context) -> Result<()> {
         return meshes(args, &edit, (&model, &known), context);
     }
     let labels = known.gaussians.keys().copied().filter(|&label| label != UNLABELLED).collect();
-    edit.finish(context, &Edited::new(&model, known.table, model.len(), labels), json!({}))
+    edit.finish(context, &EditResult::new(&model, known.table, model.len(), labels), json!({}))
 }
 
 fn per_object(edit: &EditArgs, model: &Gaussians, known: &Catalogue, context: &Context) -> Result<()> {
@@ -114,12 +114,12 @@ fn meshes(
     context.show(&json!({ "schema_version": 1, "output": output, "meshes": rows }), &text)
 }
 
-/// The file of a label: its id and name before the ending. Characters that a file system may refuse become `_`.
+/// The file of a label: its id and name before the extension. Characters that a file system may refuse become `_`.
 fn file_of(output: &Path, label: u32, name: Option<&str>) -> PathBuf {
     let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
     let own = if label == UNLABELLED { Some("none") } else { name };
     let own: String = own.map(|name| format!("_{name}")).unwrap_or_default().chars().take(60).map(safe).collect();
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    let ending = output.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
-    output.with_file_name(format!("{stem}_{label:03}{own}{ending}"))
+    let extension = output.extension().map(|extension| format!(".{}", extension.to_string_lossy())).unwrap_or_default();
+    output.with_file_name(format!("{stem}_{label:03}{own}{extension}"))
 }

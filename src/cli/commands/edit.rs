@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::cli::commands::extract_remove::scene_sights;
 use crate::cli::support::parsers::near;
-use crate::cli::support::{Context, EditArgs, Edited, SceneArgs, near_plane};
+use crate::cli::support::{Context, EditArgs, EditResult, SceneArgs, near_plane};
 use crate::edit::fill::Sight;
 use crate::edit::{Document, EditsFile};
 use crate::error::{Error, Setting};
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &ReplayArgs, context: &Context) -> Result<()> {
     let Document { model, table } = list.replay(&args.replay, first, &mut draw)?;
     let labels = model.labels.iter().flatten().copied().collect();
     let added = (model.len() as u64).saturating_sub(of as u64);
-    let edited = Edited { added, ..Edited::new(&model, table, of, labels) };
+    let edited = EditResult { added, ..EditResult::new(&model, table, of, labels) };
     args.edit.finish(context, &edited, json!({ "edits": list.edits.len() }))
 }
 

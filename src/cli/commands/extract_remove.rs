@@ -4,8 +4,8 @@ use crate::cli::commands::occlusion::from_model;
 use crate::cli::support::model_edit::look;
 use crate::cli::support::parsers::{distance, share};
 use crate::cli::support::{
-    ChooseArgs, Context, EditArgs, Edited, MinConfidenceArg, Progress, SceneArgs, Seen, near_plane, open_gpu,
-    open_model, open_scene, warn_of_misfit,
+    ChooseArgs, Context, EditArgs, EditResult, LabelledModel, MinConfidenceArg, Progress, SceneArgs, near_plane,
+    open_gpu, open_model, open_scene, warn_of_misfit,
 };
 use crate::edit::change::without_specks;
 use crate::edit::components::Grouping;
@@ -61,7 +61,7 @@ pub struct ExtractArgs {
     #[arg(long, value_name = "DIR", requires = "refit")]
     pub masks: Option<PathBuf>,
     /// Drop fragments: connected parts of an object smaller than --min-share.
-    #[arg(long)]
+    #[arg(long, alias = "drop-fragments")]
     pub drop_specks: bool,
     /// What a speck is.
     #[command(flatten)]
@@ -90,7 +90,7 @@ impl GroupingArgs {
 /// Writes the Gaussians of the chosen labels.
 pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
     let ExtractArgs { edit, choice, .. } = args;
-    let Seen { model, known, .. } = look(&edit.model, &edit.table)?;
+    let LabelledModel { model, known, .. } = look(&edit.model, &edit.table)?;
     let labels = choice.labels(&edit.model, model.view(), &known, context)?;
     let whole = args.sure.extract_seen(&edit.model, model.view(), &labels)?;
     let part = if args.drop_specks { without_specks(&whole, args.grouping.grouping())? } else { whole.clone() };
@@ -108,7 +108,7 @@ pub(crate) fn run_extract(args: &ExtractArgs, context: &Context) -> Result<()> {
         0 => String::new(),
         _ => format!("; {unsure} more have a confidence below {least} (see --min-confidence)"),
     };
-    let edited = Edited { note, alone: true, ..Edited::new(&part, table, of, labels) };
+    let edited = EditResult { note, alone: true, ..EditResult::new(&part, table, of, labels) };
     edit.finish(context, &edited, json!({ "specks": specks, "unsure": unsure }))
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
         }
     };
     let table = known.table.as_ref().map(|table| keep(table, |id| !labels.contains(&id)));
-    edit.finish(context, &Edited { added, ..Edited::new(&part, table, model.len(), labels) }, more)
+    edit.finish(context, &EditResult { added, ..EditResult::new(&part, table, model.len(), labels) }, more)
 }
 
 /// Removes labels and closes their place by what the training views of a scene show.

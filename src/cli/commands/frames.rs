@@ -66,7 +66,8 @@ pub(crate) fn run(args: &FramesArgs, context: &Context) -> Result<()> {
     let dataset = open_scene(&args.scene, &args.reading, None, args.background, false)?;
     let views = ordered_views(args, &dataset)?;
     let lenses = windows(&args.scene, &args.reading.read.lookup())?.values().any(|window| !window.is_photo());
-    // A tracker needs frames of one size. Smaller photos lie in the upper left of theirs; the model goes on around them.
+    // A tracker needs frames of one size. Smaller photos are in the upper left of their frames; the render continues
+    // around them.
     let size = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
     let wide: Vec<Camera> =
         views.iter().map(|view| Camera { width: size.0, height: size.1, ..view.camera.clone() }).collect();

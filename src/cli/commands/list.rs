@@ -2,7 +2,7 @@
 
 use crate::cli::support::model_edit::look;
 use crate::cli::support::tables::{Column, Table, column, screen_width};
-use crate::cli::support::{Context, Seen, SheetArgs, TableArg, stdout};
+use crate::cli::support::{Context, LabelledModel, SheetArgs, TableArg, stdout};
 use crate::edit::select::LabelSummary;
 use crate::edit::{Boxes, OrientedBox};
 use crate::run::models;
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
     if args.csv && context.json {
         return Err(Error::usage("--csv", "cannot be combined with --json; use one of them"));
     }
-    let Seen { model, tally, known } = look(&args.model, &args.table)?;
+    let LabelledModel { model, tally, known } = look(&args.model, &args.table)?;
     args.sheet.write(&args.model, &tally.summaries(), &known, context)?;
     let (view, mut boxes) = (model.view(), Boxes::new(&known.gaussians));
     models::scan(&args.model, view, |_, row| {
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &ListArgs, context: &Context) -> Result<()> {
 }
 
 /// Columns of numbers on a terminal: 60 wide for scenes of usual size.
-const COLUMNS: [Column<Row>; 7] = [
+const LABEL_COLUMNS: [Column<Row>; 7] = [
     column("Gaussians", "Gaussians", 0, |row| Some(row.summary.count as f64)),
     column("x", "x", 2, |row| Some(row.summary.centre[0])),
     column("y", "y", 2, |row| Some(row.summary.centre[1])),
@@ -91,7 +91,7 @@ fn table(rows: &[Row]) -> String {
         (label, Some(name)) => format!("{label} {name}"),
         (label, None) => label.to_string(),
     };
-    Table::new("label", &COLUMNS, rows.iter().map(|row| (title(row), row))).text(screen_width())
+    Table::new("label", &LABEL_COLUMNS, rows.iter().map(|row| (title(row), row))).text(screen_width())
 }
 
 /// Returns a row per label as CSV, with world units.

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::{Picks, label, picks};
-use crate::cli::support::{Context, EditArgs, Edited};
+use crate::cli::support::{Context, EditArgs, EditResult};
 use crate::edit::merge::{MergedLabels, merge};
 use clap::Args;
 use serde_json::json;
@@ -28,6 +28,6 @@ pub(crate) fn run(args: &MergeArgs, context: &Context) -> Result<()> {
     let (model, known) = args.edit.open()?;
     let labels = args.edit.resolve(&known, "--labels", &args.labels)?;
     let MergedLabels { model: merged, table, into } = merge(&model, &known, &labels, args.into, args.name.as_deref())?;
-    let edited = Edited::new(&merged, table, model.len(), [into].into());
+    let edited = EditResult::new(&merged, table, model.len(), [into].into());
     args.edit.finish(context, &edited, json!({ "merged": labels }))
 }

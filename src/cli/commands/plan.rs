@@ -34,12 +34,12 @@ pub struct PlanArgs {
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub moments: Moments,
     /// Plan for a GPU with this much memory, such as 24G, instead of the device of this machine.
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, alias = "gpu-memory", value_name = "SIZE", value_parser = bytes)]
     pub card: Option<u64>,
 }
 
 /// Largest label id of the plan; a larger id costs a few bytes.
-const MAX_LABEL: u32 = 255;
+const PLANNED_LABEL_MAX: u32 = 255;
 
 /// A step and its device.
 struct Subject {
@@ -93,9 +93,9 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
         None => device(context)?,
     };
     let labels = (args.label_samples > 0).then(|| LabelSize {
-        max_label: MAX_LABEL.max(args.label_samples),
+        max_label: PLANNED_LABEL_MAX.max(args.label_samples),
         layers: args.label_samples,
-        vote_columns: MAX_LABEL.max(args.label_samples) + 1,
+        vote_columns: PLANNED_LABEL_MAX.max(args.label_samples) + 1,
     });
     let size = (args.size.0, args.size.1);
     let room = EngineSize::new(args.gaussians.max(1), size).for_training().with_labels(labels);
@@ -107,7 +107,7 @@ fn subject(args: &PlanArgs, context: &Context) -> Result<Subject> {
     Ok(Subject { device, shape, limits, room, capacity, list })
 }
 
-/// Returns the name, kernels and limits of the device, or those of a software device if there is none.
+/// Returns the name, kernels and limits of the device, or of an assumed CPU device if there is none.
 fn device(context: &Context) -> Result<(Option<String>, KernelShape, Limits)> {
     let options = context.gpu_options()?;
     match gpu::devices(&options) {
@@ -134,8 +134,14 @@ fn planned(subject: &Subject, limits: &Limits) -> Result<(Memory, Plan)> {
 
 /// Returns the limits with unlimited memory, for a report of the needed memory.
 fn without_sizes(limits: &Limits) -> Limits {
-    const MUCH: u64 = 1 << 60;
-    Limits { max_storage_range: MUCH, max_texel_elements: MUCH, max_allocation: MUCH, max_memory: MUCH, ..*limits }
+    const UNLIMITED_BYTES: u64 = 1 << 60;
+    Limits {
+        max_storage_range: UNLIMITED_BYTES,
+        max_texel_elements: UNLIMITED_BYTES,
+        max_allocation: UNLIMITED_BYTES,
+        max_memory: UNLIMITED_BYTES,
+        ..*limits
+    }
 }
 
 fn to_text(subject: &Subject, (memory, plan): &(Memory, Plan)) -> Result<String> {
@@ -164,13 +170,14 @@ fn to_text(subject: &Subject, (memory, plan): &(Memory, Plan)) -> Result<String>
     ))
 }
 
-const MIB: f64 = 1_048_576.0;
+const MIB_BYTES: f64 = 1_048_576.0;
 
 /// Returns what a count of votes needs: their memory comes and goes with it.
 fn votes_text(votes: &MemoryReport) -> String {
     let rows = votes.rows.iter().filter(|row| row.name.starts_with("votes_"));
-    let (own, scratch) = (rows.map(|row| row.bytes).sum::<u64>() as f64 / MIB, votes.step_pages.iter().sum::<u64>());
-    let (scratch, total) = (scratch as f64 / MIB, votes.total as f64 / MIB);
+    let (own, scratch) =
+        (rows.map(|row| row.bytes).sum::<u64>() as f64 / MIB_BYTES, votes.step_pages.iter().sum::<u64>());
+    let (scratch, total) = (scratch as f64 / MIB_BYTES, votes.total as f64 / MIB_BYTES);
     format!(
         "\nvote counting, between steps: votes {own:.0} MiB, scratch arena {scratch:.0} MiB, total {total:.0} MiB\n"
     )
@@ -179,20 +186,20 @@ fn votes_text(votes: &MemoryReport) -> String {
 /// Returns what to take from the plan: the memory, the Gaussians that fit, and what smaller values save.
 fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
     let room = &subject.room;
-    let (needed, limit) = (memory.total() as f64 / MIB, subject.limits.max_memory as f64 / MIB);
+    let (needed, limit) = (memory.total() as f64 / MIB_BYTES, subject.limits.max_memory as f64 / MIB_BYTES);
     let mut text = format!("needed:  {needed:.0} MiB at the start, of {limit:.0} MiB available\n");
     text += &match most_gaussians(subject) {
         0 => "fits:    no Gaussians at this image size\n".to_owned(),
         most => format!("fits:    up to {} at this image size and number of objects\n", counted(most, "Gaussian")),
     };
     if let Some(total) = subject.half_fits(memory) {
-        let needed = total as f64 / MIB;
+        let needed = total as f64 / MIB_BYTES;
         text += &format!("moments: fits with `labelgs train --set moments=half`: {needed:.0} MiB\n");
     }
     let kept = subject.limits.kept_max(memory.total());
     if kept > 0 {
         let views = kept / (6 * u64::from(room.image.0) * u64::from(room.image.1)).max(1);
-        text += &format!("photos:  {views} with masks stay resident, in {:.0} MiB\n", kept as f64 / MIB);
+        text += &format!("photos:  {views} with masks stay resident, in {:.0} MiB\n", kept as f64 / MIB_BYTES);
     }
     let half = |value: u32| (value / 2).max(1);
     let image = (half(room.image.0), half(room.image.1));
@@ -209,9 +216,9 @@ fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
         savings.push((memory.total().saturating_sub(total), what));
     }
     savings.sort_by(|a, b| b.cmp(a));
-    let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB);
+    let shown = savings.iter().filter(|(bytes, _)| *bytes as f64 >= MIB_BYTES);
     let savings: Vec<String> =
-        shown.map(|(bytes, what)| format!("{what} saves {:.0} MiB", *bytes as f64 / MIB)).collect();
+        shown.map(|(bytes, what)| format!("{what} saves {:.0} MiB", *bytes as f64 / MIB_BYTES)).collect();
     Ok(text + &format!("savings: {}\n", savings.join(", ")))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::{colour, share};
-use crate::cli::support::{ChooseArgs, Context, EditArgs, Edited};
+use crate::cli::support::{ChooseArgs, Context, EditArgs, EditResult};
 use crate::edit::change::recolour;
 use clap::Args;
 use serde_json::json;
@@ -28,6 +28,6 @@ pub(crate) fn run(args: &RecolourArgs, context: &Context) -> Result<()> {
     let labels = args.choice.labels(&args.edit.model, &model, &known, context)?;
     let painted = recolour(&model, &labels, args.colour, args.mix);
     let count: u64 = labels.iter().filter_map(|label| known.gaussians.get(label)).sum();
-    let edited = Edited::new(&painted, known.table, model.len(), labels);
+    let edited = EditResult::new(&painted, known.table, model.len(), labels);
     args.edit.finish(context, &edited, json!({ "recoloured": count }))
 }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::{Renumbering, renumbering};
-use crate::cli::support::{Context, EditArgs, Edited, or_list};
+use crate::cli::support::{Context, EditArgs, EditResult, or_list};
 use crate::edit::change::relabel;
 use crate::edit::rename::renumber;
 use clap::Args;
@@ -25,6 +25,6 @@ pub(crate) fn run(args: &RelabelArgs, context: &Context) -> Result<()> {
     let map = &args.map.0;
     or_list(known.check("--map", &map.keys().copied().collect()), &args.edit.model)?;
     let (changed, table) = (relabel(&model, map), known.table.as_ref().map(|table| renumber(table, map)));
-    let edited = Edited::new(&changed, table, model.len(), map.values().copied().collect());
+    let edited = EditResult::new(&changed, table, model.len(), map.values().copied().collect());
     args.edit.finish(context, &edited, json!({ "map": map }))
 }

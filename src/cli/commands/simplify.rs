@@ -1,7 +1,9 @@
 //! `labelgs simplify`.
 
 use crate::cli::support::parsers::{loss, near};
-use crate::cli::support::{Context, EditArgs, Edited, Progress, SceneArgs, near_plane, open_gpu, open_scene, stdout};
+use crate::cli::support::{
+    Context, EditArgs, EditResult, Progress, SceneArgs, near_plane, open_gpu, open_scene, stdout,
+};
 use crate::edit::select::MIN_LABEL_CONFIDENCE;
 use crate::edit::simplify::Simplifier;
 use crate::engine::{Engine, EngineSize};
@@ -18,9 +20,9 @@ use serde_json::json;
 use std::path::PathBuf;
 
 /// Shares of the Gaussians that the table has, in percent.
-const SHARES: [usize; 7] = [100, 75, 50, 35, 25, 15, 10];
+const TABLE_PERCENTAGES: [usize; 7] = [100, 75, 50, 35, 25, 15, 10];
 /// Halvings of an interval between two shares: below a percent of the Gaussians.
-const HALVINGS: u32 = 5;
+const HALVINGS_MAX: u32 = 5;
 
 /// `labelgs simplify`.
 #[derive(Args, Clone, Debug)]
@@ -89,8 +91,8 @@ pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
 
     let mut simplifier = Simplifier::new(&model, &weights);
     let (mut rows, mut enough) = (Vec::new(), None);
-    let mut progress = Progress::new(SHARES.len() as u64, "sizes", &context.global);
-    for (done, share) in (1..).zip(SHARES) {
+    let mut progress = Progress::new(TABLE_PERCENTAGES.len() as u64, "sizes", &context.global);
+    for (done, share) in (1..).zip(TABLE_PERCENTAGES) {
         simplifier.reduce_to((model.len() * share).div_ceil(100))?;
         let row = scorer.score(&simplifier.model())?;
         rows.push(row);
@@ -110,7 +112,7 @@ pub(crate) fn run(args: &SimplifyArgs, context: &Context) -> Result<()> {
         stdout::print(&table(&rows, &chosen))?;
     }
     let small = simplifier.model();
-    let edited = Edited::with_labels_of(&small, known, model.len());
+    let edited = EditResult::with_labels_of(&small, known, model.len());
     args.edit.finish(context, &edited, json!({ "table": rows, "chosen": chosen }))
 }
 
@@ -138,7 +140,7 @@ fn fewest<'a>(
     scorer: &mut Scorer,
 ) -> Result<(Simplifier<'a>, Row)> {
     let mut below = rows.iter().map(|row| row.gaussians).find(|&count| count < enough.count()).unwrap_or(1);
-    for _ in 0..HALVINGS {
+    for _ in 0..HALVINGS_MAX {
         let middle = below.midpoint(enough.count());
         let mut next = enough.clone();
         next.reduce_to(middle)?;

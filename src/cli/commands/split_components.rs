@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::cli::commands::extract_remove::GroupingArgs;
 use crate::cli::support::parsers::{Picks, picks};
-use crate::cli::support::{Context, EditArgs, Edited};
+use crate::cli::support::{Context, EditArgs, EditResult};
 use crate::edit::change::{SmallParts, split_components};
 use crate::edit::rename::split;
 use crate::words::counted;
@@ -19,7 +19,7 @@ pub struct SplitArgs {
     #[arg(long, value_name = "LABELS", value_parser = picks)]
     pub labels: Picks,
     /// What to do with fragments smaller than --min-share.
-    #[arg(long, value_name = "WHAT", value_enum, default_value = "keep")]
+    #[arg(long, alias = "fragments", value_name = "WHAT", value_enum, default_value = "keep")]
     pub specks: SmallParts,
     /// What is connected.
     #[command(flatten)]
@@ -36,6 +36,6 @@ pub(crate) fn run(args: &SplitArgs, context: &Context) -> Result<()> {
         tracing::info!("{}: {}: {ids:?}", known.title(label), counted(ids.len(), "part"));
     }
     let table = known.table.as_ref().map(|table| split(table, &found.ids));
-    let edited = Edited::new(&found.model, table, model.len(), found.ids.values().flatten().copied().collect());
+    let edited = EditResult::new(&found.model, table, model.len(), found.ids.values().flatten().copied().collect());
     args.edit.finish(context, &edited, json!({ "parts": found.ids, "specks": found.specks }))
 }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::{direction, factor, place};
-use crate::cli::support::{Context, EditArgs, Edited};
+use crate::cli::support::{Context, EditArgs, EditResult};
 use crate::edit::Transform;
 use clap::Args;
 use glam::{DQuat, DVec3};
@@ -34,6 +34,6 @@ pub(crate) fn run(args: &TransformArgs, context: &Context) -> Result<()> {
     let moved = change.apply(&model)?;
     let turn = [turn.w, turn.x, turn.y, turn.z];
     let more = json!({ "origin": change.origin.to_array(), "turn_wxyz": turn, "scale": change.scale });
-    let edited = Edited { moved: Some(change), ..Edited::with_labels_of(&moved, known, model.len()) };
+    let edited = EditResult { moved: Some(change), ..EditResult::with_labels_of(&moved, known, model.len()) };
     args.edit.finish(context, &edited, more)
 }

@@ -10,7 +10,7 @@ use crate::render::{Parts, RenderOptions};
 use crate::run::models::first_view;
 use crate::scene::Dataset;
 use crate::scenes::camera_json::views_of_model;
-use crate::viewer::{Finished, Token, Viewer, ViewerOptions, Words, show};
+use crate::viewer::{FinishedModel, ProgramCommands, Token, Viewer, ViewerOptions, show};
 use crate::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Variable with the token to ask for instead of a new one.
-const TOKEN: &str = "LABELGS_VIEW_TOKEN";
+const TOKEN_VARIABLE: &str = "LABELGS_VIEW_TOKEN";
 
 /// `labelgs view`.
 #[derive(Args, Clone, Debug)]
@@ -84,7 +84,7 @@ pub struct WatchArgs {
 impl ServerArgs {
     /// Starts the server, and the browser if that was asked for.
     pub(crate) fn start(&self, share: f32) -> Result<Viewer> {
-        let given = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
+        let given = std::env::var(TOKEN_VARIABLE).ok().filter(|token| !token.is_empty());
         let token = match given {
             _ if self.view_no_token => Token::Off,
             Some(token) => Token::Given(token),
@@ -137,7 +137,7 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
     let words = TypedOptions { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
     let (path, table, dataset) = (&args.model, known.table, &dataset);
     let first_view = first_view(path)?;
-    let finished = Finished { path, model, table, dataset, options, words: &words, photos, first_view };
+    let finished = FinishedModel { path, model, table, dataset, options, words: &words, photos, first_view };
     signals::note_only();
     let saved = show(&viewer, finished, gpu, &|| !signals::is_noted())?;
     if let Some(saved) = saved {
@@ -162,14 +162,14 @@ fn open_browser(address: &str) {
     }
 }
 
-/// The commands as a user would type them.
+/// Commands as a user would type them.
 pub(crate) struct TypedOptions {
     pub(crate) scene: Option<PathBuf>,
     pub(crate) masks: Option<PathBuf>,
     pub(crate) network: Option<PathBuf>,
 }
 
-impl Words for TypedOptions {
+impl ProgramCommands for TypedOptions {
     fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
         let scene = self.scene.as_ref().map_or(String::new(), |scene| format!(" --scene {}", path(scene)));
         format!("labelgs edit {} --replay {}{scene} -o {}", path(model), path(edits), path(output))

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::cli::support::signals;
 
 /// Status of a bug in the program.
-pub(crate) const BUG: i32 = 70;
+pub(crate) const BUG_STATUS: i32 = 70;
 
 /// Returns the exit status of a process that ends with `error`.
 pub fn exit_status(error: &Error) -> i32 {
@@ -21,7 +21,7 @@ pub fn exit_status(error: &Error) -> i32 {
         Error::Vulkan { .. } if error.is_without_device() => 4,
         Error::Vulkan { .. } if error.is_out_of_memory() => 5,
         Error::Vulkan { .. } if error.is_device_lost() => 6,
-        Error::Vulkan { .. } | Error::Bug(_) => BUG,
+        Error::Vulkan { .. } | Error::Bug(_) => BUG_STATUS,
     }
 }
 

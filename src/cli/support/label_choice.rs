@@ -4,7 +4,7 @@ use crate::cli::support::args::{ReadArgs, SceneArgs};
 use crate::cli::support::context::Context;
 use crate::cli::support::model_drawer::Drawer;
 use crate::cli::support::model_edit::{or_list, require_labels};
-use crate::cli::support::parsers::{At, BoxAt, Picks, at, box_at, near, picks};
+use crate::cli::support::parsers::{Picks, ViewBox, ViewPixel, near, picks, view_box, view_pixel};
 use crate::cli::support::scene::{find_view, near_plane, open_gpu, open_scene};
 use crate::edit::catalogue::{Catalogue, Pick};
 use crate::edit::prompt::{Prompt, PromptArea, choose};
@@ -26,14 +26,14 @@ pub struct PromptArgs {
     pub names: Vec<String>,
     /// Select the label at pixel x,y of a view; 0,0 is the top left pixel of the photo, after --max-resolution.
     /// Repeatable.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
-    pub at: Vec<At>,
+    #[arg(long, value_name = "VIEW:x,y", value_parser = view_pixel, requires = "scene")]
+    pub at: Vec<ViewPixel>,
     /// Exclude the label at this pixel. Repeatable.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "scene")]
-    pub not_at: Vec<At>,
+    #[arg(long, value_name = "VIEW:x,y", value_parser = view_pixel, requires = "scene")]
+    pub not_at: Vec<ViewPixel>,
     /// Select labels with more than half of their pixels inside a box: x0 <= x < x1 and y0 <= y < y1. Repeatable.
-    #[arg(long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at, requires = "scene")]
-    pub boxes: Vec<BoxAt>,
+    #[arg(long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = view_box, requires = "scene")]
+    pub boxes: Vec<ViewBox>,
     /// Select labels with more than half of their pixels inside a mask of the view --view. Pixels above 0 are inside.
     #[arg(long, value_name = "FILE", requires = "view", requires = "scene")]
     pub mask: Option<PathBuf>,
@@ -68,7 +68,7 @@ pub struct ChooseArgs {
 }
 
 /// A model and the scene of its views.
-pub(crate) struct Asked<'a> {
+pub(crate) struct LabelQuery<'a> {
     /// Path of the model.
     pub path: &'a Path,
     /// The model.
@@ -93,7 +93,7 @@ impl ChooseArgs {
         to: &Context,
     ) -> Result<BTreeSet<u32>> {
         let (scene, model, memory) = (self.scene.as_deref(), model.into(), SchedulerOptions::default());
-        let asked = Asked { path, model, known, scene, reading: self.read_as_typed(), memory };
+        let asked = LabelQuery { path, model, known, scene, reading: self.read_as_typed(), memory };
         self.prompts.labels("--labels", self.labels.as_ref(), &asked, to)
     }
 
@@ -122,7 +122,7 @@ impl PromptArgs {
         &self,
         argument: &str,
         listed: Option<&Picks>,
-        asked: &Asked,
+        asked: &LabelQuery,
         context: &Context,
     ) -> Result<BTreeSet<u32>> {
         let names: Vec<Pick> = self.names.iter().map(|name| Pick::Name(name.clone())).collect();
@@ -146,12 +146,12 @@ impl PromptArgs {
 
     fn prompts(&self) -> Result<Vec<Prompt>> {
         let point = |argument, away| {
-            move |at: &At| {
+            move |at: &ViewPixel| {
                 let [x, y] = at.pixel;
                 Prompt { argument, view: at.view.clone(), size: None, place: PromptArea::Point(x, y), away }
             }
         };
-        let area = |boxed: &BoxAt| Prompt {
+        let area = |boxed: &ViewBox| Prompt {
             argument: "--box",
             view: boxed.view.clone(),
             size: None,
@@ -170,7 +170,7 @@ impl PromptArgs {
     }
 
     /// Renders the label map of each view and size among the prompts, each once.
-    fn label_maps(&self, prompts: &[Prompt], asked: &Asked, context: &Context) -> Result<BTreeMap<Key, LabelMap>> {
+    fn label_maps(&self, prompts: &[Prompt], asked: &LabelQuery, context: &Context) -> Result<BTreeMap<Key, LabelMap>> {
         let Some(scene) = asked.scene else {
             return Err(Error::usage(
                 prompts[0].argument,

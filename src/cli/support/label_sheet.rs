@@ -12,7 +12,7 @@ use crate::engine::Engine;
 use crate::files::atomic;
 use crate::files::image::write_png_rgb8;
 use crate::render::portrait::portrait;
-use crate::report::sheet::{SIDE, Tile, page, picture};
+use crate::report::sheet::{TILE_SIDE, Tile, page, picture};
 use crate::run::models::first_view;
 use crate::scene::overview::likely_up;
 use crate::scene::{Camera, Overview, UNLABELLED};
@@ -47,17 +47,17 @@ impl SheetArgs {
         let up = Overview::from_cameras(cameras.iter().copied()).map_or_else(of_file, |all| Ok(Some(all.up)))?;
         let up = up.unwrap_or_else(|| likely_up((0..model.len()).map(|row| model.world(row))));
         let near = near_plane(path, None)?;
-        let mut engine = Engine::for_model(open_gpu(to)?, &model, std::iter::once((SIDE, SIDE)))?;
+        let mut engine = Engine::for_model(open_gpu(to)?, &model, std::iter::once((TILE_SIDE, TILE_SIDE)))?;
         let stage = Stage::new("drawing labels", labels.len());
         let mut tile = |row: &&LabelSummary| -> Result<Tile> {
-            let pixels = portrait(&mut engine, (&model, row.label), (&cameras, up), (SIDE, near))?;
+            let pixels = portrait(&mut engine, (&model, row.label), (&cameras, up), (TILE_SIDE, near))?;
             stage.count();
             let size = [0, 1, 2].map(|axis| row.max[axis] - row.min[axis]);
             let name = known.name(row.label).map(str::to_owned);
             Ok(Tile { id: row.label, name, gaussians: row.count, size, pixels })
         };
         let tiles: Vec<Tile> = labels.iter().map(&mut tile).collect::<Result<_>>()?;
-        if sheet.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
+        if sheet.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
             let ((width, height), pixels) = picture(&tiles);
             return write_png_rgb8(sheet, width, height, &pixels);
         }

@@ -16,7 +16,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{EnvFilter, Layer};
 
 /// All progress bars of the process.
-static BARS: LazyLock<MultiProgress> =
+static PROGRESS_BARS: LazyLock<MultiProgress> =
     LazyLock::new(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10)));
 
 /// Time before the first plain progress line, and between two.
@@ -24,12 +24,12 @@ pub(crate) const PLAIN_AFTER: Duration = Duration::from_secs(2);
 pub(crate) const PLAIN_EVERY: Duration = Duration::from_secs(10);
 
 /// Standard error. The bars are hidden during a write.
-struct AboveBars;
+struct BarAwareStderr;
 
-impl Write for AboveBars {
+impl Write for BarAwareStderr {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         // A closed standard error must not end the work, and the logger would panic on an error.
-        let _ = BARS.suspend(|| std::io::stderr().write_all(bytes));
+        let _ = PROGRESS_BARS.suspend(|| std::io::stderr().write_all(bytes));
         Ok(bytes.len())
     }
 
@@ -38,21 +38,21 @@ impl Write for AboveBars {
     }
 }
 
-/// Most warnings that are kept.
+/// Maximum number of warnings kept.
 const WARNINGS_MAX: usize = 2000;
 
 /// The warnings of this process, for reports.
-static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+static KEPT_WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Returns the text of all warnings so far.
 pub(crate) fn warnings() -> Vec<String> {
-    WARNINGS.lock().map(|kept| kept.clone()).unwrap_or_default()
+    KEPT_WARNINGS.lock().map(|kept| kept.clone()).unwrap_or_default()
 }
 
-/// Keeps warnings.
-struct Keep;
+/// Collects warnings.
+struct WarningKeeper;
 
-impl<S: tracing::Subscriber> Layer<S> for Keep {
+impl<S: tracing::Subscriber> Layer<S> for WarningKeeper {
     fn on_event(&self, event: &tracing::Event<'_>, _: Context<'_, S>) {
         struct Message(String);
         impl Visit for Message {
@@ -64,7 +64,7 @@ impl<S: tracing::Subscriber> Layer<S> for Keep {
         }
         let mut message = Message(String::new());
         event.record(&mut message);
-        if let Ok(mut kept) = WARNINGS.lock()
+        if let Ok(mut kept) = KEPT_WARNINGS.lock()
             && kept.len() < WARNINGS_MAX
         {
             kept.push(message.0);
@@ -82,11 +82,11 @@ pub(crate) fn start(args: &GlobalArgs) {
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    let shown = tracing_subscriber::fmt::layer().with_writer(|| AboveBars).with_ansi(colour).with_target(false);
+    let shown = tracing_subscriber::fmt::layer().with_writer(|| BarAwareStderr).with_ansi(colour).with_target(false);
     let own = Targets::new().with_target("labelgs", Level::WARN);
     let started = tracing_subscriber::registry()
         .with(shown.without_time().with_filter(filter))
-        .with(Keep.with_filter(own))
+        .with(WarningKeeper.with_filter(own))
         .with((!args.quiet).then(|| Stages.with_filter(Targets::new().with_target(STAGE_TARGET, Level::INFO))))
         .try_init();
     // A second start in one process, as in tests, keeps the first logger.
@@ -97,7 +97,7 @@ pub(crate) fn start(args: &GlobalArgs) {
 
 /// Prints the error that ends the process, even with `--quiet`.
 pub(crate) fn final_error(error: &Error) {
-    BARS.suspend(|| {
+    PROGRESS_BARS.suspend(|| {
         // A closed standard error cannot be reported.
         let _ = writeln!(std::io::stderr(), "error: {error}");
     });
@@ -108,10 +108,10 @@ pub(crate) fn bar(total: u64) -> ProgressBar {
     // Short, so that a line with bar and message fits 80 columns.
     let template = if total == 0 { "{spinner} {msg}" } else { "{bar:6} {msg}" };
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    BARS.add(ProgressBar::new(total).with_style(style))
+    PROGRESS_BARS.add(ProgressBar::new(total).with_style(style))
 }
 
-/// Returns how far long work is, for bars and lines alike. `rate` is that of a second.
+/// Returns the progress of long work as text, for bars and lines. `rate` is in items per second.
 pub(crate) fn told((done, total): (u64, u64), what: &str, rate: f64, more: &str) -> String {
     let mut text = format!("{done}/{total} {what}");
     if rate > 0.0 {
@@ -149,7 +149,7 @@ impl Progress {
 
     /// Shows that `done` items are done. `message` adds details, such as the loss; it is only called when shown.
     pub(crate) fn set(&mut self, done: u64, message: impl FnOnce() -> String) {
-        // A resumed run has the time of its own steps only.
+        // In a resumed run, only the steps of this process count.
         let first = *self.first.get_or_insert(done.saturating_sub(1));
         let wait = if self.bar.is_some() { Duration::from_millis(100) } else { self.wait };
         if let Some(bar) = &self.bar {
@@ -172,7 +172,7 @@ impl Drop for Progress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
-            BARS.remove(bar);
+            PROGRESS_BARS.remove(bar);
         }
     }
 }

@@ -36,7 +36,7 @@ pub(crate) fn largest(sizes: impl Iterator<Item = (u32, u32)>) -> (u32, u32) {
 pub(crate) enum Drawer<'a> {
     /// It is on the device.
     Whole(Box<Engine>, Option<u32>),
-    /// Parts of it come to the device.
+    /// Parts of the model are loaded for each image.
     Parts(Box<Painter<'a>>),
 }
 

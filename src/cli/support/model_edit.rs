@@ -68,8 +68,8 @@ impl EditArgs {
     }
 
     /// Writes model and table of an edit and prints a summary. `more` holds further fields of the JSON.
-    pub(crate) fn finish(&self, context: &Context, edited: &Edited, more: Value) -> Result<()> {
-        let Edited { model, table, of, added, labels, note, alone, moved } = edited;
+    pub(crate) fn finish(&self, context: &Context, edited: &EditResult, more: Value) -> Result<()> {
+        let EditResult { model, table, of, added, labels, note, alone, moved } = edited;
         let mut options = match alone {
             true => self.write.options_of_part(&self.model, &self.output, model)?,
             false => self.write.options(&self.model, &self.output)?,
@@ -102,14 +102,14 @@ impl EditArgs {
 }
 
 /// The result of an edit.
-pub(crate) struct Edited<'a> {
+pub(crate) struct EditResult<'a> {
     /// The model.
     pub model: &'a Gaussians,
     /// The names of its labels, if the source has names.
     pub table: Option<LabelTable>,
     /// Number of Gaussians of the source.
     pub of: usize,
-    /// Number of Gaussians that the source has not.
+    /// Number of Gaussians that the edit added.
     pub added: u64,
     /// Labels that were chosen or made.
     pub labels: BTreeSet<u32>,
@@ -121,7 +121,7 @@ pub(crate) struct Edited<'a> {
     pub moved: Option<Transform>,
 }
 
-impl<'a> Edited<'a> {
+impl<'a> EditResult<'a> {
     /// The result of an edit that adds no Gaussians to the `of` before.
     pub(crate) fn new(model: &'a Gaussians, table: Option<LabelTable>, of: usize, labels: BTreeSet<u32>) -> Self {
         Self { model, table, of, added: 0, labels, note: String::new(), alone: false, moved: None }
@@ -200,7 +200,7 @@ pub(crate) fn open(model: &Path, table: &TableArg) -> Result<(Gaussians, Catalog
 }
 
 /// A model that may stay in its file, with its labels.
-pub(crate) struct Seen {
+pub(crate) struct LabelledModel {
     /// The model.
     pub model: LazyModel,
     /// The Gaussians of each label.
@@ -210,7 +210,7 @@ pub(crate) struct Seen {
 }
 
 /// Looks through a model for its labels.
-pub(crate) fn look(path: &Path, table: &TableArg) -> Result<Seen> {
+pub(crate) fn look(path: &Path, table: &TableArg) -> Result<LabelledModel> {
     let model = models::open_lazily(path)?;
     let (view, mut tally) = (model.view(), Tally::default());
     models::scan(path, view, |_, row| {
@@ -218,5 +218,5 @@ pub(crate) fn look(path: &Path, table: &TableArg) -> Result<Seen> {
         tally.add(row.label.unwrap_or(UNLABELLED), place, opacity_of(row.opacity));
     })?;
     let known = Catalogue { gaussians: tally.counts(), table: table.open(path, model.names().cloned())? };
-    Ok(Seen { model, tally, known })
+    Ok(LabelledModel { model, tally, known })
 }

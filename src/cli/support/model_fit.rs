@@ -1,4 +1,4 @@
-//! Notices a model that is not of the scene it is used with, or in another frame.
+//! Detects a model that belongs to another scene, or that is in another coordinate frame.
 
 use crate::Result;
 use crate::cli::support::args::SceneArgs;
@@ -14,16 +14,16 @@ use std::sync::Arc;
 const OPACITY_MIN: f64 = 0.3;
 /// Factor of the first coefficient of colour (3DGS).
 const SH_0: f32 = 0.282_094_8;
-/// Fewest such Gaussians that can judge a model.
+/// Minimum number of such Gaussians for a verdict.
 const GAUSSIANS_MIN: usize = 200;
 /// Correlation of the colours of Gaussians and photos below which they do not belong together. Models of their scene have
 /// 0.7 to 0.9, others -0.1 to 0.1.
-const COLOUR_WRONG: f64 = 0.25;
+const COLOUR_CORRELATION_MIN: f64 = 0.25;
 /// Share of the Gaussians in a photo below which they do not, if there is nothing to compare colours with.
-const SHARE_WRONG: f64 = 0.01;
+const SHARE_IN_PHOTO_MIN: f64 = 0.01;
 /// Photos that are read for a command that needs none, and their longest side, px.
-const PHOTOS: usize = 4;
-const SIDE: u32 = 256;
+const SAMPLED_PHOTOS_MAX: usize = 4;
+const SAMPLED_SIDE_MAX: u32 = 256;
 
 /// Warns if a model and the photos of a scene do not belong together.
 pub(crate) fn warn_of_misfit(path: &Path, model: &Gaussians, dataset: &Dataset) -> Result<()> {
@@ -56,11 +56,11 @@ pub(crate) fn warn_of_misfit_with(
     dataset: &Dataset,
 ) -> Result<()> {
     let views = dataset.all();
-    let some = views.iter().step_by(views.len().div_ceil(PHOTOS).max(1)).map(|view| view.name.clone());
+    let some = views.iter().step_by(views.len().div_ceil(SAMPLED_PHOTOS_MAX).max(1)).map(|view| view.name.clone());
     let only: BTreeSet<String> = some.collect();
     let options = LoadOptions {
         only: Some(Arc::new(only)),
-        max_resolution: Some(SIDE),
+        max_resolution: Some(SAMPLED_SIDE_MAX),
         photo_folder: None,
         ..reading.read.options(LoadOptions::default())
     };
@@ -71,17 +71,17 @@ pub(crate) fn warn_of_misfit_with(
     }
 }
 
-/// Says why a model is not that of the photos.
+/// Returns why a model does not match the photos.
 fn misfit(found: &Agreement) -> Option<String> {
     match found.colour {
-        Some(colour) if colour < COLOUR_WRONG => {
+        Some(colour) if colour < COLOUR_CORRELATION_MIN => {
             let share = 100.0 * found.in_picture;
             Some(format!(
                 "a photo shows {share:.0} % of the Gaussians on average, and their colours do not match (correlation \
                  {colour:.2}, usually 0.7 to 0.9)"
             ))
         }
-        None if found.in_picture < SHARE_WRONG => {
+        None if found.in_picture < SHARE_IN_PHOTO_MIN => {
             Some(format!("a photo shows only {:.1} % of the Gaussians on average", 100.0 * found.in_picture))
         }
         _ => None,

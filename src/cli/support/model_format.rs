@@ -39,7 +39,7 @@ impl WriteArgs {
     /// shows it best.
     pub(crate) fn options_of_part(self, model: &Path, output: &Path, part: &Gaussians) -> Result<WriteOptions> {
         let mut options = self.options(model, output)?;
-        // Damaged cameras have been told.
+        // `options` has reported damaged cameras.
         let views = views_of_model(model).unwrap_or_default();
         let cameras: Vec<&Camera> = views.iter().map(|view| &view.camera).collect();
         if let (Some(view), Some(best)) = (&mut options.first_view, best_camera(part, &cameras)) {

@@ -1,4 +1,4 @@
-//! Masks that a command was given: id pictures, or nested masks, of which all views together choose objects.
+//! Masks of a command: id images, or nested masks among which all views together choose objects.
 
 use crate::cli::support::SceneArgs;
 use crate::engine::Engine;
@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Folder of nested masks, and of the id pictures beside it whose outlines held-out views keep, in a folder of `masks make`.
-pub(crate) const NESTED: &str = "nested";
-pub(crate) const OBJECTS: &str = "objects";
+pub(crate) const NESTED_FOLDER: &str = "nested";
+pub(crate) const OBJECTS_FOLDER: &str = "objects";
 
 /// Where masks are.
 #[derive(Clone, Debug)]
@@ -30,9 +30,9 @@ pub(crate) struct MaskFolders {
 }
 
 impl MaskFolders {
-    /// Looks at the folder of a flag: that of `masks make`, one of Segment Anything's lists, or one of id pictures.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
-        let (lists, objects) = (folder.join(NESTED), folder.join(OBJECTS));
+    /// Detects the kind of a folder: the output of `masks make`, Segment Anything's mask lists, or id images.
+    pub(crate) fn from_folder(folder: &Path) -> Result<Self> {
+        let (lists, objects) = (folder.join(NESTED_FOLDER), folder.join(OBJECTS_FOLDER));
         if lists.is_dir() {
             return Ok(Self { pictures: objects.is_dir().then_some(objects), lists: Some(lists) });
         }

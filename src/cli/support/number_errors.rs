@@ -1,11 +1,11 @@
-//! What the parser of arguments says of a number that is none: the standard library's words are for programmers.
+//! Messages about invalid numbers, because the standard library's messages are for programmers.
 
 use clap::Error;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::error::Error as _;
 use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 
-/// Returns the error in words for those who typed the number; other errors stay.
+/// Replaces the message of an error about an invalid number; other errors stay.
 pub(crate) fn in_words(error: Error) -> Error {
     let Some(problem) = number(&error) else { return error };
     let text = |kind| match error.get(kind) {
@@ -17,7 +17,7 @@ pub(crate) fn in_words(error: Error) -> Error {
     Error::raw(ErrorKind::ValueValidation, message)
 }
 
-/// Returns what is wrong with a number that is none; nothing for other errors.
+/// Returns what is wrong with an invalid number, or `None` for other errors.
 pub(crate) fn number(error: &Error) -> Option<&'static str> {
     let source = error.source()?;
     match source.downcast_ref::<ParseIntError>().map(ParseIntError::kind) {

@@ -19,7 +19,7 @@ pub struct Picks(pub Vec<Pick>);
 
 /// A pixel of a view: column and row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct At {
+pub struct ViewPixel {
     /// Name of the view.
     pub view: String,
     /// Column and row.
@@ -28,7 +28,7 @@ pub struct At {
 
 /// A box in a view: first column and row, and one past the last.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BoxAt {
+pub struct ViewBox {
     /// Name of the view.
     pub view: String,
     /// x0, y0, x1, y1.
@@ -65,16 +65,16 @@ pub(crate) fn page_file() -> impl TypedValueParser<Value = PathBuf> {
 /// Parses the path of a sheet of labels to write.
 pub(crate) fn sheet_file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path.extension() {
-        Some(ending) if ending.eq_ignore_ascii_case("html") || ending.eq_ignore_ascii_case("png") => Ok(path),
+        Some(extension) if extension.eq_ignore_ascii_case("html") || extension.eq_ignore_ascii_case("png") => Ok(path),
         _ => Err("expected the extension .html (a page with names and numbers) or .png (an image)"),
     })
 }
 
-/// Parses a path whose extension, if it has one, is that of what is written.
-fn file_of(ending: &'static str, what: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+/// Parses an output path. An extension must be the given one.
+fn file_of(extension: &'static str, what: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match path.extension() {
-        Some(other) if !other.eq_ignore_ascii_case(ending) => {
-            Err(format!("this file is {what}; expected the extension .{ending}"))
+        Some(other) if !other.eq_ignore_ascii_case(extension) => {
+            Err(format!("this file is {what}; expected the extension .{extension}"))
         }
         _ => Ok(path),
     })
@@ -122,19 +122,19 @@ pub(crate) fn renumbering(text: &str) -> Result<Renumbering, String> {
 }
 
 /// Parses a pixel of a view such as `004:120,80`.
-pub(crate) fn at(text: &str) -> Result<At, String> {
+pub(crate) fn view_pixel(text: &str) -> Result<ViewPixel, String> {
     let (view, pixel) = in_view(text, "VIEW:x,y in whole px, such as 004:120,80")?;
-    Ok(At { view, pixel })
+    Ok(ViewPixel { view, pixel })
 }
 
 /// Parses a box in a view such as `004:100,60,160,120`.
-pub(crate) fn box_at(text: &str) -> Result<BoxAt, String> {
+pub(crate) fn view_box(text: &str) -> Result<ViewBox, String> {
     let (view, corners) = in_view(text, "VIEW:x0,y0,x1,y1 in whole px, such as 004:100,60,160,120")?;
     let [x0, y0, x1, y1] = corners;
     if x0 >= x1 || y0 >= y1 {
         return Err(format!("`{text}` is empty; the second corner must be right of and below the first"));
     }
-    Ok(BoxAt { view, corners })
+    Ok(ViewBox { view, corners })
 }
 
 /// Parses the name of a view and the numbers after the last colon.

@@ -37,12 +37,12 @@ pub(crate) fn open_gpu(context: &Context) -> Result<Arc<Gpu>> {
 
 /// Opens the chosen device for long work, and says once which one it is.
 pub(crate) fn open_gpu_for_long(context: &Context) -> Result<Arc<Gpu>> {
-    static TOLD: Once = Once::new();
+    static ANNOUNCEMENT: Once = Once::new();
     let gpu = open_gpu(context)?;
     let name = &gpu.capabilities().name;
     // What follows in brackets are versions of the compiler inside of the driver.
     let short = name.split(" (").next().unwrap_or(name);
-    TOLD.call_once(|| match gpu.is_cpu() {
+    ANNOUNCEMENT.call_once(|| match gpu.is_cpu() {
         true => tracing::info!("Using the CPU ({short}). A GPU is much faster."),
         false => tracing::info!("Using the GPU {short}."),
     });

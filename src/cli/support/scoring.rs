@@ -42,7 +42,7 @@ pub struct ScoreArgs {
     pub json: JsonFileArg,
 }
 
-/// Counts pictures and adds them to the page.
+/// Counts images and adds them to the page.
 pub(crate) struct Watcher {
     progress: Progress,
     done: u64,

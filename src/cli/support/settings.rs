@@ -65,7 +65,8 @@ fn problem(error: &clap::Error, value: &str) -> String {
     }
 }
 
-/// Returns the values by key. Refuses a setting that was given twice, of which `is_typed` tells the flags.
+/// Returns the values by key. Refuses a setting that was given twice. `is_typed` returns true for a key typed as a
+/// flag.
 pub(crate) fn by_key(sets: &[Assignment], is_typed: impl Fn(&str) -> bool) -> Result<BTreeMap<String, String>> {
     let mut values = BTreeMap::new();
     for Assignment { key, value } in sets {
@@ -116,13 +117,13 @@ fn with_default(arg: Arg, default: Option<&String>) -> Arg {
 }
 
 /// Settings of training that a newcomer needs: the help shows them with the flags that have no heading.
-const FIRST: [&str; 3] = ["iterations", "max_resolution", "preset"];
+const PROMINENT_SETTINGS: [&str; 3] = ["iterations", "max_resolution", "preset"];
 
 /// Returns the command `train` with defaults in its help.
 pub(crate) fn in_help(train: clap::Command) -> clap::Command {
     let defaults = defaults();
     train.mut_args(|arg| {
-        let arg = if FIRST.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
+        let arg = if PROMINENT_SETTINGS.contains(&arg.get_id().as_str()) { arg.help_heading(None) } else { arg };
         if arg.get_id() == "preset" {
             let help = arg.get_long_help().map(ToString::to_string).unwrap_or_default();
             return arg.long_help(format!("{help} {}", paper()));

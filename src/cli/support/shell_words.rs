@@ -9,7 +9,7 @@ pub(crate) fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
-/// Returns the command line of this process. Where the program lies tells nothing, so that is left out.
+/// Returns the command line of this process, without the path of the program.
 pub(crate) fn typed() -> String {
     let words = std::env::args_os().skip(1).map(|word| quoted(&word.to_string_lossy()));
     std::iter::once("labelgs".to_owned()).chain(words).collect::<Vec<_>>().join(" ")

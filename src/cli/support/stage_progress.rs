@@ -18,20 +18,20 @@ use tracing_subscriber::layer::Context;
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// The stages of this moment, by the number of their span.
-static STAGES: Mutex<BTreeMap<u64, Running>> = Mutex::new(BTreeMap::new());
+static RUNNING_STAGES: Mutex<BTreeMap<u64, RunningStage>> = Mutex::new(BTreeMap::new());
 
 /// A stage that has not ended.
-struct Running {
+struct RunningStage {
     what: String,
     total: u64,
     done: u64,
     start: Instant,
-    /// When a line told of it.
+    /// Time of the last progress line.
     told: Option<Instant>,
     bar: Option<ProgressBar>,
 }
 
-impl Visit for Running {
+impl Visit for RunningStage {
     fn record_u64(&mut self, field: &Field, value: u64) {
         match field.name() {
             "total" => self.total = value,
@@ -47,7 +47,7 @@ impl Visit for Running {
     }
 }
 
-impl Running {
+impl RunningStage {
     /// Shows the stage if it is time for it; returns a line to print.
     fn shown(&mut self, is_terminal: bool) -> Option<String> {
         if self.start.elapsed() < PLAIN_AFTER || self.what.is_empty() {
@@ -82,8 +82,8 @@ impl Running {
 pub(crate) struct Stages;
 
 impl Stages {
-    fn with(id: &Id, of: impl FnOnce(&mut BTreeMap<u64, Running>, u64)) {
-        of(&mut STAGES.lock().unwrap_or_else(PoisonError::into_inner), id.into_u64());
+    fn update(id: &Id, change: impl FnOnce(&mut BTreeMap<u64, RunningStage>, u64)) {
+        change(&mut RUNNING_STAGES.lock().unwrap_or_else(PoisonError::into_inner), id.into_u64());
     }
 }
 
@@ -91,14 +91,14 @@ impl<S: tracing::Subscriber> Layer<S> for Stages {
     fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, _: Context<'_, S>) {
         if attributes.metadata().target() == STAGE_TARGET {
             let (what, start) = (String::new(), Instant::now());
-            let mut stage = Running { what, total: 0, done: 0, start, told: None, bar: None };
+            let mut stage = RunningStage { what, total: 0, done: 0, start, told: None, bar: None };
             attributes.record(&mut stage);
-            Self::with(id, |stages, id| drop(stages.insert(id, stage)));
+            Self::update(id, |stages, id| drop(stages.insert(id, stage)));
         }
     }
 
     fn on_record(&self, id: &Id, values: &Record<'_>, _: Context<'_, S>) {
-        Self::with(id, |stages, id| {
+        Self::update(id, |stages, id| {
             if let Some(stage) = stages.get_mut(&id) {
                 values.record(stage);
             }
@@ -106,7 +106,7 @@ impl<S: tracing::Subscriber> Layer<S> for Stages {
     }
 
     fn on_close(&self, id: Id, _: Context<'_, S>) {
-        Self::with(&id, |stages, id| {
+        Self::update(&id, |stages, id| {
             if let Some(bar) = stages.remove(&id).and_then(|stage| stage.bar) {
                 bar.finish_and_clear();
             }
@@ -119,25 +119,25 @@ pub(crate) fn watch() {
     let is_terminal = std::io::stderr().is_terminal();
     let look = move || loop {
         thread::sleep(LOOK_EVERY);
-        let mut stages = STAGES.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut stages = RUNNING_STAGES.lock().unwrap_or_else(PoisonError::into_inner);
         let lines: Vec<String> = stages.values_mut().filter_map(|stage| stage.shown(is_terminal)).collect();
         // The logger must not wait for itself.
         drop(stages);
         lines.iter().for_each(|line| tracing::info!("{line}"));
     };
-    // Without a thread there is no progress; the work goes on.
+    // Without a thread there is no progress, but the work continues.
     let _ = thread::Builder::new().name("stages".to_owned()).spawn(look);
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{PLAIN_EVERY, Running};
+    use super::{PLAIN_EVERY, RunningStage};
     use std::time::{Duration, Instant};
 
     #[test]
     fn a_line_comes_after_two_seconds_and_then_seldom() {
         let ago = |seconds: u64| Instant::now().checked_sub(Duration::from_secs(seconds)).expect("a clock that runs");
-        let stage = |seconds, total| Running {
+        let stage = |seconds, total| RunningStage {
             what: "reading photos".to_owned(),
             total,
             done: 3,

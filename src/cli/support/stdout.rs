@@ -3,12 +3,12 @@
 use crate::{Error, Result};
 use std::io::{ErrorKind, Write};
 
-const NAME: &str = "standard output";
+const STDOUT_NAME: &str = "standard output";
 
 /// Prints text as it is.
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Error::write(NAME))
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Error::write(STDOUT_NAME))
 }
 
 /// Prints a value as one line of JSON.
@@ -20,5 +20,5 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<()> {
 /// Returns true if the reader of standard output closed it, as `head` does.
 pub(crate) fn is_closed(error: &Error) -> bool {
     matches!(error, Error::Write { path, source }
-        if path.as_os_str() == NAME && source.kind() == ErrorKind::BrokenPipe)
+        if path.as_os_str() == STDOUT_NAME && source.kind() == ErrorKind::BrokenPipe)
 }

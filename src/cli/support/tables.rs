@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use std::io::IsTerminal;
 
 /// Columns between two columns of text.
-const GAP: usize = 2;
+const COLUMN_GAP: usize = 2;
 /// Fewest characters that are left of a shortened name.
 const NAME_MIN: usize = 8;
 
@@ -77,7 +77,7 @@ impl Table {
     /// Returns the table as lines of text. Names are shortened if lines were longer than `width` otherwise.
     pub(crate) fn text(&self, width: Option<usize>) -> String {
         let widths: Vec<usize> = self.columns.iter().map(|column| widest(column.short, &column.cells)).collect();
-        let others: usize = widths.iter().map(|width| width + GAP).sum();
+        let others: usize = widths.iter().map(|width| width + COLUMN_GAP).sum();
         let room = width.map_or(usize::MAX, |width| width.saturating_sub(others).max(NAME_MIN));
         let names: Vec<String> = self.names.iter().map(|name| shortened(name, room)).collect();
         let first = widest(self.first, &names);
@@ -170,19 +170,19 @@ impl Parts {
     }
 }
 
-/// Columns of a terminal that does not tell.
-const WIDTH: usize = 80;
+/// Columns of a terminal that does not report its width.
+const TERMINAL_WIDTH_DEFAULT: usize = 80;
 
-/// Returns the columns of the terminal on standard output; none if it is none.
+/// Returns the columns of the terminal on standard output, or `None` if it is not a terminal.
 pub(crate) fn screen_width() -> Option<usize> {
     if !std::io::stdout().is_terminal() {
         return None;
     }
-    Some(terminal_size::terminal_size().map_or(WIDTH, |(width, _)| usize::from(width.0)))
+    Some(terminal_size::terminal_size().map_or(TERMINAL_WIDTH_DEFAULT, |(width, _)| usize::from(width.0)))
 }
 
 fn padded(text: &str, width: usize, is_number: bool) -> String {
-    if is_number { format!("{:GAP$}{text:>width$}", "") } else { format!("{:GAP$}{text:width$}", "") }
+    if is_number { format!("{:COLUMN_GAP$}{text:>width$}", "") } else { format!("{:COLUMN_GAP$}{text:width$}", "") }
 }
 
 fn widest(title: &str, cells: &[String]) -> usize {
@@ -222,8 +222,8 @@ fn capital(text: &str) -> String {
 }
 
 /// Digits of decibels and of scores from 0 to 1, as on pages.
-pub(crate) const DB: usize = text::DECIBELS;
-pub(crate) const SHARE: usize = text::SCORE;
+pub(crate) const DECIBEL_DIGITS: usize = text::DECIBEL_DIGITS;
+pub(crate) const SCORE_DIGITS: usize = text::SCORE_DIGITS;
 
 #[cfg(test)]
 mod tests {

@@ -31,9 +31,9 @@ const MODEL_WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, chec
 
 /// The page's scripts, concatenated in this order.
 const PAGE_SCRIPTS: [&str; 8] = [
-    web::ALGEBRA,
-    web::CAMERA,
-    web::INPUT,
+    web::ALGEBRA_SCRIPT,
+    web::CAMERA_SCRIPT,
+    web::INPUT_SCRIPT,
     include_str!("decode.js"),
     include_str!("shaders.js"),
     include_str!("draw.js"),

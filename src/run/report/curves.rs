@@ -1,7 +1,7 @@
 //! Charts over the steps.
 
 use super::load::ReportedRun;
-use crate::report::text::{DECIBELS, SCORE};
+use crate::report::text::{DECIBEL_DIGITS, SCORE_DIGITS};
 use crate::report::{Chart, Digits, Mark, Scale, Series};
 use crate::run::history::{Entry, Steps, ViewScore};
 use maud::{Markup, html};
@@ -23,13 +23,13 @@ pub(super) fn curves(runs: &[ReportedRun]) -> Markup {
     let mut charts = losses(runs);
     charts.push(Chart {
         least_span: PSNR_AXIS_MIN_DB,
-        digits: Digits::Fixed(DECIBELS),
+        digits: Digits::Fixed(DECIBEL_DIGITS),
         ..chart("PSNR", "dB", views_of(runs, |scored| scored.psnr))
     });
     charts.push(Chart {
         least_span: IOU_AXIS_MIN,
         ceiling: Some(1.0),
-        digits: Digits::Fixed(SCORE),
+        digits: Digits::Fixed(SCORE_DIGITS),
         ..chart("Label IoU", "mean over objects", views_of(runs, |scored| scored.iou))
     });
     charts.push(Chart {

@@ -2,7 +2,7 @@
 
 use super::load::ReportedRun;
 use super::{columns, row, run_name};
-use crate::report::text::{DECIBELS, SCORE, bytes, count, duration, number, utc};
+use crate::report::text::{DECIBEL_DIGITS, SCORE_DIGITS, bytes, count, duration, number, utc};
 use crate::run::Settings;
 use maud::{Markup, html};
 use std::path::Path;
@@ -46,9 +46,9 @@ pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
 
 /// Returns the main numbers.
 pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
-    let score = |value: f64| number(Some(value), SCORE);
+    let score = |value: f64| number(Some(value), SCORE_DIGITS);
     let main = [
-        row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBELS) + " dB")),
+        row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBEL_DIGITS) + " dB")),
         row(runs, "SSIM", |run| run.test()?.ssim.map(score)),
         row(runs, "Label IoU", |run| run.test()?.iou_map.map(score)),
         row(runs, "Time", |run| run.seconds().map(duration)),
@@ -69,7 +69,7 @@ pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
 fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
     let objects = "Object IoU, visible parts";
     [
-        row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE))),
+        row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE_DIGITS))),
         row(runs, "Device memory", |run| run.info.memory.device_peak.map(bytes)),
         row(runs, "Host memory", |run| run.info.memory.host_peak.map(bytes)),
     ]

@@ -4,7 +4,7 @@ use super::load::ReportedRun;
 use super::run_name;
 use super::views::PictureBook;
 use crate::Result;
-use crate::report::text::{DECIBELS, SCORE, count, number};
+use crate::report::text::{DECIBEL_DIGITS, SCORE_DIGITS, count, number};
 use crate::run::{ObjectSummary, thumbnails};
 use crate::scene::labels::label_colour;
 use maud::{Markup, html};
@@ -62,10 +62,10 @@ fn single<'a>(objects: impl Iterator<Item = &'a ObjectSummary>, pictures: &Pictu
                             (title(object.id, object.name.as_deref(), pictures))
                             (cell("Label", Some(f64::from(object.id)), 0))
                             td.right data-title="Gaussians" data-value=(object.gaussians) { (count(object.gaussians)) }
-                            (cell("Confidence", object.confidence, SCORE))
-                            (cell("IoU", object.iou, SCORE))
-                            (cell("PSNR, dB", object.psnr, DECIBELS))
-                            (cell("Worst IoU", object.worst_iou, SCORE))
+                            (cell("Confidence", object.confidence, SCORE_DIGITS))
+                            (cell("IoU", object.iou, SCORE_DIGITS))
+                            (cell("PSNR, dB", object.psnr, DECIBEL_DIGITS))
+                            (cell("Worst IoU", object.worst_iou, SCORE_DIGITS))
                             td.right data-title="in view" { (worst) }
                         }
                     }
@@ -97,8 +97,8 @@ fn several(
                         tr {
                             (title(*id, name.as_deref(), pictures))
                             (cell("Label", Some(f64::from(*id)), 0))
-                            @for run in all { (cell("IoU", run.get(id).and_then(|object| object.iou), SCORE)) }
-                            @for run in all { (cell("PSNR, dB", run.get(id).and_then(|object| object.psnr), DECIBELS)) }
+                            @for run in all { (cell("IoU", run.get(id).and_then(|object| object.iou), SCORE_DIGITS)) }
+                            @for run in all { (cell("PSNR, dB", run.get(id).and_then(|object| object.psnr), DECIBEL_DIGITS)) }
                         }
                     }
                 }

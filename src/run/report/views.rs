@@ -3,7 +3,7 @@
 use super::load::ReportedRun;
 use crate::error::Result;
 use crate::files::read;
-use crate::report::text::{DECIBELS, SCORE, number};
+use crate::report::text::{DECIBEL_DIGITS, SCORE_DIGITS, number};
 use crate::report::{Figure, Panel};
 use crate::run::info::PicturedView;
 use crate::run::pictures::{HEAT_MAP_FILE, PICTURE_KINDS, path};
@@ -42,7 +42,11 @@ fn single(book: &mut PictureBook, run: &ReportedRun, view: &PicturedView) -> Res
     for (name, file) in PICTURE_KINDS {
         panels.extend(book.panel(run, view.number, file, name)?);
     }
-    let numbers = [("PSNR", view.psnr, DECIBELS, " dB"), ("SSIM", view.ssim, SCORE, ""), ("IoU", view.iou, SCORE, "")];
+    let numbers = [
+        ("PSNR", view.psnr, DECIBEL_DIGITS, " dB"),
+        ("SSIM", view.ssim, SCORE_DIGITS, ""),
+        ("IoU", view.iou, SCORE_DIGITS, ""),
+    ];
     let numbers = numbers.into_iter().filter(|(_, value, ..)| value.is_some());
     let numbers = numbers.map(|(name, value, digits, unit)| (name.to_owned(), number(value, digits) + unit)).collect();
     // Masks and errors are folded.
@@ -67,7 +71,7 @@ fn several(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Vec<Figure>> 
                 figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[0].1, PICTURE_KINDS[0].0)?);
             }
             figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[1].1, &run.name)?);
-            figure.numbers.push((run.name.clone(), number(view.psnr, DECIBELS) + " dB"));
+            figure.numbers.push((run.name.clone(), number(view.psnr, DECIBEL_DIGITS) + " dB"));
         }
         figures.push(figure);
     }

@@ -25,7 +25,7 @@ pub(super) struct Row {
 }
 
 /// Name, masks and flags of the known variants, in the order of the table.
-const KNOWN: [(&str, Masks, &[&str]); 8] = [
+const KNOWN_VARIANTS: [(&str, Masks, &[&str]); 8] = [
     ("no-labels", Masks::None, &[]),
     ("paper", Masks::Given, &["--preset", "paper"]),
     ("paper-no-dov", Masks::WithoutDov, &["--preset", "paper"]),
@@ -45,14 +45,14 @@ pub(super) fn rows(names: &[String], own: &[String], has_without_dov: bool) -> R
     };
     let mut rows: Vec<Row> = Vec::new();
     for name in names {
-        let Some(row) = KNOWN.iter().find(|row| row.0 == name) else {
-            let all: Vec<&str> = KNOWN.iter().map(|row| row.0).collect();
+        let Some(row) = KNOWN_VARIANTS.iter().find(|row| row.0 == name) else {
+            let all: Vec<&str> = KNOWN_VARIANTS.iter().map(|row| row.0).collect();
             return Err(Error::usage("--rows", format!("no variant is called {name}; known are {}", all.join(", "))));
         };
         rows.push(known(row));
     }
     if names.is_empty() && own.is_empty() {
-        rows.extend(KNOWN.iter().filter(|row| has_without_dov || row.1 != Masks::WithoutDov).map(known));
+        rows.extend(KNOWN_VARIANTS.iter().filter(|row| has_without_dov || row.1 != Masks::WithoutDov).map(known));
     }
     if !has_without_dov && let Some(row) = rows.iter().find(|row| row.masks == Masks::WithoutDov) {
         return Err(Error::usage("--rows", format!("{} needs --masks-without-dov DIR", row.name)));
@@ -87,7 +87,7 @@ mod tests {
         let names = |rows: &[Row]| rows.iter().map(|row| row.name.clone()).collect::<Vec<_>>();
         let all = rows(&[], &[], false).expect("rows");
         assert!(names(&all).contains(&"ours".to_owned()) && !names(&all).contains(&"paper-no-dov".to_owned()));
-        assert_eq!(rows(&[], &[], true).expect("rows").len(), KNOWN.len());
+        assert_eq!(rows(&[], &[], true).expect("rows").len(), KNOWN_VARIANTS.len());
         let own =
             rows(&["ours".into()], &["t03=--preset paper --set label_threshold=0.3".into()], false).expect("rows");
         assert_eq!(names(&own), ["ours", "t03"]);

@@ -5,7 +5,7 @@ use super::Outcome;
 /// A column: title, digits, value of a run.
 type Column = (&'static str, usize, fn(&Outcome) -> Option<f64>);
 
-const COLUMNS: [Column; 10] = [
+const OUTCOME_COLUMNS: [Column; 10] = [
     ("PSNR", 2, |run| run.scores.psnr),
     ("SSIM", 4, |run| run.scores.ssim),
     ("iou_map", 4, |run| run.scores.objects.iou_map),
@@ -23,10 +23,10 @@ pub(super) fn table(rows: &[(&str, &[Outcome])]) -> String {
     let several = rows.iter().any(|(_, runs)| runs.len() > 1);
     let width = if several { 17 } else { 12 };
     let mut text = format!("{:>24}", "variant");
-    COLUMNS.iter().for_each(|(title, ..)| text += &format!(" {title:>width$}"));
+    OUTCOME_COLUMNS.iter().for_each(|(title, ..)| text += &format!(" {title:>width$}"));
     for (name, runs) in rows {
         text += &format!("\n{name:>24}");
-        for (_, digits, value) in COLUMNS {
+        for (_, digits, value) in OUTCOME_COLUMNS {
             let values: Vec<f64> = runs.iter().filter_map(value).collect();
             text += &format!(" {:>width$}", cell(&values, digits));
         }

@@ -1,17 +1,17 @@
 //! Scores of a benchmark as tables.
 
-use crate::cli::support::tables::{Column, DB, Part, Parts, SHARE, Table, column, number};
+use crate::cli::support::tables::{Column, DECIBEL_DIGITS, Part, Parts, SCORE_DIGITS, Table, column, number};
 use crate::eval::protocol::report::{MissingPrediction, Report};
 use crate::eval::protocol::score::PairScores;
 
-const COLUMNS: [Column<PairScores>; 7] = [
-    column("IoU", "IoU", SHARE, |row| row.iou),
-    column("by colour", "IoU by colour", SHARE, |row| row.iou_colour),
-    column("bIoU", "Boundary IoU", SHARE, |row| row.boundary_iou),
-    column("accuracy", "Accuracy", SHARE, |row| row.accuracy),
-    column("PSNR", "PSNR, dB", DB, |row| row.psnr),
-    column("SSIM", "SSIM", SHARE, |row| row.ssim),
-    column("LPIPS", "LPIPS", SHARE, |row| row.lpips),
+const SCORE_COLUMNS: [Column<PairScores>; 7] = [
+    column("IoU", "IoU", SCORE_DIGITS, |row| row.iou),
+    column("by colour", "IoU by colour", SCORE_DIGITS, |row| row.iou_colour),
+    column("bIoU", "Boundary IoU", SCORE_DIGITS, |row| row.boundary_iou),
+    column("accuracy", "Accuracy", SCORE_DIGITS, |row| row.accuracy),
+    column("PSNR", "PSNR, dB", DECIBEL_DIGITS, |row| row.psnr),
+    column("SSIM", "SSIM", SCORE_DIGITS, |row| row.ssim),
+    column("LPIPS", "LPIPS", SCORE_DIGITS, |row| row.lpips),
 ];
 
 /// Returns the table of objects with averages, then everything that is missing.
@@ -24,14 +24,14 @@ pub(super) fn tables(report: &Report) -> Parts {
     let objects = report.objects.iter().map(|(name, object)| (name.clone(), &object.mean));
     let means = [("mean of pairs", &report.mean.pairs), ("mean of objects", &report.mean.objects)];
     let means = means.map(|(name, scores)| (name.to_owned(), scores));
-    let table = Table::new("object", &COLUMNS, objects.chain(means)).with_text("labels", labels.collect());
+    let table = Table::new("object", &SCORE_COLUMNS, objects.chain(means)).with_text("labels", labels.collect());
     let mut parts = vec![Part::Title(format!("{}{compat}", report.protocol)), Part::Table(table)];
     let mut note = |text: String| parts.push(Part::Note(text));
     if report.lpips == "no weights" {
         note("LPIPS: no weights (see --lpips)".to_owned());
     }
     let head = &report.headline;
-    note(format!("headline: {} {} over {}", head.key, number(head.iou, SHARE), head.average));
+    note(format!("headline: {} {} over {}", head.key, number(head.iou, SCORE_DIGITS), head.average));
     note(format!("{} object-frame pairs", report.mean.pair_count));
     report.rules.iter().for_each(|rule| note(format!("rule: {rule}")));
     report.missing.iter().for_each(|absent| note(absence("missing", absent)));

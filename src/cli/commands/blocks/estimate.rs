@@ -8,7 +8,7 @@ use crate::words::counted;
 use clap::Args;
 use serde_json::json;
 
-const MIB: u64 = 1 << 20;
+const MIB_BYTES: u64 = 1 << 20;
 
 /// `labelgs blocks estimate`.
 #[derive(Args, Clone, Debug)]
@@ -26,7 +26,7 @@ pub struct EstimateArgs {
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1600x1064")]
     pub size: Size,
     /// GPU memory, such as 24G.
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, alias = "gpu-memory", value_name = "SIZE", value_parser = bytes)]
     pub card: u64,
     /// Largest label id in the masks; 0 for a scene without masks.
     #[arg(long, value_name = "ID", default_value_t = 255)]
@@ -73,8 +73,8 @@ fn to_text(found: &Estimate) -> String {
         counted(found.gaussians, "Gaussian"),
         found.frozen,
         counted(found.views, "view"),
-        found.need.device.div_ceil(MIB),
-        found.need.host.div_ceil(MIB),
+        found.need.device.div_ceil(MIB_BYTES),
+        found.need.host.div_ceil(MIB_BYTES),
         counted(found.need.steps, "step")
     )
 }
@@ -86,8 +86,8 @@ fn to_json(found: &Estimate) -> serde_json::Value {
         "gaussians": found.gaussians,
         "frozen": found.frozen,
         "views": found.views,
-        "device_mib": found.need.device.div_ceil(MIB),
-        "host_mib": found.need.host.div_ceil(MIB),
+        "device_mib": found.need.device.div_ceil(MIB_BYTES),
+        "host_mib": found.need.host.div_ceil(MIB_BYTES),
         "steps": found.need.steps,
         "hours": hours(found),
         "card_hours": hours(found).map(|hours| hours * found.blocks as f64),

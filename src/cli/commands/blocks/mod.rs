@@ -1,4 +1,4 @@
-//! `labelgs blocks`: a scene larger than a card.
+//! `labelgs blocks`: a scene larger than a GPU.
 
 mod estimate;
 mod join;

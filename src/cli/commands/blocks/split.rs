@@ -28,7 +28,7 @@ pub struct SplitArgs {
     #[arg(long, conflicts_with = "output")]
     pub dry_run: bool,
     /// Memory of the GPU that trains the blocks, such as 24G.
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, alias = "gpu-memory", value_name = "SIZE", value_parser = bytes)]
     pub card: u64,
     /// Gaussians of the whole scene after densification, such as 40M. Default: four times the coarse model.
     #[arg(long, value_name = "N", value_parser = count)]

@@ -72,9 +72,9 @@ pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     let (gpu, memory) = (open_gpu(context)?, args.scoring.memory.options());
     let image = largest(views.iter().map(|view| (view.camera.width, view.camera.height)));
     let scores = if fits(&gpu, source.view(), image, memory)? {
-        job.of_whole(&gpu, views, memory)?
+        job.score_whole(&gpu, views, memory)?
     } else {
-        job.of_parts(&gpu, source.view(), &views, memory)?
+        job.score_parts(&gpu, source.view(), &views, memory)?
     };
     scores.warn_of_odd_view(near);
     Ok(scores)
@@ -91,7 +91,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Scores a model that fits into the memory of the device.
-    fn of_whole(&self, gpu: &Arc<Gpu>, views: Vec<&View>, memory: SchedulerOptions) -> Result<Scores> {
+    fn score_whole(&self, gpu: &Arc<Gpu>, views: Vec<&View>, memory: SchedulerOptions) -> Result<Scores> {
         let (args, how) = (self.args, self.how);
         let model = open_model(&args.model)?;
         warn_of_misfit(&args.model, &model, self.dataset)?;
@@ -111,7 +111,8 @@ impl Job<'_> {
         let mut engine = Engine::new(gpu.clone(), EngineSize::for_model(&model, sizes), memory)?;
         let mut whole =
             WholeModel { engine: &mut engine, model: &model, min_confidence: args.scoring.sure.min_confidence };
-        let mut scores = Scores { refined_poses: args.refine_poses, ..self.of(&mut whole, &views, &mut watcher)? };
+        let mut scores =
+            Scores { refined_poses: args.refine_poses, ..self.evaluate(&mut whole, &views, &mut watcher)? };
         if args.removal {
             drop(engine);
             let all: Vec<&View> = views.iter().chain(&train).copied().collect();
@@ -124,7 +125,13 @@ impl Job<'_> {
     }
 
     /// Scores a model of which each picture takes a part.
-    fn of_parts(&self, gpu: &Arc<Gpu>, model: ModelRef, views: &[&View], memory: SchedulerOptions) -> Result<Scores> {
+    fn score_parts(
+        &self,
+        gpu: &Arc<Gpu>,
+        model: ModelRef,
+        views: &[&View],
+        memory: SchedulerOptions,
+    ) -> Result<Scores> {
         let args = self.args;
         for (flag, typed) in [("--removal", args.removal), ("--refine-poses", args.refine_poses)] {
             if typed {
@@ -136,12 +143,12 @@ impl Job<'_> {
         let (index, notes) = GaussianIndex::new(model, args.scoring.sure.min_confidence, |_, _| true)?;
         models::log_notes(&args.model, &notes);
         let mut painter = Painter::new(Arc::clone(gpu), model, index, memory);
-        let scores = self.of(&mut painter, views, &mut watcher)?;
+        let scores = self.evaluate(&mut painter, views, &mut watcher)?;
         watcher.finish(&tables(&scores, names(args)?.as_ref()))?;
         Ok(scores)
     }
 
-    fn of(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
+    fn evaluate(&self, subject: &mut dyn Subject, views: &[&View], watcher: &mut Watcher) -> Result<Scores> {
         let mut scores = evaluate(subject, views, self.how, &self.wholes, watcher)?;
         if let Some(seams) = Seams::for_model(&self.args.model)? {
             subject.show(None)?;

@@ -1,56 +1,56 @@
 //! Scores as tables.
 
-use crate::cli::support::tables::{Column, DB, Part, Parts, SHARE, Table, column, number};
+use crate::cli::support::tables::{Column, DECIBEL_DIGITS, Part, Parts, SCORE_DIGITS, Table, column, number};
 use crate::eval::PlaceScore;
 use crate::eval::removal::ObjectRemoval;
 use crate::eval::scores::{MeanScores, ObjectScores, Scores, ViewScores};
 use crate::files::label_table::LabelTable;
 
-const VIEWS: [Column<MeanScores>; 4] = [
-    column("PSNR", "PSNR, dB", DB, |row| row.psnr),
-    column("corrected", "PSNR after colour correction, dB", DB, |row| row.psnr_corrected),
-    column("SSIM", "SSIM", SHARE, |row| row.ssim),
-    column("LPIPS", "LPIPS", SHARE, |row| row.lpips),
+const VIEW_COLUMNS: [Column<MeanScores>; 4] = [
+    column("PSNR", "PSNR, dB", DECIBEL_DIGITS, |row| row.psnr),
+    column("corrected", "PSNR after colour correction, dB", DECIBEL_DIGITS, |row| row.psnr_corrected),
+    column("SSIM", "SSIM", SCORE_DIGITS, |row| row.ssim),
+    column("LPIPS", "LPIPS", SCORE_DIGITS, |row| row.lpips),
 ];
-const OBJECTS: [Column<ObjectScores>; 8] = [
-    column("IoU", "IoU of the label map", SHARE, |row| row.iou_map),
-    column("bIoU", "Boundary IoU", SHARE, |row| row.boundary_iou),
-    column("whole", "IoU of the whole object", SHARE, |row| row.iou_object),
-    column("paper", "IoU as in the LabelGS paper", SHARE, |row| row.paper_iou),
-    column("PSNR", "PSNR alone, dB", DB, |row| row.object_psnr),
-    column("SSIM", "SSIM alone", SHARE, |row| row.object_ssim),
-    column("hidden", "IoU of hidden parts", SHARE, |row| row.iou_hidden),
-    column("dB hidden", "PSNR of hidden parts, dB", DB, |row| row.psnr_hidden),
+const OBJECT_COLUMNS: [Column<ObjectScores>; 8] = [
+    column("IoU", "IoU of the label map", SCORE_DIGITS, |row| row.iou_map),
+    column("bIoU", "Boundary IoU", SCORE_DIGITS, |row| row.boundary_iou),
+    column("whole", "IoU of the whole object", SCORE_DIGITS, |row| row.iou_object),
+    column("paper", "IoU as in the LabelGS paper", SCORE_DIGITS, |row| row.paper_iou),
+    column("PSNR", "PSNR alone, dB", DECIBEL_DIGITS, |row| row.object_psnr),
+    column("SSIM", "SSIM alone", SCORE_DIGITS, |row| row.object_ssim),
+    column("hidden", "IoU of hidden parts", SCORE_DIGITS, |row| row.iou_hidden),
+    column("dB hidden", "PSNR of hidden parts, dB", DECIBEL_DIGITS, |row| row.psnr_hidden),
 ];
-const PLACES: [Column<PlaceScore>; 2] = [
-    column("PSNR", "PSNR, dB", DB, |row| Some(row.psnr)),
+const PLACE_COLUMNS: [Column<PlaceScore>; 2] = [
+    column("PSNR", "PSNR, dB", DECIBEL_DIGITS, |row| Some(row.psnr)),
     column("pixels", "Pixels", 0, |row| Some(row.pixels as f64)),
 ];
-const REMOVED: [Column<ObjectRemoval>; 4] = [
-    column("removed", "Removed, dB", DB, |row| row.votes.psnr),
-    column("filled", "Filled, dB", DB, |row| row.filled.psnr),
-    column("mean colour", "Mean colour, dB", DB, |row| row.mean_colour.psnr),
-    column("paper's", "Paper's rule, dB", DB, |row| row.main.psnr),
+const REMOVAL_COLUMNS: [Column<ObjectRemoval>; 4] = [
+    column("removed", "Removed, dB", DECIBEL_DIGITS, |row| row.votes.psnr),
+    column("filled", "Filled, dB", DECIBEL_DIGITS, |row| row.filled.psnr),
+    column("mean colour", "Mean colour, dB", DECIBEL_DIGITS, |row| row.mean_colour.psnr),
+    column("paper's", "Paper's rule, dB", DECIBEL_DIGITS, |row| row.main.psnr),
 ];
-const SHADOWED: [Column<ObjectRemoval>; 4] = [
-    column("removed", "Removed, dB", DB, |row| row.votes.psnr_shadowed),
-    column("filled", "Filled, dB", DB, |row| row.filled.psnr_shadowed),
-    column("mean colour", "Mean colour, dB", DB, |row| row.mean_colour.psnr_shadowed),
-    column("paper's", "Paper's rule, dB", DB, |row| row.main.psnr_shadowed),
+const SHADOW_COLUMNS: [Column<ObjectRemoval>; 4] = [
+    column("removed", "Removed, dB", DECIBEL_DIGITS, |row| row.votes.psnr_shadowed),
+    column("filled", "Filled, dB", DECIBEL_DIGITS, |row| row.filled.psnr_shadowed),
+    column("mean colour", "Mean colour, dB", DECIBEL_DIGITS, |row| row.mean_colour.psnr_shadowed),
+    column("paper's", "Paper's rule, dB", DECIBEL_DIGITS, |row| row.main.psnr_shadowed),
 ];
-const LEFT: [Column<ObjectRemoval>; 7] = [
-    column("area", "Area left", SHARE, |row| row.votes.leftover),
-    column("paper's", "Paper's rule", SHARE, |row| row.main.leftover),
-    column("weight", "Weight left", SHARE, |row| row.votes.leftover_weight),
-    column("paper's", "Paper's rule", SHARE, |row| row.main.leftover_weight),
-    column("hole", "Hole", SHARE, |row| row.hole),
-    column("filled", "Hole after --fill", SHARE, |row| row.hole_filled),
+const REMAINDER_COLUMNS: [Column<ObjectRemoval>; 7] = [
+    column("area", "Area left", SCORE_DIGITS, |row| row.votes.leftover),
+    column("paper's", "Paper's rule", SCORE_DIGITS, |row| row.main.leftover),
+    column("weight", "Weight left", SCORE_DIGITS, |row| row.votes.leftover_weight),
+    column("paper's", "Paper's rule", SCORE_DIGITS, |row| row.main.leftover_weight),
+    column("hole", "Hole", SCORE_DIGITS, |row| row.hole),
+    column("filled", "Hole after --fill", SCORE_DIGITS, |row| row.hole_filled),
     column("added", "Gaussians added", 0, |row| Some(row.added as f64)),
 ];
-const HOLES: [Column<ObjectRemoval>; 3] = [
-    column("filled", "Filled, dB", DB, |row| row.holes.filled),
-    column("with shadow", "Filled, with its shadow, dB", DB, |row| row.holes.filled_shadowed),
-    column("ring mean", "Mean of the ring around, dB", DB, |row| row.holes.mean_colour),
+const HOLE_COLUMNS: [Column<ObjectRemoval>; 3] = [
+    column("filled", "Filled, dB", DECIBEL_DIGITS, |row| row.holes.filled),
+    column("with shadow", "Filled, with its shadow, dB", DECIBEL_DIGITS, |row| row.holes.filled_shadowed),
+    column("ring mean", "Mean of the ring around, dB", DECIBEL_DIGITS, |row| row.holes.mean_colour),
 ];
 
 /// Returns the tables of views, then of objects, which have names from a table.
@@ -63,12 +63,12 @@ pub(super) fn tables(scores: &Scores, names: Option<&LabelTable>) -> Parts {
     let views: Vec<(String, MeanScores)> =
         scores.views.iter().map(|(name, view)| (name.clone(), of_view(view))).collect();
     let rows = views.iter().map(|(name, view)| (name.clone(), view));
-    parts.push(Part::Table(Table::new("view", &VIEWS, rows.chain([("mean".to_owned(), mean)]))));
+    parts.push(Part::Table(Table::new("view", &VIEW_COLUMNS, rows.chain([("mean".to_owned(), mean)]))));
     parts.extend(regions(scores));
     if !scores.places.is_empty() {
         parts.push(Part::Title("places".to_owned()));
         let rows = scores.places.iter().map(|(name, score)| (name.clone(), score));
-        parts.push(Part::Table(Table::new("place", &PLACES, rows)));
+        parts.push(Part::Table(Table::new("place", &PLACE_COLUMNS, rows)));
     }
     if scores.objects.is_empty() {
         return Parts(parts);
@@ -76,7 +76,7 @@ pub(super) fn tables(scores: &Scores, names: Option<&LabelTable>) -> Parts {
     let title = |id: u32| names.and_then(|names| names.name(id)).map_or_else(|| format!("label {id}"), str::to_owned);
     let rows = scores.objects.iter().map(|(&id, scores)| (title(id), scores));
     parts.push(Part::Title("objects".to_owned()));
-    parts.push(Part::Table(Table::new("object", &OBJECTS, rows.chain([("mean".to_owned(), &mean.objects)]))));
+    parts.push(Part::Table(Table::new("object", &OBJECT_COLUMNS, rows.chain([("mean".to_owned(), &mean.objects)]))));
     if mean.specks.is_some() {
         let count = number(mean.specks, 1);
         parts.push(Part::Note(format!("Extra fragments in the label map, not in the masks: {count} per view.")));
@@ -106,20 +106,20 @@ fn removals(scores: &Scores, title: &impl Fn(u32) -> String) -> Vec<Part> {
     let heading = |text: &str| Part::Title(text.to_owned());
     vec![
         heading("PSNR where an object was removed, against photos without it"),
-        table(&REMOVED),
+        table(&REMOVAL_COLUMNS),
         heading("the same, against photos that keep its shadow"),
-        table(&SHADOWED),
+        table(&SHADOW_COLUMNS),
         heading("remains after removal, as shares of the object, and hole, as a share of its area"),
-        table(&LEFT),
+        table(&REMAINDER_COLUMNS),
         heading("PSNR in the holes"),
-        table(&HOLES),
+        table(&HOLE_COLUMNS),
     ]
 }
 
 /// Returns the PSNR by region.
 fn regions(scores: &Scores) -> Option<Part> {
     let mean = scores.mean.regions.as_ref()?;
-    let psnr = |value| number(value, DB);
+    let psnr = |value| number(value, DECIBEL_DIGITS);
     let mut text = format!(
         "PSNR by region: {} ({} corrected) where three training views see ({:.0} % of the pixels), {} elsewhere",
         psnr(mean.psnr_seen),

@@ -1,7 +1,7 @@
 //! `labelgs label --click` and `--box`: an object from places in photos.
 
 use super::LabelArgs;
-use crate::cli::support::parsers::{At, BoxAt, at, box_at};
+use crate::cli::support::parsers::{ViewBox, ViewPixel, view_box, view_pixel};
 use crate::cli::support::scene::{find_view, open_photos};
 use crate::cli::support::{Context, near_plane, open_gpu, open_model};
 use crate::edit::add::add;
@@ -25,15 +25,15 @@ use std::time::Instant;
 pub struct ClickArgs {
     /// Label the object that a network finds at pixel x,y of a view, and keep all other labels; 0,0 is the top left
     /// pixel of the photo, after --max-resolution. Repeat it for more clicks on the same object, in any view.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at)]
-    pub click: Vec<At>,
+    #[arg(long, value_name = "VIEW:x,y", value_parser = view_pixel)]
+    pub click: Vec<ViewPixel>,
     /// Mark a pixel that does not belong to the object. Repeatable.
-    #[arg(long, value_name = "VIEW:x,y", value_parser = at, requires = "places")]
-    pub not: Vec<At>,
+    #[arg(long, value_name = "VIEW:x,y", value_parser = view_pixel, requires = "places")]
+    pub not: Vec<ViewPixel>,
     /// Label the object that a network finds in a box of a view: x0 <= x < x1 and y0 <= y < y1. You can combine it with
     /// clicks on the same object.
-    #[arg(id = "area", long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = box_at)]
-    pub area: Option<BoxAt>,
+    #[arg(id = "area", long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = view_box)]
+    pub area: Option<ViewBox>,
     /// Folder of the segmentation network, as for `masks make`.
     #[arg(long, value_name = "DIR", requires = "places")]
     pub network: Option<PathBuf>,
@@ -90,11 +90,11 @@ fn hints(args: &ClickArgs, typed: &Dataset, photos: &Photos) -> Result<Hints> {
         photos.index(&view.name)
     };
     let on = args.click.iter().map(|at| ("--click", at));
-    let click = |(flag, at): (&'static str, &At)| {
+    let click = |(flag, at): (&'static str, &ViewPixel)| {
         Ok(Click { view: in_view(flag, &at.view, at.pixel)?, pixel: at.pixel, is_on: flag == "--click" })
     };
     let clicks = on.chain(args.not.iter().map(|at| ("--not", at))).map(click).collect::<Result<_>>()?;
-    let area = |BoxAt { view, corners }: &BoxAt| {
+    let area = |ViewBox { view, corners }: &ViewBox| {
         let last = [corners[2] - 1, corners[3] - 1];
         Ok(Area { view: in_view("--box", view, last)?, corners: *corners })
     };

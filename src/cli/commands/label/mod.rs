@@ -94,7 +94,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
         return click::run(args, scene, context);
     };
     let (mut model, near) = (open_model(&args.model)?, near_plane(&args.model, args.near)?);
-    let masks = MaskFolders::of(folder)?;
+    let masks = MaskFolders::from_folder(folder)?;
     let mut dataset = open_scene(scene, &args.reading, masks.pictures.clone(), [0.0; 3], true)?;
     dataset.train.retain(|view| view.mask.is_some() || masks.lists.is_some());
     if dataset.train.is_empty() {
@@ -131,7 +131,7 @@ pub(crate) fn run(args: &LabelArgs, context: &Context) -> Result<()> {
     finish(args, (&model, names.as_ref()), (views.len(), seconds), context)
 }
 
-/// Writes the labelled model, and tells its labels.
+/// Writes the labelled model, and prints its labels.
 fn finish(
     args: &LabelArgs,
     (model, names): (&Gaussians, Option<&LabelTable>),

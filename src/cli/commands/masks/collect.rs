@@ -76,7 +76,7 @@ fn tracked_file(folder: &Path, frame: &Frame) -> PathBuf {
     folder.join(format!("{stem}.png"))
 }
 
-/// Returns how the views lie in photos through lenses; nothing if all photos are those of pinhole cameras.
+/// Returns how views map to distorted photos; empty if all cameras are pinhole cameras.
 fn windows_of(args: &CollectArgs, video: &Frames) -> Result<BTreeMap<String, Window>> {
     let found = match &args.scene {
         Some(scene) => windows(scene, &args.read.lookup())?,

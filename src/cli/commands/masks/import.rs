@@ -89,7 +89,7 @@ fn warn(done: &ImportSummary) {
     done.notes.iter().for_each(|note| tracing::warn!("{note}"));
 }
 
-/// Says what the ids mean and, if each photo has its own, how they come to agree.
+/// Explains the ids and, if they differ from photo to photo, how to match them.
 fn meaning(objects: &Objects, args: &ImportArgs) -> String {
     let why = &objects.why;
     match objects.per {

@@ -1,7 +1,7 @@
 //! `labelgs masks make`.
 
 use super::{files_of_photos, write_mask};
-use crate::cli::support::nested_masks::{NESTED, OBJECTS};
+use crate::cli::support::nested_masks::{NESTED_FOLDER, OBJECTS_FOLDER};
 use crate::cli::support::parsers::share;
 use crate::cli::support::{Context, FileArgs, Progress, ReadArgs, quoted};
 use crate::files::resize::bounded_size;
@@ -20,17 +20,18 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// File that says how the masks of a folder were made.
-const FILE: &str = "masks.json";
+const MASKS_RECORD: &str = "masks.json";
 /// Longest side of a mask, px: twice the grid of the network, so that outlines are as smooth as it draws them.
-const MASK_PX: u32 = 512;
+const MASK_SIDE_MAX: u32 = 512;
 
 /// Defaults of the flags.
-const GRID: u16 = 12;
-const MIN_SCORE: f32 = 0.7;
-const MIN_STABILITY: f32 = 0.5;
+const GRID_DEFAULT: u16 = 12;
+const SCORE_MIN_DEFAULT: f32 = 0.7;
+const STABILITY_MIN_DEFAULT: f32 = 0.5;
 
 /// The levels of nested masks, and the folders of their id pictures.
-const LEVELS: [(Level, &str); 3] = [(Level::Objects, OBJECTS), (Level::Parts, "parts"), (Level::Wholes, "wholes")];
+const LEVEL_FOLDERS: [(Level, &str); 3] =
+    [(Level::Objects, OBJECTS_FOLDER), (Level::Parts, "parts"), (Level::Wholes, "wholes")];
 
 /// `labelgs masks make`.
 #[derive(Args, Clone, Debug)]
@@ -47,13 +48,13 @@ pub struct MakeArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Number of prompt points along each side of a photo.
-    #[arg(long, value_name = "N", default_value_t = GRID, value_parser = clap::value_parser!(u16).range(1..=128))]
+    #[arg(long, value_name = "N", default_value_t = GRID_DEFAULT, value_parser = clap::value_parser!(u16).range(1..=128))]
     pub grid: u16,
     /// Minimum mask quality, as predicted by the network.
-    #[arg(long, value_name = "SHARE", default_value_t = MIN_SCORE, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = SCORE_MIN_DEFAULT, value_parser = share)]
     pub min_score: f32,
     /// Minimum stability of a mask: its area at a strict threshold divided by its area at a loose threshold.
-    #[arg(long, value_name = "SHARE", default_value_t = MIN_STABILITY, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = STABILITY_MIN_DEFAULT, value_parser = share)]
     pub min_stability: f32,
     /// Number of threads. Default: one per CPU core, fewer if memory is short. A photo takes about 400 MB, and each
     /// thread 60 MB.
@@ -70,9 +71,9 @@ impl MakeArgs {
             scene: scene.to_owned(),
             network: network.to_owned(),
             output,
-            grid: GRID,
-            min_score: MIN_SCORE,
-            min_stability: MIN_STABILITY,
+            grid: GRID_DEFAULT,
+            min_score: SCORE_MIN_DEFAULT,
+            min_stability: STABILITY_MIN_DEFAULT,
             threads: None,
             read: ReadArgs { files, poses: None },
         }
@@ -81,7 +82,7 @@ impl MakeArgs {
 
 /// How masks were made, beside them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Made {
+struct MaskRecord {
     schema_version: u32,
     network: String,
     grid: u16,
@@ -118,11 +119,11 @@ pub(in crate::cli) fn make(args: &MakeArgs, context: &Context) -> Result<(Value,
     let mut progress = Progress::new(files.len() as u64, "photos", &context.global);
     let (mut made, mut masks, mut empty) = (0, 0, Vec::new());
     for (done, (file, of)) in files.iter().enumerate() {
-        let list = args.output.join(NESTED).join(file).with_extension("json");
+        let list = args.output.join(NESTED_FOLDER).join(file).with_extension("json");
         if !list.is_file() {
             let view = views[of[0]];
             let found = of_photo(args, &network, &cache, view)?;
-            for ((_, folder), map) in LEVELS.iter().zip(&found.levels) {
+            for ((_, folder), map) in LEVEL_FOLDERS.iter().zip(&found.levels) {
                 write_mask(&args.output.join(folder).join(file), map)?;
             }
             // Written last: its presence means that the photo is done.
@@ -146,19 +147,19 @@ pub(in crate::cli) fn make(args: &MakeArgs, context: &Context) -> Result<(Value,
 
 /// Writes how the masks are made, or refuses a folder whose masks were made otherwise.
 fn remember(args: &MakeArgs, network: &Network) -> Result<()> {
-    let made = Made {
+    let made = MaskRecord {
         schema_version: 1,
         network: network.digest.clone(),
         grid: args.grid,
         min_score: args.min_score,
         min_stability: args.min_stability,
     };
-    let path = args.output.join(FILE);
+    let path = args.output.join(MASKS_RECORD);
     if !path.is_file() {
         atomic::require_empty("--output", &args.output)?;
         return atomic::write_json(&path, &made);
     }
-    let before: Made = read::json(&path, "how masks were made")?;
+    let before: MaskRecord = read::json(&path, "how masks were made")?;
     if before != made {
         let problem = "these masks were made by another network or with other options; use a new folder";
         return Err(Error::data(&path, "", problem));
@@ -170,8 +171,8 @@ fn of_photo(args: &MakeArgs, network: &Network, cache: &FeatureCache, view: &Vie
     let search = Search { grid: usize::from(args.grid), min_score: args.min_score, min_stability: args.min_stability };
     let photo = view.photo()?;
     let features = cache.features(network, &photo)?;
-    let size = bounded_size(features.photo, Some(MASK_PX));
-    masks_of_photo(network, &features, &search, &LEVELS.map(|(level, _)| level), size)
+    let size = bounded_size(features.photo, Some(MASK_SIDE_MAX));
+    masks_of_photo(network, &features, &search, &LEVEL_FOLDERS.map(|(level, _)| level), size)
 }
 
 fn size_of(levels: &[LabelMap]) -> (u32, u32) {

@@ -69,7 +69,7 @@ pub(crate) fn run(args: &RepairArgs, context: &Context) -> Result<()> {
 pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Value, String)> {
     atomic::require_empty("--output", &args.output)?;
     let model = open_model(&args.model)?;
-    let folders = MaskFolders::of(&args.masks)?;
+    let folders = MaskFolders::from_folder(&args.masks)?;
     let mut dataset = open_scene(&args.scene, &args.reading, folders.pictures.clone(), [0.0; 3], true)?;
     let (gpu, near) = (open_gpu(context)?, near_plane(&args.model, args.near)?);
     if let Some(lists) = &folders.lists {
@@ -113,8 +113,8 @@ pub(in crate::cli) fn repair(args: &RepairArgs, context: &Context) -> Result<(Va
     Ok(report(&all, &masks, &repairs, args))
 }
 
-/// Makes the table of masks that were repaired, from that of their folder. Where each view had ids of its own, an object
-/// gets the name of most of its pixels; else its id keeps its entry.
+/// Makes the label table of repaired masks from the table of their folder. With ids per view, an object gets the name
+/// of most of its pixels; otherwise each id keeps its entry.
 pub(in crate::cli) fn table(
     folder: &Path,
     per_view: bool,

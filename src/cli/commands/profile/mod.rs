@@ -4,7 +4,7 @@ pub mod compare;
 pub(crate) mod report;
 pub mod timed;
 
-use crate::cli::commands::profile::report::{Clocks, Measured, Profile, Window, Workers};
+use crate::cli::commands::profile::report::{Clocks, Measurement, Profile, Window, Workers};
 use crate::cli::support::parsers::share;
 use crate::cli::support::{Context, JsonFileArg, Progress, SceneArgs, open_gpu_for_long, open_model, open_scene};
 use crate::gpu::Gpu;
@@ -69,7 +69,7 @@ pub struct ProfileArgs {
 }
 
 /// Steps after the timed ones; they count pairs.
-const COUNTED: u32 = 10;
+const COUNTED_STEPS: u32 = 10;
 
 /// Times steps of a real training.
 pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
@@ -87,8 +87,8 @@ pub(crate) fn run(args: &ProfileArgs, context: &Context) -> Result<()> {
     args.json.put_out(&profile, &profile.to_text(), context)
 }
 
-/// Returns the settings of a run whose steps after `from_step` are those of its end: photos of full size, all bands of
-/// colour, labels.
+/// Returns the settings of a run whose steps after `from_step` are as at its end: full-size photos, the full degree of
+/// spherical harmonics, labels.
 pub(crate) fn finished_from(from_step: u32, settings: TrainConfig) -> TrainConfig {
     let first = from_step.saturating_add(1);
     TrainConfig {
@@ -106,7 +106,7 @@ fn decide(args: &ProfileArgs) -> Result<TrainConfig> {
         None => TrainConfig::default(),
     };
     let Window { steps, warm_up, from_step, .. } = args.window;
-    let steps = u64::from(from_step) + 2 * (u64::from(warm_up) + u64::from(steps)) + u64::from(COUNTED) + 1;
+    let steps = u64::from(from_step) + 2 * (u64::from(warm_up) + u64::from(steps)) + u64::from(COUNTED_STEPS) + 1;
     let steps = u32::try_from(steps).map_err(|_| Error::usage(Setting("steps"), "there are too many steps in all"))?;
     decided.iterations = decided.iterations.max(steps);
     if !args.as_scheduled {
@@ -149,7 +149,7 @@ pub(crate) fn profile(
     Ok(Profile::new(gpu, workers, window, dataset.train.len(), measured))
 }
 
-fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<Measured> {
+fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<Measurement> {
     let before = window.from_step + window.warm_up;
     let all = u64::from(before) + u64::from(window.warm_up) + 2 * u64::from(window.steps);
     let mut progress = Progress::new(all, "steps", &context.global);
@@ -176,11 +176,11 @@ fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<M
     let clocks = in_the_pipeline(trainer, window, step)?;
     trainer.count_pairs(true);
     let mut counted = Vec::new();
-    for _ in 0..COUNTED.min(window.steps) {
+    for _ in 0..COUNTED_STEPS.min(window.steps) {
         counted.extend(trainer.step()?);
     }
     counted.extend(trainer.drain()?);
-    Ok(Measured { clocks, reports, times, counted, gaussians })
+    Ok(Measurement { clocks, reports, times, counted, gaussians })
 }
 
 /// Runs further steps as in a training: without timestamps, and with as many in flight as there are frames. The clock ends
@@ -209,27 +209,29 @@ fn in_the_pipeline(
     Ok(Clocks { wall, steps, cpu, traffic })
 }
 
-/// Returns the host threads that run the passes; `None` on a graphics card.
+/// Returns the host threads that run the passes; `None` on a GPU.
 fn workers(gpu: &Gpu) -> Result<Option<Workers>> {
-    const NAME: &str = "LP_NUM_THREADS";
+    const THREADS_VARIABLE: &str = "LP_NUM_THREADS";
     /// lavapipe starts at most this many threads.
-    const MOST: usize = 32;
+    const THREADS_MAX: usize = 32;
     if !gpu.is_cpu() {
         return Ok(None);
     }
-    let set = std::env::var(NAME).ok().filter(|text| !text.is_empty());
+    let set = std::env::var(THREADS_VARIABLE).ok().filter(|text| !text.is_empty());
     let (count, source) = match set {
         // 0 runs everything on the submitting thread.
         Some(text) => match text.parse::<usize>() {
-            Ok(count) => (count.max(1), NAME),
-            Err(_) => return Err(Error::usage(NAME, format!("is {text}, needs a whole number of threads"))),
+            Ok(count) => (count.max(1), THREADS_VARIABLE),
+            Err(_) => {
+                return Err(Error::usage(THREADS_VARIABLE, format!("is {text}, needs a whole number of threads")));
+            }
         },
         None => (std::thread::available_parallelism().map_or(1, usize::from), "CPU cores of this machine"),
     };
-    Ok(Some(Workers { count: count.min(MOST), source }))
+    Ok(Some(Workers { count: count.min(THREADS_MAX), source }))
 }
 
-/// Returns the processor time of this process: user and system, all threads.
+/// Returns the CPU time of this process: user and system, all threads.
 #[cfg(unix)]
 fn cpu_time() -> Option<Duration> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);

@@ -1,7 +1,7 @@
 //! The result of `labelgs profile`, as a table and as JSON.
 
 use crate::cli::commands::devices::{shape_json, shape_text};
-use crate::cli::commands::profile::timed::Timed;
+use crate::cli::commands::profile::timed::TimedWork;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Stage};
 use crate::scheduler::{Profiler, Traffic};
@@ -41,7 +41,7 @@ pub struct Window {
 }
 
 /// What was measured of a training.
-pub(crate) struct Measured {
+pub(crate) struct Measurement {
     /// Times of further steps by the clocks of the host.
     pub clocks: Clocks,
     /// Reports of the timed steps.
@@ -60,7 +60,7 @@ pub(crate) struct Clocks {
     pub wall: Duration,
     /// Each call of the trainer, which waits for an earlier step.
     pub steps: Vec<Duration>,
-    /// Processor time of the process, if the system reports it.
+    /// CPU time of the process, if the system reports it.
     pub cpu: Option<Duration>,
     /// Bytes between host and device.
     pub traffic: Traffic,
@@ -93,7 +93,7 @@ struct PerPair {
 }
 
 /// Numbers of a step: name in JSON, name in the table, value by the report and the pixels of a tile.
-const COUNTERS: [(&str, &str, fn(&StepReport, f64) -> f64); 6] = [
+const STEP_COUNTERS: [(&str, &str, fn(&StepReport, f64) -> f64); 6] = [
     ("visible", "visible splats", |step, _| f64::from(step.report.counters.visible_count)),
     ("instances", "(splat, tile) pairs", |step, _| f64::from(step.report.counters.instance_count)),
     ("layer_tiles", "tiles of object layers", |step, _| f64::from(step.report.counters.layer_tile_count)),
@@ -125,7 +125,7 @@ pub(crate) struct Profile {
     steps_with_layers: usize,
     steps_with_disagreement: usize,
     #[serde(skip)]
-    timed: Timed,
+    timed: TimedWork,
     gaussians: u32,
     steps_counted: usize,
     stages: Vec<Row>,
@@ -146,15 +146,15 @@ pub(crate) struct Profile {
 impl Profile {
     /// Makes a profile of steps on `views` views. The times of a recording's first run, in which drivers compile, are left
     /// out.
-    pub(crate) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window, views: usize, found: Measured) -> Self {
-        let Measured { clocks, reports, mut times, counted, gaussians } = found;
+    pub(crate) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window, views: usize, found: Measurement) -> Self {
+        let Measurement { clocks, reports, mut times, counted, gaussians } = found;
         let (device, shape) = (gpu.capabilities(), KernelShape::for_device(gpu.capabilities()));
         let pixels = f64::from(shape.tile_pixels());
         let of_step = |report: &StepReport| step_json(report, times.iter().find(|t| t.step == report.step), pixels);
         let steps: Vec<Value> = reports.iter().map(of_step).collect();
         let all = times.len();
         times.retain(|times| !times.is_first);
-        let (timed, is_timed) = (Timed::new(&reports), |step| times.iter().any(|times| times.step == step));
+        let (timed, is_timed) = (TimedWork::new(&reports), |step| times.iter().any(|times| times.step == step));
         let pairs_walked: f64 =
             reports.iter().filter(|report| is_timed(report.step)).map(|step| walked_splats(step) * pixels).sum();
         let threads = workers.map_or(1.0, |workers| workers.count as f64);
@@ -193,7 +193,7 @@ impl Profile {
             bytes_to_device: clocks.traffic.up as f64 / each,
             bytes_from_device: clocks.traffic.down as f64 / each,
             processor_ms: clocks.cpu.map(|time| time.as_secs_f64() * 1e3 / each),
-            counters: COUNTERS.iter().map(|&(name, _, value)| (name, counter(value))).collect(),
+            counters: STEP_COUNTERS.iter().map(|&(name, _, value)| (name, counter(value))).collect(),
             pairs_walked,
             contributing_share: weighted / (counted.iter().map(walked_splats).sum::<f64>() * pixels),
             balance_of_halves: spread(reports.iter().map(balance)).mean,
@@ -240,7 +240,7 @@ impl Profile {
         }
         let moved = [("bytes to the device", self.bytes_to_device), ("bytes from the device", self.bytes_from_device)];
         moved.iter().for_each(|(name, bytes)| text += &format!("{name:<34} {:>16} {:>10} {bytes:>10.0}\n", "", ""));
-        COUNTERS.iter().for_each(|(key, name, _)| text += &spread_line(name, self.counters[key], 0));
+        STEP_COUNTERS.iter().for_each(|(key, name, _)| text += &spread_line(name, self.counters[key], 0));
         text + "\n" + &self.per_pair_text()
     }
 

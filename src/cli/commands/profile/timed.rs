@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 /// What the timed steps worked on.
 #[derive(Clone, Debug, Default)]
-pub struct Timed {
+pub struct TimedWork {
     /// Sizes of photos, px, the smallest first.
     pub sizes: BTreeSet<(u32, u32)>,
     /// Degrees of the spherical harmonics.
@@ -19,7 +19,7 @@ pub struct Timed {
     pub pixels: f64,
 }
 
-impl Timed {
+impl TimedWork {
     /// Sums steps up.
     pub fn new(reports: &[StepReport]) -> Self {
         let with = |labels| reports.iter().filter(|report| report.kind.labels == labels).count();

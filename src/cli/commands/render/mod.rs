@@ -4,7 +4,7 @@ mod motion;
 
 use crate::cli::support::parsers::{Picks, colour, picks};
 use crate::cli::support::{
-    Asked, Context, Drawer, MemoryArg, MinConfidenceArg, PromptArgs, SceneArgs, TableArg, largest, model_edit,
+    Context, Drawer, LabelQuery, MemoryArg, MinConfidenceArg, PromptArgs, SceneArgs, TableArg, largest, model_edit,
     near_plane, open_gpu, open_model, open_scene, pick_views, warn_of_misfit_with,
 };
 use crate::edit::catalogue::Catalogue;
@@ -85,7 +85,7 @@ struct Shots {
     cameras: Vec<(String, Camera)>,
     /// The scene that has them.
     dataset: Option<Dataset>,
-    /// Frames per second, if they are those of a video.
+    /// Frames per second of a video.
     per_second: Option<f64>,
 }
 
@@ -269,14 +269,14 @@ fn chosen(args: &RenderArgs) -> Result<Option<Choice<'_>>> {
     }
 }
 
-fn asked<'a>(args: &'a RenderArgs, model: ModelRef<'a>, known: &'a Catalogue) -> Asked<'a> {
+fn asked<'a>(args: &'a RenderArgs, model: ModelRef<'a>, known: &'a Catalogue) -> LabelQuery<'a> {
     let (max_resolution, read) = (args.reading.max_resolution, args.reading.read.clone());
     let reading = SceneArgs { max_resolution, read, ..SceneArgs::default() };
     let (scene, memory) = (args.scene.as_deref(), args.memory.options());
-    Asked { path: &args.model, model, known, scene, reading, memory }
+    LabelQuery { path: &args.model, model, known, scene, reading, memory }
 }
 
-/// Returns the views to draw; those of a turntable are known with the model only.
+/// Returns the views to draw. The views of a turntable follow later, from the model.
 fn shots(args: &RenderArgs) -> Result<Shots> {
     if args.motion.turntable.is_some() {
         return Ok(Shots { per_second: Some(args.motion.fps.into()), ..Shots::default() });

@@ -15,14 +15,14 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 /// Ending of a video.
-const VIDEO: &str = "mp4";
+const VIDEO_EXTENSION: &str = "mp4";
 /// Shares of what is drawn, along each axis, between which the turntable shows it.
-const SPAN: [f64; 2] = [0.02, 0.98];
+const FRAMED_QUANTILES: [f64; 2] = [0.02, 0.98];
 /// Focal length of the turntable, in the smaller side of the picture, and the least space around what is drawn.
-const FOCAL: f64 = 1.4;
-const MARGIN: f64 = 1.1;
+const FOCAL_IN_SIDES: f64 = 1.4;
+const FRAME_MARGIN: f64 = 1.1;
 /// Height of the eye over what is drawn alone, in distances.
-const RAISED: f64 = 0.35;
+const EYE_HEIGHT_IN_DISTANCES: f64 = 0.35;
 
 /// A camera that moves.
 #[derive(Args, Clone, Debug)]
@@ -51,7 +51,7 @@ pub struct MotionArgs {
 
 /// Returns true for the path of a video.
 pub(super) fn is_video(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(VIDEO))
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(VIDEO_EXTENSION))
 }
 
 /// Returns the kind of picture in a video; fails for several, and for values that are no colours.
@@ -76,31 +76,31 @@ impl MotionArgs {
         Ok(found.map(|found| (found.per_second, found.cameras)))
     }
 
-    /// Returns the cameras of the turntable around places, and the largest near plane that cuts nothing of them. `alone`: they are
-    /// those of objects; else the cameras of the model's run tell where to look from.
+    /// Returns the cameras of the turntable around points, and the largest near plane that does not cut them. `alone`:
+    /// the points belong to objects; otherwise the cameras of the model's run give height and distance.
     pub(super) fn around(
         &self,
         model: &Path,
         places: impl Iterator<Item = DVec3> + Clone,
         alone: bool,
     ) -> Result<(Vec<Camera>, f32)> {
-        let [low, high] = quantiles(places.clone(), SPAN);
+        let [low, high] = quantiles(places.clone(), FRAMED_QUANTILES);
         let first = first_view(model)?;
         let up = first.map_or_else(|| likely_up(places), |view| view.up);
         let Size(width, height) = self.size;
-        let focal = FOCAL * f64::from(width.min(height));
+        let focal = FOCAL_IN_SIDES * f64::from(width.min(height));
         let (middle, radius) = (0.5 * (low + high), 0.5 * low.distance(high).max(1e-6));
         let views = if alone { Vec::new() } else { views_of_model(model)? };
         let cameras = || views.iter().map(|view| &view.camera);
         // The cosine makes a ball of the radius touch the edge of the picture.
-        let distance = MARGIN * radius * (2.0 * FOCAL).hypot(1.0);
+        let distance = FRAME_MARGIN * radius * (2.0 * FOCAL_IN_SIDES).hypot(1.0);
         let (target, distance, raised) = match Overview::from_cameras(cameras()) {
             Some(all) => {
                 let heights = cameras().map(|camera| (camera.centre() - all.target).dot(up)).sum::<f64>();
                 let share = (heights / views.len() as f64 / all.distance).clamp(-0.9, 0.9);
                 (all.target, all.distance, share / (1.0 - share * share).sqrt())
             }
-            None => (middle, distance, RAISED),
+            None => (middle, distance, EYE_HEIGHT_IN_DISTANCES),
         };
         let level = first.and_then(|view| (view.eye - target).reject_from_normalized(up).try_normalize());
         let level = level.unwrap_or_else(|| up.any_orthonormal_vector());

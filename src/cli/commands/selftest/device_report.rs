@@ -14,14 +14,14 @@ use crate::verify::selftest::Check;
 use crate::{Error, Result};
 use serde_json::{Value, json};
 
-/// Returns the report. `error` ended the checks. What cannot be measured stands in the report as an error of its own.
+/// Returns the report. `error` ended the checks. A failed measurement is reported as an error of its own.
 pub(crate) fn report(checks: &[Check], error: Option<&Error>, context: &Context) -> Result<Value> {
     let options = context.gpu_options()?;
     let (found, picked) = gpu::devices(&options)?;
     let picked = picked.ok();
     let listed = found.iter().map(|device| {
         let mut row = devices::to_json(device, picked);
-        // It tells two cards of the same kind apart.
+        // The UUID would identify the machine.
         row.as_object_mut().and_then(|row| row.remove("uuid"));
         row
     });
@@ -51,7 +51,7 @@ fn compiler(options: GpuOptions) -> Result<Value> {
     Ok(json!(kernels_json(&compiled_kernels(&gpu)?)))
 }
 
-/// The profile of steps with labels on the built-in scene: a million Gaussians at 1600 x 1064 px on a card with the
+/// The profile of steps with labels on the built-in scene: a million Gaussians at 1600 x 1064 px on a GPU with the
 /// memory for them, else the scene's own size.
 fn steps(context: &Context) -> Result<Value> {
     const LARGE_MIN: u64 = 3 << 30;

@@ -104,7 +104,7 @@ impl TrainFlags {
             return Err(Error::usage(Setting(key), "cannot be given with a block, which decides it; leave out one"));
         }
         let mut settings = match (&self.config, checkpoint) {
-            // A run that goes on compares the whole file with its checkpoint.
+            // A resumed run compares the whole file with its checkpoint.
             (Some(path), _) => Settings::read(path)?,
             (None, Some(found)) => found.clone(),
             (None, None) => self.preset.map(Settings::preset).unwrap_or_default(),

@@ -10,7 +10,7 @@ use crate::cli::support::shell_words::typed;
 use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted, signals};
 use crate::report::text::duration;
 use crate::run::{self, Event, Flow, LiveScene, Observer, Request, Settings, Summary};
-use crate::viewer::Watched;
+use crate::viewer::ViewerObserver;
 use crate::words::{brief, counted};
 
 /// Trains a model and prints a summary.
@@ -45,7 +45,7 @@ fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summar
     let words = TypedOptions { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
     let mut terminal = Terminal { context, progress: None };
     let title = args.output.display().to_string();
-    observed(request, context, &mut Watched::new(&viewer, &mut terminal, title, &words))
+    observed(request, context, &mut ViewerObserver::new(&viewer, &mut terminal, title, &words))
 }
 
 fn observed(request: Request, context: &Context, observer: &mut dyn Observer) -> Result<Summary> {

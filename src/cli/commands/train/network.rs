@@ -11,17 +11,17 @@ use crate::run::{Request, Settings, Summary};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Folders in that of the run: the run without masks, the masks, and there those that agree.
-const PLAIN: &str = "plain";
-const MASKS: &str = "masks";
-const AGREED: &str = "agreed";
+/// Subfolders of the run: the run without masks, the masks, and inside them the masks with matching ids.
+const PLAIN_FOLDER: &str = "plain";
+const MASKS_FOLDER: &str = "masks";
+const AGREED_FOLDER: &str = "agreed";
 /// Steps without masks for each one with them.
 const PLAIN_STEPS: u32 = 3;
 
 /// Trains without masks, makes masks, chooses objects among them, and trains the model on with these.
 pub(super) fn run(args: &TrainArgs, network: &Path, context: &Context) -> Result<Summary> {
     let out = args.output.as_path();
-    let (plain, agreed) = (out.join(PLAIN), out.join(MASKS).join(AGREED));
+    let (plain, agreed) = (out.join(PLAIN_FOLDER), out.join(MASKS_FOLDER).join(AGREED_FOLDER));
     let typed = args.how.settings(None)?;
     let is_last = args.how.resume && agreed.is_dir() && !checkpoint_folder::list(out)?.is_empty();
     if !is_last {
@@ -42,17 +42,17 @@ pub(super) fn run(args: &TrainArgs, network: &Path, context: &Context) -> Result
     trained(args, Request { init: Some(plain), ..request }, context)
 }
 
-/// Trains without masks and makes those that agree. Returns the result of the training if it was stopped.
+/// Trains without masks and makes masks with matching ids. Returns the result of the training if it was stopped.
 fn masks(
     args: &TrainArgs,
     network: &Path,
     (plain, agreed): (&Path, &PathBuf),
     context: &Context,
 ) -> Result<Option<Summary>> {
-    let make = MakeArgs::new(&args.scene, network, args.output.join(MASKS), args.how.files.clone());
-    // What cannot be used fails before hours of training.
+    let make = MakeArgs::new(&args.scene, network, args.output.join(MASKS_FOLDER), args.how.files.clone());
+    // An unusable network fails here, before hours of training.
     make::opened(&make)?;
-    // Those of an earlier run would be taken for ours after a kill.
+    // After a kill, masks of an earlier run would be mistaken for masks of this run.
     if agreed.is_dir() {
         std::fs::remove_dir_all(agreed).map_err(Error::write(agreed))?;
     }
@@ -62,7 +62,7 @@ fn masks(
     if summary.stopped {
         return Ok(Some(summary));
     }
-    // Nothing is lost from here on: what is there is used again.
+    // From here, a signal loses nothing: existing files are used again.
     signals::end_at_once()?;
     let poses = Settings::for_model(plain)?.map(|settings| settings.read.poses);
     let read = ReadArgs { poses, ..make.read.clone() };
