@@ -3,9 +3,9 @@
 import { add, cross, dot, length, looking, orthonormal, scale, sub, toWorld, turned, unit } from "./algebra.js";
 
 /** Closest to straight up or down that turning goes, radians. */
-const POLE = 0.03;
+const POLE_ANGLE_MIN = 0.03;
 /** Field of view where no view gives one: focal length in heights of the picture. */
-const FOCAL = 1.0;
+const FOCAL_IN_HEIGHTS = 1.0;
 
 export class Rig {
   constructor() {
@@ -18,7 +18,7 @@ export class Rig {
     this.centre = [0, 0, -3];
     this.pivot = [0, 0, 0];
     // Focal lengths and offset of the principal point, in heights of the picture.
-    this.focal = [FOCAL, FOCAL];
+    this.focal = [FOCAL_IN_HEIGHTS, FOCAL_IN_HEIGHTS];
     this.offset = [0, 0];
     this.size = [640, 480];
     this.speed = 1;
@@ -41,7 +41,7 @@ export class Rig {
     if (this.views.length > 0) return this.snap(Math.max(first, 0));
     const side = unit(cross(this.up, Math.abs(this.up[0]) < 0.9 ? [1, 0, 0] : [0, 0, 1]));
     const away = unit(this.from ?? add(add(side, scale(cross(side, this.up), 0.4)), scale(this.up, 0.35)));
-    const focal = FOCAL * Math.min(1, this.size[0] / this.size[1]);
+    const focal = FOCAL_IN_HEIGHTS * Math.min(1, this.size[0] / this.size[1]);
     this.view = null;
     this.focal = [focal, focal];
     this.offset = [0, 0];
@@ -87,7 +87,7 @@ export class Rig {
     const arm = sub(this.centre, about);
     // Up and down end before the poles, where left and right would swap.
     const tilt = Math.acos(Math.max(-1, Math.min(1, dot(this.rows[2], this.up))));
-    const pitch = Math.max(tilt - Math.PI + POLE, Math.min(tilt - POLE, -down));
+    const pitch = Math.max(tilt - Math.PI + POLE_ANGLE_MIN, Math.min(tilt - POLE_ANGLE_MIN, -down));
     const side = this.rows[0];
     const turn = (v) => turned(turned(v, side, pitch), this.up, -right);
     this.rows = orthonormal(this.rows.map(turn));

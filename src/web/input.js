@@ -1,18 +1,18 @@
 // Mouse, touch and keys on the picture.
 
 /** Radians per pixel of a drag. */
-const TURN = 0.0055;
+const RADIANS_PER_PIXEL = 0.0055;
 /** Pixels that a click may move. */
-const CLICK = 4;
+const CLICK_MOTION_MAX = 4;
 /** Milliseconds that a click waits for a second one. */
-const DOUBLE = 280;
+const DOUBLE_CLICK_MS = 280;
 
 /** Keys that move, by their place on the keyboard: right, down, forward. */
-const MOVES = {
+const MOVE_KEYS = {
   KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyQ: [0, 1, 0], KeyE: [0, -1, 0],
 };
 /** Keys that turn: right and down. */
-const TURNS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const TURN_KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export class Input {
   /**
@@ -59,7 +59,7 @@ export class Input {
     const now = this.at(event);
     const [dx, dy] = [now[0] - last[0], now[1] - last[1]];
     this.moved += Math.hypot(dx, dy);
-    if (this.moved <= CLICK) return;
+    if (this.moved <= CLICK_MOTION_MAX) return;
     this.pointers.set(event.pointerId, now);
     this.stage.box.classList.add("dragging");
     this.actions.moved?.();
@@ -73,7 +73,7 @@ export class Input {
       const ratio = this.rig.size[1] / this.stage.box.clientHeight;
       this.rig.pan(dx * ratio, dy * ratio);
     } else {
-      this.rig.orbit(dx * TURN, dy * TURN, this.isFlight);
+      this.rig.orbit(dx * RADIANS_PER_PIXEL, dy * RADIANS_PER_PIXEL, this.isFlight);
     }
     this.stage.change(true);
   }
@@ -98,14 +98,14 @@ export class Input {
     if (!this.pointers.delete(event.pointerId)) return;
     this.stage.box.classList.remove("dragging");
     if (this.isBoxed) return this.endTool(event.type === "pointercancel" ? null : this.at(event), event);
-    if (this.tool && event.type !== "pointercancel" && this.moved <= CLICK && event.button !== 1) {
+    if (this.tool && event.type !== "pointercancel" && this.moved <= CLICK_MOTION_MAX && event.button !== 1) {
       return this.tool.click(this.at(event), event.button === 0, event);
     }
-    if (event.type === "pointercancel" || this.moved > CLICK || event.button !== 0) return;
+    if (event.type === "pointercancel" || this.moved > CLICK_MOTION_MAX || event.button !== 0) return;
     const at = this.at(event);
     // Of the hand, not of the picture that a slow machine drew in between.
     const now = event.timeStamp;
-    if (this.last && now - this.last.when < DOUBLE && Math.hypot(at[0] - this.last.at[0], at[1] - this.last.at[1]) < 6) {
+    if (this.last && now - this.last.when < DOUBLE_CLICK_MS && Math.hypot(at[0] - this.last.at[0], at[1] - this.last.at[1]) < 6) {
       this.last = null;
       return this.actions.pivot(at);
     }
@@ -128,10 +128,10 @@ export class Input {
     const isText = target.matches?.("input:not([type=range]):not([type=color]), textarea, select");
     if (isText || document.querySelector("dialog[open]")) return;
     const isCommand = event.ctrlKey || event.metaKey;
-    const isArrow = event.code in TURNS;
+    const isArrow = event.code in TURN_KEYS;
     // Arrows belong to lists and bars that have the focus; movement to everything else.
     const isOnPicture = target === document.body || target === this.stage.box;
-    if (!isCommand && (event.code in MOVES || (isArrow && isOnPicture))) {
+    if (!isCommand && (event.code in MOVE_KEYS || (isArrow && isOnPicture))) {
       event.preventDefault();
       if (!this.held.has(event.code)) {
         this.held.add(event.code);
@@ -162,8 +162,8 @@ export class Input {
       const seconds = Math.min((now - last) / 1000, 0.1);
       const pace = (this.modifiers?.shiftKey ? 4 : 1) * (this.modifiers?.altKey ? 0.25 : 1);
       const sum = (table) => [...this.held].filter((code) => code in table).map((code) => table[code]);
-      for (const move of sum(MOVES)) this.rig.fly(move.map((part) => part * pace), seconds);
-      for (const [right, down] of sum(TURNS)) this.rig.orbit(right * seconds * 1.4 * pace, down * seconds * 1.4 * pace, this.isFlight);
+      for (const move of sum(MOVE_KEYS)) this.rig.fly(move.map((part) => part * pace), seconds);
+      for (const [right, down] of sum(TURN_KEYS)) this.rig.orbit(right * seconds * 1.4 * pace, down * seconds * 1.4 * pace, this.isFlight);
       this.stage.change(true);
       this.run(now);
     });

@@ -1,9 +1,9 @@
 // The model in the page: an SPZ of version 3, as a texture of whole numbers.
 
 const MAGIC = 0x5053474e;
-const LABELS = 0x4c470001;
+const LABELS_EXTENSION = 0x4c470001;
 // Texels of a Gaussian: place and label; covariance, colour and opacity; harmonics.
-const TEXELS = 3;
+const TEXELS_PER_GAUSSIAN = 3;
 const TEXELS_OF_HARMONICS = 3;
 
 async function unpacked(bytes, kind) {
@@ -21,7 +21,7 @@ async function labelsOf(file, at, count) {
   const view = new DataView(file.buffer, file.byteOffset);
   while (at + 8 <= file.length) {
     const [kind, length] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
-    if (kind === LABELS) {
+    if (kind === LABELS_EXTENSION) {
       const [width, size] = [file[at + 16], view.getUint32(at + 20, true)];
       const packed = file.subarray(at + 24, at + 24 + size);
       const ids = await unpacked(packed, 'deflate');
@@ -75,7 +75,7 @@ async function decode(text, rowOf, texelsMax) {
   });
   const ids = await labelsOf(file, end, count);
 
-  const stride = TEXELS + (bands > 0 ? TEXELS_OF_HARMONICS : 0);
+  const stride = TEXELS_PER_GAUSSIAN + (bands > 0 ? TEXELS_OF_HARMONICS : 0);
   const width = Math.floor(texelsMax / stride) * stride;
   const height = Math.ceil((count * stride) / width);
   const words = new Uint32Array(width * height * 4);

@@ -1,7 +1,7 @@
 // Draws the model: sorts the Gaussians by depth and blends them from back to front.
 
-const BUCKETS = 65536;
-const NEAR = 0.01;
+const SORT_BUCKETS = 65536;
+const NEAR_PLANE = 0.01;
 // How the Gaussians of a label look.
 const LOOK = { hidden: 0, shown: 1, tinted: 2, dim: 3 };
 
@@ -87,19 +87,19 @@ class Picture {
     let [low, high] = [Infinity, -Infinity];
     for (let row = 0; row < count; row++) {
       let depth = forward[0] * positions[3 * row] + forward[1] * positions[3 * row + 1] + forward[2] * positions[3 * row + 2] + shift[2];
-      if (depth < NEAR || this.hidden[rows[row]]) depth = -1;
+      if (depth < NEAR_PLANE || this.hidden[rows[row]]) depth = -1;
       else {
         low = Math.min(low, depth);
         high = Math.max(high, depth);
       }
       this.depths[row] = depth;
     }
-    const scale = (BUCKETS - 1) / Math.max(high - low, 1e-9);
-    const ends = new Uint32Array(BUCKETS + 1);
+    const scale = (SORT_BUCKETS - 1) / Math.max(high - low, 1e-9);
+    const ends = new Uint32Array(SORT_BUCKETS + 1);
     const bucket = (depth) => Math.floor((high - depth) * scale);
     let shown = 0;
     for (const depth of this.depths) if (depth >= 0) { ends[bucket(depth) + 1]++; shown++; }
-    for (let at = 1; at <= BUCKETS; at++) ends[at] += ends[at - 1];
+    for (let at = 1; at <= SORT_BUCKETS; at++) ends[at] += ends[at - 1];
     this.depths.forEach((depth, row) => { if (depth >= 0) this.sorted[ends[bucket(depth)]++] = row; });
     this.shown = shown;
     this.gl.bufferData(this.gl.ARRAY_BUFFER, this.sorted.subarray(0, shown), this.gl.STREAM_DRAW);

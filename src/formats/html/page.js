@@ -1,6 +1,6 @@
 // The page: labels and the first camera.
 
-const FLIP = [1, -1, -1]; // between the axes of scenes (x right, y down, z forward) and those of the SPZ
+const SPZ_AXIS_SIGNS = [1, -1, -1]; // between the axes of scenes (x right, y down, z forward) and those of the SPZ
 const middle = (values) => values.sort()[values.length >> 1];
 
 // A camera that sees the model, upright: from where the first photo was taken, but no farther than a small model needs.
@@ -21,16 +21,16 @@ function rigOf(positions, { view }, size) {
 // A camera of `labelgs render --camera` in the axes of the model.
 function cameraOf(text) {
   const { w2c, ...lens } = JSON.parse(text);
-  const rows = w2c.slice(0, 3).map((row) => [...FLIP.map((sign, axis) => sign * row[axis]), row[3] + dot(row, about.origin)]);
+  const rows = w2c.slice(0, 3).map((row) => [...SPZ_AXIS_SIGNS.map((sign, axis) => sign * row[axis]), row[3] + dot(row, about.origin)]);
   const numbers = [...rows.flat(), ...['fx', 'fy', 'cx', 'cy', 'W', 'H'].map((name) => lens[name])];
   if (!numbers.every(Number.isFinite)) throw new Error('not a camera');
   return { w2c: rows, ...lens };
 }
 
 // The widest lens that a tall window gets, which would see past the ends of most scenes: focal length in heights.
-const TALL = 0.7;
+const TALL_FOCAL_MIN = 0.7;
 // Behind an object that is shown alone, so that a dark one is seen too.
-const GROUND = [0.16, 0.17, 0.19];
+const SOLO_BACKGROUND = [0.16, 0.17, 0.19];
 
 const byId = (id) => document.getElementById(id);
 const about = JSON.parse(byId('about').textContent);
@@ -68,7 +68,7 @@ async function start() {
     const { w2c, fx, fy, cx, cy, W, H } = rig.file();
     const rows = w2c.slice(0, 3);
     const camera = { turn: rows.map((row) => row.slice(0, 3)), shift: rows.map((row) => row[3]), lens: [fx, fy, cx, cy], size: [W, H] };
-    picture.draw({ ...camera, ground: isAlone ? GROUND : [0, 0, 0] });
+    picture.draw({ ...camera, ground: isAlone ? SOLO_BACKGROUND : [0, 0, 0] });
   }
   function ask() {
     if (asked) return;
@@ -147,7 +147,7 @@ async function start() {
   function home() {
     rig.home();
     // A tall window shows less at the sides instead of nothing above and below.
-    if (rig.view === null) rig.focal = rig.focal.map((focal) => Math.max(focal, TALL));
+    if (rig.view === null) rig.focal = rig.focal.map((focal) => Math.max(focal, TALL_FOCAL_MIN));
     ask();
   }
   function fromAddress() {

@@ -1,10 +1,10 @@
 // Which object is seen at a point of the picture.
 
 // Light that gets past the Gaussians where nothing was hit, and where the rest no longer counts.
-const MISSED = 0.5;
-const DARK = 0.01;
+const MISSED_LIGHT_MIN = 0.5;
+const LIGHT_MIN = 0.01;
 // Square of the reach of an opaque Gaussian, in standard deviations.
-const REACH = 2 * Math.log(255);
+const REACH_SQUARED = 2 * Math.log(255);
 
 // Inverse covariance of a Gaussian in the picture, as the shader has it: [xx, xy, yy]. Its numbers begin at `base`, its
 // centre is at `p` of the camera.
@@ -32,7 +32,7 @@ function picked({ model, camera, sorted, shown }, [x, y]) {
   const along = (axis, at) => turn[axis][0] * positions[at] + turn[axis][1] * positions[at + 1] + turn[axis][2] * positions[at + 2] + shift[axis];
   const weights = new Map();
   let light = 1;
-  for (let place = shown - 1; place >= 0 && light > DARK; place--) {
+  for (let place = shown - 1; place >= 0 && light > LIGHT_MIN; place--) {
     const row = sorted[place];
     const [right, down, ahead] = [along(0, 3 * row), along(1, 3 * row), along(2, 3 * row)];
     const dx = (lens[0] * right) / ahead + lens[2] - x;
@@ -41,7 +41,7 @@ function picked({ model, camera, sorted, shown }, [x, y]) {
     const base = row * stride * 4;
     const sizes = numbers[base + 4] + numbers[base + 7] + numbers[base + 9];
     const zoom = (Math.max(lens[0], lens[1]) / ahead) ** 2 * (1 + (right * right + down * down) / (ahead * ahead));
-    if (dx * dx + dy * dy > REACH * (0.3 + zoom * sizes)) continue;
+    if (dx * dx + dy * dy > REACH_SQUARED * (0.3 + zoom * sizes)) continue;
     const [xx, xy, yy] = flattened(numbers, base + 4, camera, [right, down, ahead]);
     const fall = Math.exp(-0.5 * (xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy));
     const alpha = Math.min(0.99, (octets[4 * base + 43] / 255) * fall);
@@ -49,6 +49,6 @@ function picked({ model, camera, sorted, shown }, [x, y]) {
     weights.set(rows[row], (weights.get(rows[row]) ?? 0) + light * alpha);
     light *= 1 - alpha;
   }
-  if (light > MISSED) return null;
+  if (light > MISSED_LIGHT_MIN) return null;
   return [...weights].reduce((best, one) => (one[1] > best[1] ? one : best))[0];
 }

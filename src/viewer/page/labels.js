@@ -2,9 +2,9 @@
 
 import { $, counted, el, icon, number, toast } from "./dom.js";
 
-const EYE = ["M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8Z", "M8 6a2 2 0 1 0 0 4 2 2 0 0 0 0-4Z"];
-const SHUT = ["M1.5 8S4 12.5 8 12.5 14.5 8 14.5 8", "M4 11.2 3 13", "M8 12.5v2", "M12 11.2l1 1.8"];
-const SOLO = ["M8 2.5a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11Z", "M8 6.5a1.5 1.5 0 1 0 0 3 1.5 1.5 0 0 0 0-3Z"];
+const EYE_PATHS = ["M1.5 8S4 3.5 8 3.5 14.5 8 14.5 8 12 12.5 8 12.5 1.5 8 1.5 8Z", "M8 6a2 2 0 1 0 0 4 2 2 0 0 0 0-4Z"];
+const CLOSED_EYE_PATHS = ["M1.5 8S4 12.5 8 12.5 14.5 8 14.5 8", "M4 11.2 3 13", "M8 12.5v2", "M12 11.2l1 1.8"];
+const SOLO_PATHS = ["M8 2.5a5.5 5.5 0 1 0 0 11 5.5 5.5 0 0 0 0-11Z", "M8 6.5a1.5 1.5 0 1 0 0 3 1.5 1.5 0 0 0 0-3Z"];
 
 export class Labels {
   constructor(link, changed) {
@@ -137,8 +137,8 @@ export class Labels {
     }, icon(...shape));
     const item = el("li", { className: isVisible ? "label" : "label off", tabIndex: -1, role: "option" },
       swatch, name, el("span", { className: "id", textContent: row.id === 0 ? "" : row.id }),
-      button("eye", isVisible ? EYE : SHUT, isVisible ? "Hide" : "Show", false),
-      button("solo", SOLO, "Show only this", this.solo.includes(row.id)), facts);
+      button("eye", isVisible ? EYE_PATHS : CLOSED_EYE_PATHS, isVisible ? "Hide" : "Show", false),
+      button("solo", SOLO_PATHS, "Show only this", this.solo.includes(row.id)), facts);
     item.dataset.id = row.id;
     return item;
   }

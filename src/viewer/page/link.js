@@ -1,9 +1,9 @@
 // The connection to the server: requests, frames, and what happens when it goes away.
 
 /** Bytes of a frame's header. */
-const HEADER = 36;
+const HEADER_BYTES = 36;
 /** Milliseconds between two signs of life. */
-const ALIVE = 20000;
+const ALIVE_INTERVAL_MS = 20000;
 
 export class Link {
   /** `hear` gets the messages by kind; `draw` a frame, and returns a promise that ends when it is drawn. */
@@ -14,7 +14,7 @@ export class Link {
     this.seq = 0;
     this.socket = null;
     this.isOver = false;
-    setInterval(() => this.send({ kind: "alive" }), ALIVE);
+    setInterval(() => this.send({ kind: "alive" }), ALIVE_INTERVAL_MS);
     this.open();
   }
 
@@ -79,7 +79,7 @@ export class Link {
     const words = new DataView(data);
     const word = (index) => words.getUint32(4 * index, true);
     const frame = { seq: word(1), step: word(2), width: word(3), height: word(4), ms: word(5) / 1000, exact: (word(6) & 1) === 1, mapped: (word(6) & 2) === 2, depths: [words.getFloat32(28, true), words.getFloat32(32, true)], blobs: [] };
-    let at = HEADER;
+    let at = HEADER_BYTES;
     for (let index = 0; index < word(6) >> 2; index += 1) {
       const size = words.getUint32(at, true);
       frame.blobs.push(new Blob([new Uint8Array(data, at + 4, size)]));

@@ -326,7 +326,7 @@ document.addEventListener("drop", (event) => {
   if (file && !scene?.training) open(file).catch(() => toast("Could not upload the file.", true));
 });
 
-const KEYS = [
+const KEY_HELP = [
   ["Drag", "rotate around the pivot, or look around in fly mode"], ["Right, middle or Shift+drag", "pan"], ["Wheel", "zoom"],
   ["Double click", "set the pivot at this point"], ["Click, .", "select the object under the pointer, or in the centre; Shift adds, Ctrl removes"],
   ["W A S D, Q E", "move; Shift fast, Alt slow"], ["Arrows", "rotate"], ["V", "switch between orbit and fly"], ["F, Shift+F", "zoom to the selection, reset the camera"],
@@ -338,15 +338,15 @@ const KEYS = [
   ["P, hold Space", "wipe to the photo, show the photo"], ["H, Shift+H, I", "hide the selection, show all, show only the selection"], ["F2, M", "rename, merge"], ["Delete, Shift+Delete", "remove, remove and fill"],
   ["Ctrl+A, Ctrl+Shift+A, Ctrl+I", "select all, select none, invert"], ["Ctrl+E, Ctrl+S", "export, save"], ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["Esc", "cancel, clear, show all"], ["C", "copy the camera"], ["K", "pause or resume training"],
 ];
-$("help-keys").append(...KEYS.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
+$("help-keys").append(...KEY_HELP.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
 
 /** Pictures with a button of their own. */
-const COMMON = 4;
+const PANE_BUTTONS = 4;
 const option = ([value, textContent]) => el("option", { value, textContent });
 $("pane-b").append(...PANES.map(option));
-$("pane-more").append(el("option", { value: "", textContent: "More", disabled: true, hidden: true }), ...PANES.slice(COMMON).map(option));
+$("pane-more").append(el("option", { value: "", textContent: "More", disabled: true, hidden: true }), ...PANES.slice(PANE_BUTTONS).map(option));
 $("pane-more").addEventListener("change", (event) => setPane(0, event.target.value));
-for (const [index, [value, name]] of PANES.slice(0, COMMON).entries()) {
+for (const [index, [value, name]] of PANES.slice(0, PANE_BUTTONS).entries()) {
   const button = el("button", { type: "button", value, textContent: name, title: `${name} (${index + 1})` });
   button.addEventListener("click", () => setPane(0, value));
   $("pane-a").append(button);

@@ -1,8 +1,8 @@
 // The labels of the picture's pixels: which one is where, and lines around them.
 
 /** Colours of a line around what is selected, and of what is below the pointer, as little-endian RGBA. */
-const LINE = 0xff3dc4ff;
-const GLOW = 0x38ffffff;
+const OUTLINE_RGBA = 0xff3dc4ff;
+const HOVER_RGBA = 0x38ffffff;
 
 export class LabelMap {
   /** Takes the labels of a picture whose channels are their bytes. */
@@ -39,14 +39,14 @@ export class LabelMap {
     };
     for (let y = 0, at = 0; y < height; y += 1) {
       for (let x = 0; x < width; x += 1, at += 1) {
-        if (ids[at] === hovered) pixels[at] = GLOW;
+        if (ids[at] === hovered) pixels[at] = HOVER_RGBA;
         if (isMarked.size === 0 || !inside(at)) continue;
         const id = ids[at];
         const isEdge = x < thick || y < thick || x >= width - thick || y >= height - thick
           || (ids[at - thick] !== id && !isMarked.has(ids[at - thick])) || (ids[at + thick] !== id && !isMarked.has(ids[at + thick]))
           || (ids[at - thick * width] !== id && !isMarked.has(ids[at - thick * width]))
           || (ids[at + thick * width] !== id && !isMarked.has(ids[at + thick * width]));
-        if (isEdge) pixels[at] = LINE;
+        if (isEdge) pixels[at] = OUTLINE_RGBA;
       }
     }
     const canvas = new OffscreenCanvas(width, height);

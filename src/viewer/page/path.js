@@ -4,8 +4,8 @@ import { $, el, toast } from "./dom.js";
 import { add, length, orthonormal, scale, sub } from "/algebra.js";
 
 /** Seconds from a keyframe to the next one. */
-const STEP = 2;
-const FPS = 30;
+const SECONDS_PER_KEYFRAME = 2;
+const FRAMES_PER_SECOND = 30;
 
 export class CameraPath {
   /** `moved` is called when the camera has moved. */
@@ -44,7 +44,7 @@ export class CameraPath {
     if (this.playing !== null || this.frames.length < 2) return this.stop();
     const start = performance.now();
     const turn = (now) => {
-      const at = (now - start) / 1000 / STEP;
+      const at = (now - start) / 1000 / SECONDS_PER_KEYFRAME;
       this.show(this.at(Math.min(at, this.frames.length - 1)));
       this.playing = at < this.frames.length - 1 ? requestAnimationFrame(turn) : null;
       this.render();
@@ -75,8 +75,8 @@ export class CameraPath {
 
   save() {
     if (this.frames.length === 0) return;
-    const keyframes = this.frames.map(({ file }, index) => ({ time: index * STEP, camera: file }));
-    const text = JSON.stringify({ schema_version: 1, fps: FPS, keyframes });
+    const keyframes = this.frames.map(({ file }, index) => ({ time: index * SECONDS_PER_KEYFRAME, camera: file }));
+    const text = JSON.stringify({ schema_version: 1, fps: FRAMES_PER_SECOND, keyframes });
     const href = URL.createObjectURL(new Blob([text], { type: "application/json" }));
     const link = el("a", { href, download: "camera-path.json" });
     document.body.append(link);

@@ -7,14 +7,14 @@ export const PANES = [
   ["colour", "Colour"], ["labels", "Labels"], ["tinted", "Labels over colour"], ["depth", "Depth"],
   ["opacity", "Opacity"], ["confidence", "Confidence"], ["error", "Error against photo"],
 ];
-const NAMES = Object.fromEntries(PANES);
+const PANE_NAMES = Object.fromEntries(PANES);
 
 /** Milliseconds after the last motion until the exact picture is asked for. */
-const STILL = 160;
+const STILL_AFTER_MS = 160;
 /** Milliseconds between two pictures of a training that the camera rests on. */
-const FRESH = 900;
+const REFRESH_INTERVAL_MS = 900;
 /** Most pixels of a picture. */
-const PIXELS = 8e6;
+const PIXELS_MAX = 8e6;
 
 export class Stage {
   constructor(rig) {
@@ -87,7 +87,7 @@ export class Stage {
     this.canvas.height = Math.max(1, Math.round(clientHeight * ratio));
     const columns = this.isPair ? 2 : 1;
     const size = [Math.max(2, Math.floor(this.canvas.width / columns)), Math.max(2, this.canvas.height)];
-    const shrink = Math.min(1, Math.sqrt(PIXELS / (size[0] * size[1])));
+    const shrink = Math.min(1, Math.sqrt(PIXELS_MAX / (size[0] * size[1])));
     this.rig.size = size.map((side) => Math.max(1, Math.floor(side * shrink)));
     this.paint();
     this.change();
@@ -135,7 +135,7 @@ export class Stage {
 
   tick(now) {
     if (!this.link?.isOpen || this.canvas.width < 2) return;
-    const isMoving = now - this.moved < STILL;
+    const isMoving = now - this.moved < STILL_AFTER_MS;
     if (this.isDirty) {
       this.isDirty = false;
       this.ask(isMoving);
@@ -143,7 +143,7 @@ export class Stage {
     } else if (!this.isStill && !isMoving) {
       this.isStill = true;
       this.ask(false);
-    } else if (this.isTraining && this.isStill && !document.hidden && this.asked === null && now - this.drawn > FRESH) {
+    } else if (this.isTraining && this.isStill && !document.hidden && this.asked === null && now - this.drawn > REFRESH_INTERVAL_MS) {
       this.ask(false);
     }
   }
@@ -253,12 +253,12 @@ export class Stage {
   }
 
   captions() {
-    const [first, second] = this.panes.map((pane) => NAMES[pane]);
+    const [first, second] = this.panes.map((pane) => PANE_NAMES[pane]);
     const isTwo = (this.layout !== "one" && this.photo === "off") || this.photo === "wipe";
     const shown = this.photo === "error" ? "error" : this.panes[0];
     $("tag-b").hidden = !isTwo;
     $("tag-b").textContent = this.photo === "wipe" ? "Photo" : second;
-    $("tag-a").textContent = this.photo === "switch" || this.isPhotoHeld ? "Photo" : this.photo === "error" ? NAMES.error : isTwo ? first : "";
+    $("tag-a").textContent = this.photo === "switch" || this.isPhotoHeld ? "Photo" : this.photo === "error" ? PANE_NAMES.error : isTwo ? first : "";
     choose({ one: $("layout-one"), wipe: $("layout-wipe"), pair: $("layout-pair") }, this.layout);
     choose({ off: $("photo-off"), wipe: $("photo-wipe"), switch: $("photo-switch"), error: $("photo-error") }, this.photo);
     choose(Object.fromEntries([...$("pane-a").children].map((button) => [button.value, button])), shown);
