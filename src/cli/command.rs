@@ -67,7 +67,7 @@ pub enum Command {
     Remove(extract_remove::RemoveArgs),
     /// Render images, depth or label maps of a model or of some of its objects.
     ///
-    /// Example: labelgs render out --scene scene --only 3 -o pictures
+    /// Example: labelgs render out --scene scene --only 3 -o images
     Render(render::RenderArgs),
     /// Rewrite the report of a run, or compare several runs on one page.
     ///
@@ -217,7 +217,7 @@ impl Command {
 /// Commands for developers of the engine: the help lists them under a heading of their own.
 const DEVELOPER_COMMANDS: [&str; 4] = ["selftest", "plan", "kernels", "profile"];
 
-/// What `--version` prints; clap wants it to last.
+/// Text of `--version`; clap needs a static string.
 static VERSION: LazyLock<String> = LazyLock::new(version::text);
 
 /// Returns the command line with the defaults of training in its help, and commit and features in its `--version`.

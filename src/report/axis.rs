@@ -2,7 +2,7 @@
 
 use super::text::count;
 
-/// How values become places.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// In proportion.

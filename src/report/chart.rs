@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 /// Colours of the style sheet.
 const COLOUR_COUNT: usize = 8;
-/// Most points of a curve that are drawn as dots too.
+/// Maximum number of points of a curve to draw dots for.
 const DOTS_MAX: usize = 24;
 
 /// Returns the class of a colour.
@@ -21,7 +21,7 @@ pub fn colour_class(colour: usize) -> String {
 pub struct Mark {
     /// Step.
     pub step: f64,
-    /// What happened.
+    /// Text of the event.
     pub text: String,
     /// Number of a run's colour if it is of one of several runs.
     pub colour: Option<usize>,
@@ -49,7 +49,7 @@ impl Digits {
     }
 }
 
-/// A picture of curves.
+/// An image of curves.
 #[derive(Clone, Debug, Default)]
 pub struct Chart {
     /// Title.
@@ -60,11 +60,11 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Events, by rising step. Their numbers are their places, from 1 on.
     pub marks: Vec<Mark>,
-    /// Says what the numbers of the events mean.
+    /// Adds a legend of the numbered events.
     pub has_legend: bool,
     /// The axis of the values.
     pub scale: Scale,
-    /// Least length of a linear axis, so that small changes look small.
+    /// Minimum range of a linear axis, so that small changes look small.
     pub least_span: f64,
     /// Largest possible value.
     pub ceiling: Option<f64>,
@@ -121,7 +121,7 @@ impl Chart {
         }
         let low = if self.scale == Scale::FromZero { low.min(0.0) } else { low };
         let room = 0.5 * (self.least_span - (high - low)).max(0.0);
-        // What is above the ceiling is moved below.
+        // A range above the ceiling is moved below it.
         let over = self.ceiling.map_or(0.0, |ceiling| (high + room - ceiling.max(high)).max(0.0));
         Axis::new(low - room - over, high + room - over, true)
     }
@@ -179,7 +179,7 @@ fn line(mark: &Mark, number: usize, x: &Axis) -> Markup {
     }
 }
 
-/// What the numbers of the events mean.
+/// The legend of the numbered events.
 fn legend(marks: &[Mark], x: &Axis) -> Markup {
     html! {
         @if marks.iter().any(|mark| is_inside(mark, x)) {

@@ -1,9 +1,9 @@
-//! Pictures of one view: side by side, or one over the other with a border that is drawn over them.
+//! Images of one view: side by side, or one over the other with a border that is drawn over them.
 
 use labelgs_scene::colour::{HEAT_COLOURS, HEAT_MAX};
 use maud::{Markup, html};
 
-/// A picture: its name, and its address inside or beside the page.
+/// An image: its name, and its address inside or beside the page.
 #[derive(Clone, Debug)]
 pub struct Panel {
     /// What it shows.
@@ -14,7 +14,7 @@ pub struct Panel {
     pub is_heat: bool,
 }
 
-/// The pictures of one view.
+/// The images of one view.
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
     /// Name of the view.
@@ -25,9 +25,9 @@ pub struct Figure {
     pub numbers: Vec<(String, String)>,
     /// A note, such as the reason for a missing prediction.
     pub note: String,
-    /// Pictures of one size. The page can lay the others over the first.
+    /// Images of one size. The page can lay the others over the first.
     pub panels: Vec<Panel>,
-    /// Pictures that are shown on demand.
+    /// Images that are shown on demand.
     pub more: Vec<Panel>,
     /// The first figure of a page is large.
     pub is_large: bool,
@@ -65,7 +65,7 @@ impl Figure {
     }
 }
 
-/// Returns the names of pictures as one text.
+/// Returns the names of images as one text.
 fn names(panels: &[Panel]) -> String {
     panels.iter().map(|panel| panel.name.as_str()).collect::<Vec<_>>().join(" and ")
 }

@@ -1,4 +1,4 @@
-//! Pixels of the pictures that pages show, and small encoded copies of them.
+//! Pixels of the images that pages show, and small encoded copies of them.
 
 use image::imageops::{FilterType, resize};
 use image::{ImageFormat, RgbImage};
@@ -8,7 +8,7 @@ use labelgs_scene::colour::{HEAT_COLOURS, HEAT_MAX, colour_on_scale};
 use labelgs_scene::{Error, Photo, Result};
 use std::io::Cursor;
 
-/// Longest side of a picture inside a page, px.
+/// Longest side of an image inside a page, px.
 pub const PANEL_SIDE_MAX: u32 = 800;
 const JPEG_QUALITY: u8 = 85;
 
@@ -26,7 +26,7 @@ pub fn heat(photo: &Photo, rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
 /// How a small copy is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Smooth pictures: JPEG.
+    /// Smooth images: JPEG.
     Smooth,
     /// Maps of few colours with sharp contours: PNG.
     Flat,

@@ -65,7 +65,7 @@ for (const chart of document.querySelectorAll("figure.chart")) {
     plot.classList.remove("pointed");
   });
 }
-// Lays one picture of a view over the first; the border between them follows the pointer or the arrow keys.
+// Lays one image of a view over the first; the border between them follows the pointer or the arrow keys.
 for (const view of document.querySelectorAll("figure.view")) {
   const stage = view.querySelector(".panels");
   const panels = [...stage.querySelectorAll(".panel")];

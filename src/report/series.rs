@@ -1,6 +1,6 @@
 //! A curve, thinned so that its spikes stay.
 
-/// Most points of a drawn curve.
+/// Maximum number of points of a drawn curve.
 pub const POINTS_MAX: usize = 600;
 
 /// A named curve.

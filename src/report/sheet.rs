@@ -8,11 +8,11 @@ use labelgs_files::image::png_rgba8;
 use labelgs_scene::{Result, label_colour};
 use maud::html;
 
-/// Side of a picture of a label, px.
+/// Side of an image of a label, px.
 pub const TILE_SIDE: u32 = 192;
-/// Colour behind labels in a picture, between the dark and the bright ones.
+/// Colour behind labels in an image, between the dark and the bright ones.
 const BACKGROUND_GREY: u8 = 150;
-/// Height of the line with the id, and space between pictures, px.
+/// Height of the line with the id, and space between images, px.
 const CAPTION_HEIGHT: u32 = 24;
 const TILE_GAP: u32 = 8;
 /// Size of a dot of a digit, px.
@@ -42,11 +42,11 @@ pub struct Tile {
     pub gaussians: u64,
     /// Its extent along x, y and z, world units.
     pub size: [f64; 3],
-    /// Its picture of [`TILE_SIDE`] x [`TILE_SIDE`] px, row-major: r, g, b and opacity.
+    /// Its image of [`TILE_SIDE`] x [`TILE_SIDE`] px, row-major: r, g, b and opacity.
     pub pixels: Vec<[u8; 4]>,
 }
 
-/// Returns a page of labels, with the pictures inside.
+/// Returns a page of labels, with the images inside.
 pub fn page(title: &str, tiles: &[Tile]) -> Result<String> {
     let picture = |tile: &Tile| -> Result<String> {
         Ok(format!("data:image/png;base64,{}", STANDARD.encode(png_rgba8((TILE_SIDE, TILE_SIDE), &tile.pixels)?)))
@@ -83,7 +83,7 @@ fn extent(size: [f64; 3]) -> String {
     size.map(|side| number(Some(side), 3)).join(" × ")
 }
 
-/// Returns size and pixels of a picture of labels with their ids below, in rows from the left.
+/// Returns size and pixels of an image of labels with their ids below, in rows from the left.
 pub fn picture(tiles: &[Tile]) -> ((u32, u32), Vec<[u8; 3]>) {
     let count = tiles.len().max(1) as u32;
     let across = f64::from(count).sqrt().ceil() as u32;

@@ -1,6 +1,6 @@
 //! Numbers, sizes and times as text: one style for all pages.
 
-/// What stands for a missing number.
+/// Text for a missing number.
 const MISSING_NUMBER: &str = "–";
 
 /// Returns a number with a fixed count of digits, or a dash.

@@ -15,14 +15,14 @@ use std::collections::BTreeSet;
 /// Temporary label of the object of strokes.
 const STROKE_OBJECT_LABEL: u32 = MODEL_LABEL_MAX;
 
-/// What is chosen, and what cannot be.
+/// The selected and the locked Gaussians.
 #[derive(Default)]
 pub(super) struct Selection {
     rows: Vec<bool>,
     locked: Vec<bool>,
     /// The places of the model's Gaussians, once they were asked for.
     nearby: Option<Nearby>,
-    /// What strokes have hit since the last choice of another kind.
+    /// Strokes since the last selection of another kind.
     seeds: Vec<Seed>,
     /// Their cut, with the model that it is of.
     cutting: Option<GraphCut<Box<Gaussians>>>,
@@ -43,7 +43,7 @@ impl Selection {
         Rows::from_mask(&self.rows)
     }
 
-    /// Chooses as a page asks, among what is drawn and not locked.
+    /// Selects as a page asks, among what is drawn and not locked.
     pub(super) fn choose(
         &mut self,
         what: &SelectionChange,
@@ -145,7 +145,7 @@ impl Selection {
     }
 }
 
-/// Returns the main Gaussians of the pixels of a stroke over a full picture.
+/// Returns the main Gaussians of the pixels of a stroke over a full image.
 fn hit(
     from: &Viewpoint,
     (points, radius): (&[[f64; 2]], f64),

@@ -10,10 +10,10 @@ use crate::scene::harmonics::sh0_of;
 use crate::scene::{Camera, Gaussians};
 use std::collections::BTreeSet;
 
-/// Colour of chosen Gaussians, r, g, b, and its share.
+/// Colour of selected Gaussians, r, g, b, and its share.
 const SELECTION_COLOUR: ([f64; 3], f32) = ([1.0, 0.55, 0.05], 0.7);
 
-/// Which labels are drawn.
+/// The choice of visible labels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Visibility {
     /// All but these.
@@ -115,7 +115,7 @@ impl Source for Drawing {
     }
 }
 
-/// A picture of nothing.
+/// An image of nothing.
 fn blank(camera: &Camera, parts: Parts, background: [f32; 3]) -> Render {
     let pixels = camera.width as usize * camera.height as usize;
     let count = |asked: bool| if asked { pixels } else { 0 };

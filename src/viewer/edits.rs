@@ -38,7 +38,7 @@ pub(super) struct Work<'a> {
 struct AppliedEdit {
     edit: Edit,
     told: String,
-    /// What it made, if that took long.
+    /// The resulting model, if the edit took long.
     after: Option<Document>,
 }
 
@@ -133,7 +133,7 @@ impl<'a> Work<'a> {
             None if self.done.is_empty() => (0, self.first.take().ok_or_else(none)?),
             None => (0, self.first.clone().ok_or_else(none)?),
         };
-        // What needs pictures was kept.
+        // Results of edits that need images were kept.
         let mut sights = |_: &Gaussians| Err(Error::Bug("a filled model was not kept".to_owned()));
         for done in &self.done[from..] {
             now = now.apply(&done.edit, &mut sights)?;

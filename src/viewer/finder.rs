@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
-/// A place or a box of a picture.
+/// A place or a box of an image.
 #[derive(Debug)]
 pub(super) enum Spot {
     /// In a photo: a pixel, or the corners of a box, as shares of its width and height.
@@ -21,7 +21,7 @@ pub(super) enum Spot {
     Surface(Vec<DVec3>, DVec3),
 }
 
-/// What a page pointed at.
+/// A click or a box of a page.
 #[derive(Debug)]
 pub(super) enum Pointing {
     /// The object, or what does not belong to it.
@@ -101,7 +101,7 @@ impl Drop for Finder {
     }
 }
 
-/// What the thread works with.
+/// State of the thread.
 struct Work {
     gpu: Arc<Gpu>,
     near: f32,
@@ -109,7 +109,7 @@ struct Work {
     newest: Arc<AtomicU64>,
 }
 
-/// The object that is looked for.
+/// The object that is searched for.
 #[derive(Default)]
 struct SearchTarget {
     hints: Hints,

@@ -25,10 +25,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Time between two looks for work.
+/// Maximum wait for a request.
 const WORK_WAIT_MAX: Duration = Duration::from_millis(200);
 
-/// What is shown.
+/// A finished model to show.
 pub struct FinishedModel<'a> {
     /// The model as it was typed.
     pub path: &'a Path,

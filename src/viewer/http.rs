@@ -19,7 +19,7 @@ const BODY_BYTES_MAX: u64 = 16 << 30;
 const HEAD_BYTES_MAX: usize = 16 << 10;
 const HEADERS_MAX: usize = 64;
 
-/// Nothing is loaded from elsewhere, no script or style of markup is run, and no page frames this one.
+/// Nothing is loaded from other servers, no inline script or style is run, and no page may frame this page.
 const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src \
                       'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -30,7 +30,7 @@ pub(super) struct Head {
     pub(super) path: String,
     pub(super) query: String,
     headers: Vec<(String, String)>,
-    /// What came of the body already.
+    /// The part of the body that was read with the head.
     pub(super) body: Vec<u8>,
 }
 

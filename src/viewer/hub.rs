@@ -11,17 +11,17 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Most pages at a time.
+/// Maximum number of open pages.
 const CLIENTS_MAX: usize = 8;
-/// Most requests other than frames that wait.
+/// Maximum number of waiting requests other than frames.
 const TASKS_MAX: usize = 64;
-/// Most answers that wait for a page to take them.
+/// Maximum number of answers waiting for a page.
 const REPLIES_MAX: usize = 64;
 
 /// Number of a page.
 pub(super) type ClientId = u64;
 
-/// What a writer sends next.
+/// The next message of a writer.
 #[derive(Debug)]
 pub(super) enum Outgoing {
     Text(Arc<str>),
@@ -63,7 +63,7 @@ struct State {
     files: Vec<PathBuf>,
     /// Where models go that pages send; none in a training.
     folder: Option<PathBuf>,
-    /// Pictures of labels, as PNG.
+    /// Images of labels, as PNG.
     portraits: BTreeMap<u32, Arc<[u8]>>,
     is_closing: bool,
 }
@@ -127,7 +127,7 @@ impl Hub {
         self.wake.notify_all();
     }
 
-    /// Waits for work, at most `most`. Pages have turns; everything else comes before pictures.
+    /// Waits for work, at most `most`. Pages have turns; everything else comes before images.
     pub(super) fn next(&self, most: Duration) -> Option<(ClientId, Message)> {
         let end = Instant::now() + most;
         let mut state = self.lock();
@@ -163,7 +163,7 @@ impl Hub {
         !self.lock().clients.is_empty()
     }
 
-    /// Returns true if the line to a page is slow for pictures of so many pixels, each in `target` seconds.
+    /// Returns true if the line to a page is slow for images of so many pixels, each in `target` seconds.
     pub(super) fn is_slow(&self, id: ClientId, pixels: f64, target: f64) -> bool {
         self.lock().clients.get_mut(&id).is_some_and(|client| client.line.is_slow(pixels, target))
     }

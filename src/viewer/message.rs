@@ -1,6 +1,6 @@
 //! The messages between page and server. The page sends JSON; the server answers with JSON and with frames.
 //!
-//! A frame is a header of little-endian numbers and its pictures, each after its length: what a browser decodes by
+//! A frame is a header of little-endian numbers and its images, each after its length: what a browser decodes by
 //! itself, PNG or JPEG.
 
 use super::finder::News;
@@ -12,12 +12,12 @@ use std::path::PathBuf;
 
 /// Largest message of a page, bytes.
 pub(super) const BYTES_MAX: usize = 256 << 10;
-/// Most messages of a page per second, with a reserve of as many.
+/// Maximum number of messages of a page per second; short bursts may have twice as many.
 pub(super) const RATE_MAX: f64 = 240.0;
-/// Most pixels of a picture.
+/// Maximum number of pixels of an image.
 pub(super) const PIXELS_MAX: u64 = 8 << 20;
 
-/// What a picture shows.
+/// The content of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Pane {
@@ -57,19 +57,19 @@ pub(super) struct LookRequest {
     /// Width and height of the image, px, if they differ from the camera's.
     #[serde(default)]
     pub(super) size: Option<[u32; 2]>,
-    /// One or two pictures.
+    /// One or two images.
     pub(super) panes: Vec<Pane>,
-    /// The camera moves: the picture may be smaller than the camera says.
+    /// The camera moves: the image may be smaller than the camera says.
     pub(super) moving: bool,
 }
 
-/// How a page chooses Gaussians.
+/// A change to the selection of Gaussians.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "select", rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum SelectionChange {
-    /// By what is drawn over a picture.
+    /// By what is drawn over an image.
     Draw {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// What is drawn, in its pixels.
         region: Region,
@@ -79,17 +79,17 @@ pub(super) enum SelectionChange {
     },
     /// In a ball around what is at a pixel.
     Ball {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// Column and row.
         pixel: [u32; 2],
-        /// Radius of the ball in the picture, px.
+        /// Radius of the ball in the image, px.
         radius: f64,
         how: Combine,
     },
-    /// What is like the main Gaussian of a pixel, from neighbour to neighbour.
+    /// Connected Gaussians of a colour similar to the main Gaussian of a pixel.
     Flood {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// Column and row.
         pixel: [u32; 2],
@@ -99,7 +99,7 @@ pub(super) enum SelectionChange {
     },
     /// In front of what is at a pixel, or behind.
     Depth {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// Column and row.
         pixel: [u32; 2],
@@ -108,11 +108,11 @@ pub(super) enum SelectionChange {
     },
     /// The object that strokes are on, and others are not.
     Stroke {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// The line, px from the corner of the first pixel.
         points: Vec<[f64; 2]>,
-        /// How far it reaches to each side, px.
+        /// Distance that it reaches to each side, px.
         radius: f64,
         /// It is on the object.
         on: bool,
@@ -127,7 +127,7 @@ pub(super) enum SelectionChange {
     Invert,
     /// Nothing.
     Nothing,
-    /// What is chosen cannot be chosen otherwise any more.
+    /// Protects the selected Gaussians from later selections.
     Lock,
     /// Nothing is locked.
     Unlock,
@@ -139,7 +139,7 @@ pub(super) enum SelectionChange {
 pub(super) struct Export {
     /// These labels; none: everything.
     pub(super) labels: Vec<u32>,
-    /// What is chosen, instead of labels.
+    /// The selected Gaussians, instead of labels.
     #[serde(default)]
     pub(super) chosen: bool,
     /// Name without ending.
@@ -148,13 +148,13 @@ pub(super) struct Export {
     pub(super) format: String,
 }
 
-/// What a page asks of the object that it points at.
+/// A request about the object that a page points at.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(tag = "object", rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum ObjectRequest {
     /// It is at a pixel, or that does not belong to it.
     Click {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// Column and row.
         pixel: [u32; 2],
@@ -163,7 +163,7 @@ pub(super) enum ObjectRequest {
     },
     /// It is in a box.
     Box {
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// First column and row, and the last.
         corners: [u32; 4],
@@ -177,7 +177,7 @@ pub(super) enum ObjectRequest {
     Drop,
 }
 
-/// What a page can ask of a training.
+/// A command for a running training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Command {
@@ -206,7 +206,7 @@ pub(super) enum Message {
     Pick {
         /// Number, for the answer.
         seq: u32,
-        /// Camera of the full picture.
+        /// Camera of the full image.
         from: Viewpoint,
         /// Column and row.
         pixel: [u32; 2],
@@ -216,7 +216,7 @@ pub(super) enum Message {
         /// r, g, b, 0 to 1.
         colour: [f32; 3],
     },
-    /// Which labels are drawn: all but the hidden ones, or only some.
+    /// Sets the visible labels: all except the hidden ones, or only some.
     Show {
         /// Labels that are not drawn.
         hidden: Vec<u32>,
@@ -228,7 +228,7 @@ pub(super) enum Message {
         /// The change.
         what: Edit,
     },
-    /// Chooses Gaussians.
+    /// Selects Gaussians.
     Choose {
         /// How.
         what: SelectionChange,
@@ -282,15 +282,15 @@ pub(super) enum Message {
 pub(super) struct Frame {
     pub(super) seq: u32,
     pub(super) step: u32,
-    /// Size of the pictures, px.
+    /// Size of the images, px.
     pub(super) size: (u32, u32),
-    /// Every pixel of the picture that was asked for, without loss.
+    /// Every pixel of the image that was asked for, without loss.
     pub(super) exact: bool,
     /// Time of the render and of the compression, microseconds.
     pub(super) micros: u32,
-    /// Nearest and farthest depth that a picture of depths shows, world units.
+    /// Nearest and farthest depth that an image of depths shows, world units.
     pub(super) depths: [f32; 2],
-    /// The last picture has the label of each pixel.
+    /// The last image has the label of each pixel.
     pub(super) mapped: bool,
     pub(super) pictures: Vec<Vec<u8>>,
 }

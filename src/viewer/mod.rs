@@ -40,7 +40,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Time for pages to hear that the server ends.
+/// Time for pages to receive the message that the server ends.
 const FAREWELL_TIME_MAX: Duration = Duration::from_millis(500);
 
 /// Where the server listens, and what viewing may cost.

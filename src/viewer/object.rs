@@ -9,7 +9,7 @@ use crate::scene::Gaussians;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Places in a box, along each side, whose surface is carried to a photo.
+/// Points along each side of a box whose surface points are projected into a photo.
 const BOX_SAMPLES_PER_SIDE: u32 = 16;
 
 /// The object, and who looks for it.
@@ -115,7 +115,7 @@ impl Object {
     }
 }
 
-/// Returns what a page points at; `at` finds what is at pixels of a picture.
+/// Returns what a page points at; `at` finds what is at pixels of an image.
 pub(super) fn pointed(
     find: &ObjectRequest,
     at: impl FnOnce(&Viewpoint, &[[u32; 2]]) -> Result<Spot>,

@@ -1,20 +1,20 @@
-//! How large a moving picture may be, and how much of the time of a training viewing may take.
+//! The size of images while the camera moves, and the time that viewing may take from training.
 
 use std::time::Duration;
 
-/// Weight of a frame when the next one comes: about the last twenty count.
+/// Decay of the weight of a frame with each new frame: about the last twenty count.
 const FRAME_DECAY: f64 = 0.95;
-/// Ratio of the widths of two sizes.
+/// Ratio of the widths of two successive sizes.
 const SIZE_RATIO: f64 = 1.12;
-/// Smallest size: a quarter of the width.
+/// Number of smaller sizes, down to a quarter of the width.
 const SIZE_LEVELS_MAX: i32 = 12;
-/// A picture becomes smaller if it is predicted to take longer than this share of the target.
+/// An image becomes smaller if it is predicted to take longer than this share of the target.
 const SHRINK_ABOVE: f64 = 1.25;
-/// A picture becomes larger if the larger one is predicted to take less than this share of the target.
+/// An image becomes larger if the larger one is predicted to take less than this share of the target.
 const GROW_BELOW: f64 = 0.95;
 
 /// A model of the time of a frame, a + b · pixels, and the size that follows from it. Splats are projected and sorted at
-/// any size, so time per pixel alone would shrink the picture further and further.
+/// any size, so time per pixel alone would shrink the image further and further.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pace {
     /// Weighted sums of 1, x, y, x², xy, with x in megapixels and y in seconds.
@@ -45,7 +45,7 @@ impl Pace {
         mean_y + slope * (pixels / 1e6 - mean_x)
     }
 
-    /// Returns the share of the full width and height for a moving picture that should take `target` seconds.
+    /// Returns the share of the full width and height for a moving image that should take `target` seconds.
     pub(super) fn scale(&mut self, full_pixels: f64, target: f64) -> f64 {
         let time = |level: i32| self.predict(full_pixels * side(level) * side(level));
         if time(self.level) > SHRINK_ABOVE * target {
@@ -63,7 +63,7 @@ fn side(level: i32) -> f64 {
     (0..level).fold(1.0, |side, _| side / SIZE_RATIO)
 }
 
-/// The rate of the line to a client, and whether its moving pictures are worth a lossy compression.
+/// The rate of the line to a client, and whether its moving images are worth a lossy compression.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Line {
     /// Bytes per second.
@@ -78,7 +78,7 @@ impl Line {
         self.rate = if self.rate == 0.0 { rate } else { 0.8 * self.rate + 0.2 * rate };
     }
 
-    /// Returns true if a lossless picture of so many pixels would take longer than `target` seconds to arrive.
+    /// Returns true if a lossless image of so many pixels would take longer than `target` seconds to arrive.
     pub(super) fn is_slow(&mut self, pixels: f64, target: f64) -> bool {
         if self.rate > 0.0 {
             // Fast PNGs of photos take about 1.5 bytes per pixel.
@@ -97,7 +97,7 @@ pub(super) struct Budget {
     credit: f64,
 }
 
-/// Most seconds of viewing that a time without viewing saves up.
+/// Maximum time for viewing that accumulates without viewing, s.
 const CREDIT_MAX: f64 = 0.5;
 
 impl Budget {

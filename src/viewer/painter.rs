@@ -21,7 +21,7 @@ use std::time::Instant;
 /// Time of a moving frame, s: on a GPU, and on a CPU.
 const MOVING_FRAME_SECONDS: [f64; 2] = [0.04, 0.08];
 
-/// Longest side of a picture in which the surface is looked up, px.
+/// Longest side of an image in which the surface is looked up, px.
 pub(super) const SURFACE_SIDE_MAX: u32 = 1024;
 
 /// A source of renders.
@@ -34,7 +34,7 @@ pub(super) trait Source {
     fn row(&self, drawn: usize) -> usize {
         drawn
     }
-    /// Largest picture, px, if there is a limit.
+    /// Largest image, px, if there is a limit.
     fn largest(&mut self) -> Option<(u32, u32)>;
     /// Step of the training; 0 for a finished model.
     fn step(&self) -> u32;
@@ -42,7 +42,7 @@ pub(super) trait Source {
 
 /// The surface at a pixel.
 pub(super) struct Surface {
-    /// Camera of the full picture.
+    /// Camera of the full image.
     pub(super) camera: Camera,
     /// In the world.
     pub(super) place: DVec3,
@@ -103,7 +103,7 @@ impl Painter {
         let camera = full.resized(size.0, size.1);
         let is_lossy = look.moving && hub.is_slow(id, pixels(size), self.target);
         let mut parts = pictures::parts(&look.panes);
-        // Clicks on a still picture are answered by the page.
+        // Clicks on a still image are answered by the page.
         parts.labels |= !look.moving;
         let rendered = source.render(&camera, parts)?;
         let compares = look.panes.contains(&Pane::Error);
@@ -128,7 +128,7 @@ impl Painter {
         })
     }
 
-    /// Says what is at a pixel: the label of the label map, and the main Gaussian.
+    /// Reports the label of the label map and the main Gaussian at a pixel.
     pub(super) fn pick(
         &self,
         hub: &Hub,
@@ -167,8 +167,8 @@ impl Painter {
         }))
     }
 
-    /// Renders a full picture, smaller if it has to be or is longer than `longest`, px. Returns its camera and its size as
-    /// shares of the full one.
+    /// Renders a full image, or a smaller one if memory or `longest` (px) require it. Returns its camera and its size
+    /// as shares of the full size.
     pub(super) fn seen(
         &self,
         from: &Viewpoint,
@@ -184,7 +184,7 @@ impl Painter {
         Ok((small, scale, rendered))
     }
 
-    /// Returns what is at a pixel of a full picture. Nothing is an error.
+    /// Returns what is at a pixel of a full image. Nothing is an error.
     pub(super) fn surface(&self, from: &Viewpoint, pixel: [u32; 2], source: &mut dyn Source) -> Result<Surface> {
         let (small, scale, rendered) = self.seen(from, Parts { depth: true, ..Parts::MAIN }, None, source)?;
         let index = index_of(&small, scale, pixel)?;
@@ -196,7 +196,7 @@ impl Painter {
         Ok(Surface { camera: full, place, depth, row })
     }
 
-    /// Returns what is at pixels of a full picture: in the photo of a view, or on the surface.
+    /// Returns what is at pixels of a full image: in the photo of a view, or on the surface.
     pub(super) fn spot(&self, from: &Viewpoint, pixels: &[[u32; 2]], source: &mut dyn Source) -> Result<Spot> {
         let (full, posed) = camera(&self.views, from)?;
         if let Some(View { name, .. }) = posed.filter(|posed| posed.photo.is_some()) {
@@ -226,7 +226,7 @@ impl Painter {
     }
 }
 
-/// Returns the number of a pixel of a full picture in a smaller one.
+/// Returns the number of a pixel of a full image in a smaller one.
 fn index_of(small: &Camera, scale: [f64; 2], pixel: [u32; 2]) -> Result<usize> {
     let along = |axis: usize| ((f64::from(pixel[axis]) + 0.5) * scale[axis]) as u32;
     let (x, y) = (along(0), along(1));
@@ -237,7 +237,7 @@ fn index_of(small: &Camera, scale: [f64; 2], pixel: [u32; 2]) -> Result<usize> {
     Ok(y as usize * small.width as usize + x as usize)
 }
 
-/// Returns the camera of a full picture, and its view.
+/// Returns the camera of a full image, and its view.
 fn camera<'a>(views: &'a Views, from: &Viewpoint) -> Result<(Camera, Option<&'a View>)> {
     match from {
         Viewpoint::View(index) => {
@@ -261,7 +261,7 @@ fn is_fatal(error: &Error) -> bool {
     error.is_device_lost() || matches!(error, Error::Interrupted)
 }
 
-/// Returns the size of a camera's picture, smaller if it is larger than `largest` or has too many pixels.
+/// Returns the size of a camera's image, smaller if it is larger than `largest` or has too many pixels.
 fn fitting(camera: &Camera, largest: Option<(u32, u32)>) -> (u32, u32) {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let (most_wide, most_high) = largest.map_or((width, height), |(w, h)| (f64::from(w), f64::from(h)));

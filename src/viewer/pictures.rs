@@ -11,13 +11,13 @@ use crate::scene::{Photo, UNLABELLED};
 
 /// Share of the label's colour in labels over colour.
 const LABEL_TINT_SHARE: f32 = 0.55;
-/// Quality of JPEGs, for moving pictures on slow lines.
+/// Quality of JPEGs, for moving images on slow lines.
 const JPEG_QUALITY: u8 = 70;
 
 /// Colours of no to full confidence.
 const CONFIDENCE_COLOURS: [[u8; 3]; 3] = [[214, 47, 39], [253, 219, 124], [26, 150, 84]];
 
-/// What panes need besides the render.
+/// Data that panes need besides the render.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PanelData<'a> {
     /// Confidence by row of the drawn model.
@@ -36,7 +36,7 @@ pub(super) fn parts(panes: &[Pane]) -> Parts {
     }
 }
 
-/// Returns the bytes of the picture of a pane. Colour, labels, depth and opacity have the pixels that `render` writes.
+/// Returns the bytes of the image of a pane. Colour, labels, depth and opacity have the pixels that `render` writes.
 pub(super) fn encode(pane: Pane, rendered: &Render, beside: PanelData, is_lossy: bool) -> Result<Vec<u8>> {
     let size = (rendered.width, rendered.height);
     match pane {

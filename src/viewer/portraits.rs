@@ -1,4 +1,4 @@
-//! Pictures of the labels for the list, made anew when a label has changed.
+//! Images of the labels for the list, made anew when a label has changed.
 
 use super::hub::Hub;
 use crate::edit::catalogue::Catalogue;
@@ -12,17 +12,17 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Side of a picture, px.
+/// Side of an image, px.
 const PORTRAIT_SIDE: u32 = 72;
-/// Most labels with a picture.
+/// Maximum number of labels with a thumbnail.
 const LABELS_MAX: usize = 512;
-/// Time for pictures before the next request is looked for, if none has come.
+/// Maximum time for thumbnails before the next look for requests.
 const ROUND_TIME_MAX: Duration = Duration::from_millis(400);
 
-/// What a label looked like in its picture, as a checksum.
+/// Checksum of the Gaussians in a thumbnail.
 type AppearanceHash = u64;
 
-/// The pictures that are there.
+/// The images that are there.
 #[derive(Debug, Default)]
 pub(super) struct Portraits {
     /// Labels and what they look like now.
@@ -53,7 +53,7 @@ impl Portraits {
         self.made.retain(|id, _| self.wanted.contains_key(id));
     }
 
-    /// Makes a few pictures. Returns true if it has, and another model is on the device.
+    /// Makes a few images. Returns true if it has, and another model is on the device.
     pub(super) fn make_some(
         &mut self,
         engine: &mut Engine,

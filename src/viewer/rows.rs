@@ -9,7 +9,7 @@ use crate::scene::labels::label_colour;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Most labels that a page lists.
+/// Maximum number of labels in the list of a page.
 const ROWS_MAX: usize = 4096;
 
 /// Returns the rows for the labels of a finished model.
@@ -53,7 +53,7 @@ fn described(rows: Vec<Value>, all: usize) -> Value {
     json!({ "kind": "labels", "rows": rows, "all": all })
 }
 
-/// Most points of a curve.
+/// Maximum number of points of a curve.
 const POINTS_MAX: usize = 512;
 
 /// Numbers by step. When it is full, every second point goes, and from then on half as many come.

@@ -49,7 +49,7 @@ pub(super) struct Session<'a> {
     /// The way up, of length 1.
     pub(super) up: DVec3,
     pub(super) first_view: Option<FirstView>,
-    /// What pages know of the scene.
+    /// The scene as described to pages.
     pub(super) scene: Value,
 }
 
@@ -237,7 +237,7 @@ impl Session<'_> {
         self.drawing.show(model, &shown.rows(model), self.chosen.mask())
     }
 
-    /// Makes pictures of labels, then scores, while nothing else is to do.
+    /// Makes images of labels, then scores, while nothing else is to do.
     pub(super) fn use_pause(&mut self) -> Result<()> {
         if !self.hub.is_watched() {
             return Ok(());

@@ -11,7 +11,7 @@ use tungstenite::handshake::derive_accept_key;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message as Packet, WebSocket};
 
-/// A page that says nothing for so long is gone; it sends a sign of life three times as often.
+/// A page that is silent for this long is disconnected. Pages send a sign of life three times as often.
 const SILENCE_MAX: Duration = Duration::from_secs(60);
 
 /// The reading half. What the protocol would answer by itself is dropped: it could fall into the middle of a frame.

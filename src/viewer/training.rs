@@ -75,7 +75,7 @@ impl Source for LiveScene<'_> {
     }
 
     fn largest(&mut self) -> Option<(u32, u32)> {
-        // A larger picture would need memory, which might bound the number of Gaussians.
+        // A larger image would need memory, which might bound the number of Gaussians.
         Some(self.image())
     }
 
@@ -293,7 +293,7 @@ impl Observer for ViewerObserver<'_> {
     fn observe(&mut self, event: &Event<'_>, live: &mut LiveScene<'_>) -> Result<Flow> {
         let asked = self.inner.observe(event, live)?;
         match self.see(event, live) {
-            // Pictures that do not fit cost the training nothing.
+            // Images that do not fit cost the training nothing.
             Err(error) if error.is_out_of_memory() => self.notice(&error.to_string()),
             Err(Error::Usage { problem, .. }) => self.notice(&problem),
             other => other?,

@@ -2,9 +2,9 @@
 
 import { add, cross, dot, length, looking, orthonormal, scale, sub, toWorld, turned, unit } from "./algebra.js";
 
-/** Closest to straight up or down that turning goes, radians. */
+/** Minimum angle between the view direction and the up axis, radians. */
 const POLE_ANGLE_MIN = 0.03;
-/** Field of view where no view gives one: focal length in heights of the picture. */
+/** Field of view where no view gives one: focal length in heights of the image. */
 const FOCAL_IN_HEIGHTS = 1.0;
 
 export class Rig {
@@ -17,7 +17,7 @@ export class Rig {
     this.rows = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     this.centre = [0, 0, -3];
     this.pivot = [0, 0, 0];
-    // Focal lengths and offset of the principal point, in heights of the picture.
+    // Focal lengths and offset of the principal point, in heights of the image.
     this.focal = [FOCAL_IN_HEIGHTS, FOCAL_IN_HEIGHTS];
     this.offset = [0, 0];
     this.size = [640, 480];
@@ -62,13 +62,13 @@ export class Rig {
     this.pivot = add(this.centre, scale(rows[2], ahead > 0.05 * this.distance ? ahead : this.distance));
   }
 
-  /** Size and place of the picture of a view in the stage, px. */
+  /** Size and place of the image of a view in the stage, px. */
   placed(camera, [width, height] = this.size) {
     const fit = Math.min(width / camera.W, height / camera.H);
     return { x: (width - camera.W * fit) / 2, y: (height - camera.H * fit) / 2, fit };
   }
 
-  /** Makes the camera free; the picture stays where it is. */
+  /** Makes the camera free; the image stays where it is. */
   free() {
     if (this.view === null) return;
     const { camera } = this.views[this.view];
@@ -94,7 +94,7 @@ export class Rig {
     this.centre = add(about, turn(arm));
   }
 
-  /** Moves across the picture, px of the stage: what is at the pivot follows the hand. */
+  /** Pans by px of the stage, so that the pivot follows the pointer. */
   pan(dx, dy) {
     this.free();
     const depth = Math.max(dot(sub(this.pivot, this.centre), this.rows[2]), 0.02 * this.distance);
@@ -104,7 +104,7 @@ export class Rig {
     this.pivot = add(this.pivot, move);
   }
 
-  /** Comes nearer to the pivot for factors below 1. */
+  /** Zooms: factors below 1 move the camera closer to the pivot. */
   dolly(factor) {
     this.free();
     const arm = sub(this.centre, this.pivot);
@@ -134,7 +134,7 @@ export class Rig {
     this.pivot = add(this.centre, toWorld(this.rows, scale(ray, depth)));
   }
 
-  /** Moves so that a box fills the picture. */
+  /** Moves so that a box fills the image. */
   frame(min, max) {
     this.free();
     const middle = scale(add(min, max), 0.5);
@@ -146,12 +146,12 @@ export class Rig {
     this.centre = sub(middle, scale(this.rows[2], 1.15 * radius / Math.sin(Math.atan(half))));
   }
 
-  /** Takes the present up of the picture as up. */
+  /** Uses the top of the image as the up direction. */
   level() {
     this.up = scale(this.rows[1], -1);
   }
 
-  /** The free camera for a picture of this size, as `render --camera` reads it. */
+  /** The free camera for an image of this size, as `render --camera` reads it. */
   file(width = this.size[0], height = this.size[1]) {
     if (this.view !== null) return this.views[this.view].camera;
     const move = this.rows.map((row) => -dot(row, this.centre));

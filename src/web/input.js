@@ -1,4 +1,4 @@
-// Mouse, touch and keys on the picture.
+// Mouse, touch and keys on the image.
 
 /** Radians per pixel of a drag. */
 const RADIANS_PER_PIXEL = 0.0055;
@@ -103,7 +103,7 @@ export class Input {
     }
     if (event.type === "pointercancel" || this.moved > CLICK_MOTION_MAX || event.button !== 0) return;
     const at = this.at(event);
-    // Of the hand, not of the picture that a slow machine drew in between.
+    // Of the hand, not of the image that a slow machine drew in between.
     const now = event.timeStamp;
     if (this.last && now - this.last.when < DOUBLE_CLICK_MS && Math.hypot(at[0] - this.last.at[0], at[1] - this.last.at[1]) < 6) {
       this.last = null;

@@ -1,4 +1,4 @@
-//! What pages in a browser share: the frame of a page in one file, and the camera with its mouse and keys.
+//! Shared by pages in a browser: the frame of a single-file page, and the camera with mouse and keyboard control.
 //!
 //! A page in one file opens from disk: style and script are inside, and nothing is asked from the network. All text goes
 //! through `maud`, which escapes it.
@@ -14,7 +14,7 @@ pub const INPUT_SCRIPT: &str = include_str!("input.js");
 
 /// Colours and buttons of every page in one file.
 const THEME_STYLE: &str = include_str!("theme.css");
-/// What a browser may load for a page: pictures inside it or beside it, nothing else.
+/// Content policy of a page: only images inside or beside the page may be loaded.
 const CONTENT_POLICY: &str =
     "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 

@@ -29,7 +29,7 @@ pub struct CleanArgs {
     pub inside: Option<[DVec3; 2]>,
 }
 
-/// Writes the model without what disturbs.
+/// Writes the model without floaters.
 pub(crate) fn run(args: &CleanArgs, context: &Context) -> Result<()> {
     let (model, known) = args.edit.open()?;
     let CleanArgs { min_opacity, max_size, max_gap, inside, .. } = *args;

@@ -50,7 +50,7 @@ pub struct ExtractArgs {
     pub edit: EditArgs,
     #[command(flatten)]
     pub choice: ChooseArgs,
-    /// Which Gaussians of the labels.
+    /// Minimum confidence of the extracted Gaussians.
     #[command(flatten)]
     pub sure: MinConfidenceArg,
     /// Refit the opacities of the extracted objects to the photos of --scene and to --masks. This removes haze around
@@ -63,7 +63,7 @@ pub struct ExtractArgs {
     /// Drop fragments: connected parts of an object smaller than --min-share.
     #[arg(long, alias = "drop-fragments")]
     pub drop_specks: bool,
-    /// What a speck is.
+    /// Definition of fragments.
     #[command(flatten)]
     pub grouping: GroupingArgs,
 }
@@ -153,7 +153,7 @@ pub(crate) fn run_remove(args: &RemoveArgs, context: &Context) -> Result<()> {
 /// Removes labels and closes their place by what the training views of a scene show.
 fn filled(args: &RemoveArgs, scene: &Path, model: &Gaussians, labels: &[u32], context: &Context) -> Result<Filled> {
     let RemoveArgs { edit, choice, keep_shadow, .. } = args;
-    // A choice of nothing or of everything is refused before any picture.
+    // A choice of nothing or of everything is refused before any image.
     remove(model, labels)?;
     let near = near_plane(&edit.model, choice.prompts.near)?;
     let sights = scene_sights((scene, &choice.reading(&edit.model)?), (model, near), context)?;

@@ -50,7 +50,7 @@ pub struct SimplifyArgs {
     pub reading: SceneArgs,
 }
 
-/// What a number of Gaussians costs.
+/// Scores of a model with fewer Gaussians.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Row {
     gaussians: usize,

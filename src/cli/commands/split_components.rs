@@ -21,7 +21,7 @@ pub struct SplitArgs {
     /// What to do with fragments smaller than --min-share.
     #[arg(long, alias = "fragments", value_name = "WHAT", value_enum, default_value = "keep")]
     pub specks: SmallParts,
-    /// What is connected.
+    /// Definition of connected parts.
     #[command(flatten)]
     pub grouping: GroupingArgs,
 }

@@ -1,4 +1,4 @@
-//! `--sheet`: which label is what, on one page or picture.
+//! `--sheet`: which label is what, on one page or image.
 
 use crate::Result;
 use crate::cli::support::args::SceneArgs;

@@ -1,4 +1,4 @@
-//! What commands share: arguments, how scenes and models are opened and written, messages, exit statuses.
+//! Shared by commands: arguments, opening and writing of scenes and models, messages, exit statuses.
 
 pub(crate) mod args;
 pub(crate) mod context;

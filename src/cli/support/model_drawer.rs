@@ -27,7 +27,7 @@ impl MemoryArg {
     }
 }
 
-/// Returns the size in px that pictures of all these sizes fit into.
+/// Returns the size in px that images of all these sizes fit into.
 pub(crate) fn largest(sizes: impl Iterator<Item = (u32, u32)>) -> (u32, u32) {
     sizes.fold((1, 1), |a, b| (a.0.max(b.0), a.1.max(b.1)))
 }
@@ -41,7 +41,7 @@ pub(crate) enum Drawer<'a> {
 }
 
 impl<'a> Drawer<'a> {
-    /// Makes one for pictures of these sizes, px.
+    /// Makes one for images of these sizes, px.
     pub(crate) fn new(
         gpu: Arc<Gpu>,
         model: ModelRef<'a>,
@@ -75,7 +75,7 @@ impl<'a> Drawer<'a> {
         }
     }
 
-    /// Draws a picture.
+    /// Draws an image.
     pub(crate) fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render> {
         match self {
             Self::Whole(engine, _) => render(engine, camera, options),

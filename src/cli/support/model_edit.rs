@@ -133,7 +133,7 @@ impl<'a> EditResult<'a> {
     }
 }
 
-/// Which Gaussians an object consists of.
+/// Confidence of the Gaussians of an object.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MinConfidenceArg {
     /// Minimum label confidence of a Gaussian to count as part of an object, for models with confidences.
@@ -209,7 +209,7 @@ pub(crate) struct LabelledModel {
     pub known: Catalogue,
 }
 
-/// Looks through a model for its labels.
+/// Scans a model for its labels.
 pub(crate) fn look(path: &Path, table: &TableArg) -> Result<LabelledModel> {
     let model = models::open_lazily(path)?;
     let (view, mut tally) = (model.view(), Tally::default());

@@ -16,14 +16,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Folder of nested masks, and of the id pictures beside it whose outlines held-out views keep, in a folder of `masks make`.
+/// Folders in the output of `masks make`: nested masks, and the id images whose outlines held-out views keep.
 pub(crate) const NESTED_FOLDER: &str = "nested";
 pub(crate) const OBJECTS_FOLDER: &str = "objects";
 
 /// Where masks are.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskFolders {
-    /// Id pictures.
+    /// Id images.
     pub pictures: Option<PathBuf>,
     /// Nested masks.
     pub lists: Option<PathBuf>,

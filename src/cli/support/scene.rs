@@ -1,4 +1,4 @@
-//! What commands that render share: the device, the scene, its views.
+//! Shared by commands that render: the device, the scene, its views.
 
 use crate::cli::support::args::SceneArgs;
 use crate::cli::support::context::Context;
@@ -101,7 +101,7 @@ pub(crate) fn pick_views<'a>(dataset: &'a Dataset, which: &str) -> Result<Vec<&'
     Ok(views)
 }
 
-/// Most views that a message names.
+/// Maximum number of views that a message names.
 const NAMED_MAX: usize = 4;
 
 /// Returns the view with a name, with or without its extension.

@@ -1,4 +1,4 @@
-//! What commands with scores share: how much is scored, progress, the page of `--page`, least scores.
+//! Shared by commands with scores: options, progress, the page of `--page`, minimum scores.
 
 use crate::Result;
 use crate::cli::support::context::Context;
@@ -50,7 +50,7 @@ pub(crate) struct Watcher {
 }
 
 impl Watcher {
-    /// Starts a watcher of `total` pictures with a page in `folder`.
+    /// Starts a watcher of `total` images with a page in `folder`.
     pub(crate) fn new(total: u64, folder: Option<&Path>, context: &Context) -> Result<Self> {
         let page = folder.map(Page::new).transpose()?;
         Ok(Self { progress: Progress::new(total, "images", &context.global), done: 0, page })

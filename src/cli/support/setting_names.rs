@@ -1,4 +1,4 @@
-//! What a setting is called where it is typed.
+//! Names of settings on the command line.
 
 use crate::options::Key;
 use crate::run::Settings;

@@ -68,7 +68,7 @@ impl RunningStage {
         Some(self.text(if is_first { Duration::ZERO } else { self.start.elapsed() }))
     }
 
-    /// How far the stage is, or how long it has run if that is not known.
+    /// Progress of the stage, or its running time if its length is unknown.
     fn text(&self, spent: Duration) -> String {
         match (self.total, spent.as_secs()) {
             (0, 0) => self.what.clone(),

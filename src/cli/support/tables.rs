@@ -6,7 +6,7 @@ use std::io::IsTerminal;
 
 /// Columns between two columns of text.
 const COLUMN_GAP: usize = 2;
-/// Fewest characters that are left of a shortened name.
+/// Minimum length of a shortened name, characters.
 const NAME_MIN: usize = 8;
 
 /// A column of numbers.

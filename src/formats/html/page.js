@@ -93,7 +93,7 @@ async function start() {
     list.append(item);
     return { box, tint, text };
   });
-  // Shows the state of all labels in the picture and the list.
+  // Shows the state of all labels in the image and the list.
   function update() {
     items.forEach(({ box, tint, text }, row) => {
       box.checked = states[row].shown;

@@ -1,4 +1,4 @@
-// Which object is seen at a point of the picture.
+// Which object is seen at a point of the image.
 
 // Light that gets past the Gaussians where nothing was hit, and where the rest no longer counts.
 const MISSED_LIGHT_MIN = 0.5;
@@ -6,7 +6,7 @@ const LIGHT_MIN = 0.01;
 // Square of the reach of an opaque Gaussian, in standard deviations.
 const REACH_SQUARED = 2 * Math.log(255);
 
-// Inverse covariance of a Gaussian in the picture, as the shader has it: [xx, xy, yy]. Its numbers begin at `base`, its
+// Inverse covariance of a Gaussian in the image, as the shader has it: [xx, xy, yy]. Its numbers begin at `base`, its
 // centre is at `p` of the camera.
 function flattened(numbers, base, { turn, lens, size }, p) {
   const [xx, xy, xz, yy, yz, zz] = numbers.subarray(base, base + 6);
@@ -23,7 +23,7 @@ function flattened(numbers, base, { turn, lens, size }, p) {
   return [d * inverse, -b * inverse, a * inverse];
 }
 
-// Returns the row of the label with the largest weight at a pixel of the last picture; null where little is.
+// Returns the row of the label with the largest weight at a pixel of the last image; null where little is.
 function picked({ model, camera, sorted, shown }, [x, y]) {
   const { positions, stride, rows } = model;
   const { turn, shift, lens } = camera;

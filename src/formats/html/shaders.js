@@ -1,4 +1,4 @@
-// What the graphics card does for each Gaussian and each of its pixels.
+// What the GPU does for each Gaussian and each of its pixels.
 
 const VERTEX = `#version 300 es
 precision highp float;
@@ -61,7 +61,7 @@ void main() {
   vec4 c = uintBitsToFloat(second);
   vec2 c2 = uintBitsToFloat(third.xy);
   mat3 spread = mat3(c.x, c.y, c.z, c.y, c.w, c2.x, c.z, c2.x, c2.y);
-  // Slopes beyond the picture are limited as in 3DGS, where the projection is no longer linear.
+  // Slopes beyond the image are limited as in 3DGS, where the projection is no longer linear.
   vec2 most = 1.3 * 0.5 * size / lens.xy, centre = (lens.zw - 0.5 * size) / lens.xy;
   vec2 slope = clamp(p.xy / p.z, -most - centre, most - centre);
   mat3x2 j = mat3x2(lens.x / p.z, 0.0, 0.0, lens.y / p.z, -lens.x * slope.x / p.z, -lens.y * slope.y / p.z);

@@ -29,12 +29,12 @@ export function icon(...paths) {
   return svg("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, ...parts);
 }
 
-/** Shows which of some buttons is chosen. */
+/** Marks the selected button of a group. */
 export function choose(buttons, chosen) {
   for (const [name, button] of Object.entries(buttons)) button.setAttribute("aria-pressed", String(name === chosen));
 }
 
-/** Says something for a while. */
+/** Shows a text for some seconds. */
 export function toast(text, isProblem = false) {
   const box = $("toasts");
   const made = el("div", { className: isProblem ? "toast problem" : "toast", textContent: text });
@@ -43,7 +43,7 @@ export function toast(text, isProblem = false) {
   setTimeout(() => made.remove(), isProblem ? 9000 : 4500);
 }
 
-/** Asks for a text, or for a yes where `value` is null. Returns null for no. */
+/** Asks for a text, or for a confirmation if `value` is null. Returns null if cancelled. */
 export function ask(head, text, yes, value = null) {
   const dialog = $("ask");
   if (dialog.open) return Promise.resolve(null);
@@ -66,7 +66,7 @@ export function ask(head, text, yes, value = null) {
   });
 }
 
-/** Copies text, and says so. */
+/** Copies text to the clipboard, and shows a note. */
 export async function copy(text, what) {
   try {
     await navigator.clipboard.writeText(text);

@@ -1,9 +1,9 @@
-// What can be done to the selection, and the commands that do the same.
+// Edits of the selection, export, undo and redo.
 
 import { $, copy, el } from "./dom.js";
 
 export class Edits {
-  /** `isChosen` says whether Gaussians are chosen by hand. */
+  /** `isChosen` returns whether Gaussians are selected by hand. */
   constructor(link, labels, isChosen) {
     Object.assign(this, { link, labels, isChosen, state: null, isFixed: false, fills: false, title: "model" });
     const on = (id, act) => $(id).addEventListener("click", act);
@@ -47,7 +47,7 @@ export class Edits {
     if (!this.isFixed && this.chosen.length === 1) this.send({ edit: "split", label: this.chosen[0] });
   }
 
-  /** Asks what is to be written, and under which name. */
+  /** Opens the dialog for the content, name and format of an export. */
   export() {
     if (this.isFixed || $("export").open) return;
     const option = (value, textContent) => el("option", { value, textContent });
@@ -92,7 +92,7 @@ export class Edits {
     this.send({ edit: "remove", labels: this.chosen, fill });
   }
 
-  /** Says that a hole is being filled, which takes a while. */
+  /** Shows that a hole is being filled, which takes a while. */
   setFilling(isFilling) {
     this.isFilling = isFilling;
     $("act-fill").textContent = isFilling ? "Filling …" : "Remove and fill";

@@ -48,7 +48,7 @@ export class Labels {
     this.render();
   }
 
-  /** Takes the versions of the pictures of labels. */
+  /** Takes the versions of the images of labels. */
   setThumbs({ versions }) {
     this.thumbs = versions;
     this.render();
@@ -162,7 +162,7 @@ export class Labels {
     this.select([id]);
   }
 
-  /** A click in the picture: it chooses, adds, or takes away. */
+  /** A click in the image: it replaces, extends or reduces the selection. */
   picked(id, { add, take }) {
     const chosen = new Set(add || take ? this.selected : []);
     if (take) chosen.delete(id);

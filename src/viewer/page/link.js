@@ -1,4 +1,4 @@
-// The connection to the server: requests, frames, and what happens when it goes away.
+// The connection to the server: requests, frames, and reconnection.
 
 /** Bytes of a frame's header. */
 const HEADER_BYTES = 36;
@@ -35,7 +35,7 @@ export class Link {
     socket.onclose = () => this.closed();
   }
 
-  /** Says why there is no connection, and tries again. */
+  /** Reports why the connection is lost, and reconnects. */
   async closed() {
     this.socket = null;
     this.changed(this.isOver ? "over" : "off");

@@ -123,7 +123,7 @@ function over(message) {
   veil(head, scores ? `Test views: ${scores}. ` : "", "View the model with", el("code", { textContent: message.command }));
 }
 
-/** The hint for newcomers goes with the first click or motion. */
+/** Hides the hint for newcomers after the first click or motion. */
 function known() {
   begin.isKnown = true;
   $("first-hint").hidden = true;
@@ -138,7 +138,7 @@ function moved(isMotion = true) {
 
 function snap(index) {
   rig.snap(index);
-  // Where panels are sheets, the picture is what was asked for.
+  // Where panels are sheets, the image is what was asked for.
   if (document.body.dataset.tab === "views") $("tab-stage").click();
   if (stage.photo !== "off") stage.setPhoto(stage.photo);
   moved(false);
@@ -153,7 +153,7 @@ stage.onFrame = (frame) => {
   if ((rig.view === null) === ($("state-view").textContent.startsWith("view"))) moved(true);
 };
 
-/** Selects the label at a point of the picture, without asking if the picture is known. */
+/** Selects the label at a point of the image, without asking if the image is known. */
 function select(at, how) {
   known();
   const label = stage.labelAt(...at);
@@ -229,7 +229,7 @@ const act = {
   choose: () => {
     if (edits.chosen.length > 0) selecting.send({ select: "labels", labels: edits.chosen, how: "replace" });
   },
-  /** Selects what is in the middle of the picture. */
+  /** Selects what is in the middle of the image. */
   middle: () => select([stage.box.clientWidth / 2, stage.box.clientHeight / 2], {}),
   /** Leaves one thing after the other. */
   escape: () => {
@@ -340,7 +340,7 @@ const KEY_HELP = [
 ];
 $("help-keys").append(...KEY_HELP.flatMap(([key, what]) => [el("b", { textContent: key }), el("span", { textContent: what })]));
 
-/** Pictures with a button of their own. */
+/** Images with a button of their own. */
 const PANE_BUTTONS = 4;
 const option = ([value, textContent]) => el("option", { value, textContent });
 $("pane-b").append(...PANES.map(option));

@@ -1,11 +1,11 @@
-// The labels of the picture's pixels: which one is where, and lines around them.
+// The label of each pixel of the image, and outlines of labels.
 
-/** Colours of a line around what is selected, and of what is below the pointer, as little-endian RGBA. */
+/** Colours of the outline of the selection, and of the label below the pointer, little-endian RGBA. */
 const OUTLINE_RGBA = 0xff3dc4ff;
 const HOVER_RGBA = 0x38ffffff;
 
 export class LabelMap {
-  /** Takes the labels of a picture whose channels are their bytes. */
+  /** Takes the labels of an image whose channels are their bytes. */
   constructor(image) {
     const { width, height } = image;
     const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
@@ -21,7 +21,7 @@ export class LabelMap {
     return this.ids[row * this.width + column];
   }
 
-  /** A clear picture with a line just inside of the contour of some labels, and a glow over one; null if it is empty. */
+  /** A clear image with a line just inside of the contour of some labels, and a glow over one; null if it is empty. */
   drawn(marked, hovered) {
     const { width, height, ids } = this;
     const isMarked = new Set(marked);

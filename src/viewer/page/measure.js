@@ -1,4 +1,4 @@
-// Distances between two points of the surface, and sizes of objects.
+// Distances between surface points, and sizes of objects.
 
 import { $, ask, el } from "./dom.js";
 import { add, length, scale, sub, toWorld } from "/algebra.js";
@@ -74,7 +74,7 @@ export class Measuring {
     this.draw();
   }
 
-  /** Draws the line and the boxes over the picture. */
+  /** Draws the line and the boxes over the image. */
   draw() {
     const lines = this.isOn ? [this.points, ...this.boxes.flatMap(edges)] : [];
     if (lines.length === 0 && this.stage.lines.length === 0) return;

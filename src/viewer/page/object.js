@@ -1,4 +1,4 @@
-// The tool that finds an object: clicks and a box in the picture, the answers, and what becomes of it.
+// The tool that finds an object: clicks and a box in the image, results, keep and discard.
 
 import { $, counted, duration } from "./dom.js";
 
@@ -12,7 +12,7 @@ export class Finding {
     this.render();
   }
 
-  /** Takes the tool, or puts it away. An object in work stays until it is kept or dropped. */
+  /** Activates or deactivates the tool. A pending object stays until it is kept or discarded. */
   choose(isOn) {
     this.isOn = isOn;
     this.render();
@@ -42,7 +42,7 @@ export class Finding {
     [style.left, style.top, style.width, style.height] = [...least, ...size].map((side) => `${side}px`);
   }
 
-  /** Ends a drag, or gives it up without `to`. */
+  /** Ends a drag, or cancels it without `to`. */
   box(from, to) {
     $("object-box").hidden = true;
     const [a, b] = [from, to].map((at) => at && this.stage.pixel(...at, true));

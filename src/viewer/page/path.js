@@ -1,4 +1,4 @@
-// A way of the camera through keyframes: gathered here, played here, and saved for render --path.
+// A camera path through keyframes: recorded, played, and saved for render --path.
 
 import { $, el, toast } from "./dom.js";
 import { add, length, orthonormal, scale, sub } from "/algebra.js";

@@ -1,4 +1,4 @@
-// Tools that choose Gaussians, and what becomes of those that are chosen. The choice stays on the server.
+// Tools that select Gaussians, and edits of the selected Gaussians. The selection is stored on the server.
 
 import { $, choose, counted, el, icon, svg } from "./dom.js";
 
@@ -41,7 +41,7 @@ export class Selecting {
 
   get isOn() { return this.tool !== "pointer"; }
 
-  /** What takes clicks and drags, or null for selecting labels. */
+  /** The tool that receives clicks and drags, or null for selecting labels. */
   get hand() {
     if (this.tool === "find" || this.tool === "measure") return this.other[this.tool];
     return this.isOn ? this : null;
@@ -106,7 +106,7 @@ export class Selecting {
     if (this.state.count > 0) this.send({ select: "nothing" });
   }
 
-  /** One and a quarter of the picture's tenth to the right of the camera, world units. */
+  /** One and a quarter of the image's tenth to the right of the camera, world units. */
   beside() {
     const [width] = this.rig.size;
     const depth = Math.hypot(...this.rig.pivot.map((at, axis) => at - this.rig.centre[axis]));
@@ -132,7 +132,7 @@ export class Selecting {
     else if (this.tool === "strokes") this.stroke([at], isOn && !event.ctrlKey && !event.metaKey);
   }
 
-  /** Says what belongs to the object, or what does not. */
+  /** Sends a stroke on the object or on the background. */
   stroke(path, on) {
     const points = thinned(path).map((at) => this.stage.place(...at));
     this.send({ select: "stroke", from: this.from, points, radius: Number($("chosen-size").value) * this.stage.scale(), on });
@@ -166,7 +166,7 @@ export class Selecting {
     else this.click(to, true, event);
   }
 
-  /** Chooses what is drawn over the picture, px of the stage. */
+  /** Selects what is drawn over the image, px of the stage. */
   draw(path, shape, how) {
     const places = thinned(path).map((at) => this.stage.place(...at));
     const region = { shape, points: places, radius: Number($("chosen-size").value) * this.stage.scale() };

@@ -1,4 +1,4 @@
-// The picture: draws frames, and asks for the next one when the camera or a control has changed.
+// The image: draws frames, and asks for the next one when the camera or a control has changed.
 
 import { $, choose } from "./dom.js";
 import { LabelMap } from "./map.js";
@@ -9,11 +9,11 @@ export const PANES = [
 ];
 const PANE_NAMES = Object.fromEntries(PANES);
 
-/** Milliseconds after the last motion until the exact picture is asked for. */
+/** Milliseconds after the last motion until the exact image is asked for. */
 const STILL_AFTER_MS = 160;
-/** Milliseconds between two pictures of a training that the camera rests on. */
+/** Milliseconds between two images of a training that the camera rests on. */
 const REFRESH_INTERVAL_MS = 900;
-/** Most pixels of a picture. */
+/** Most pixels of an image. */
 const PIXELS_MAX = 8e6;
 
 export class Stage {
@@ -29,12 +29,12 @@ export class Stage {
     this.isPhotoHeld = false;
     this.wipeAt = 0.5;
     this.images = [];
-    // Labels with a line around them, the one below the pointer, and where each is in the picture.
+    // Labels with a line around them, the one below the pointer, and where each is in the image.
     this.mark = [];
     this.hovered = null;
     this.map = null;
     this.overlay = null;
-    // Lines over the picture, each as points, px of the canvas.
+    // Lines over the image, each as points, px of the canvas.
     this.lines = [];
     this.isExact = false;
     this.frame = null;
@@ -78,7 +78,7 @@ export class Stage {
     this.paint();
   }
 
-  /** Pixels of the picture: half of the stage for two side by side. */
+  /** Pixels of the image: half of the stage for two side by side. */
   resize() {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const { clientWidth, clientHeight } = this.box;
@@ -189,7 +189,7 @@ export class Stage {
 
   lay() { this.overlay = this.map?.drawn(this.mark, this.hovered) ?? null; }
 
-  /** The label at a point of the stage; null outside of a picture or before the present one is there. */
+  /** The label at a point of the stage; null outside of an image or before the present one is there. */
   labelAt(x, y) {
     if (!this.map || !this.isStill || this.isDirty || this.asked !== null) return null;
     const [column, row] = this.place(x, y);
@@ -202,7 +202,7 @@ export class Stage {
     if (seq === this.asked) this.asked = null;
   }
 
-  /** Where the picture is on the canvas, px: the whole, or the place of a view in it. */
+  /** Where the image is on the canvas, px: the whole, or the place of a view in it. */
   area(column = 0) {
     const columns = this.isPair ? 2 : 1;
     const [width, height] = [this.canvas.width / columns, this.canvas.height];
@@ -268,7 +268,7 @@ export class Stage {
     this.legend(shown);
   }
 
-  /** What the colours of a picture mean. */
+  /** What the colours of an image mean. */
   legend(pane) {
     const { depths } = this.frame ?? { depths: [0, 0] };
     const scales = {
@@ -281,7 +281,7 @@ export class Stage {
     [$("legend-low").textContent, $("legend-high").textContent] = scale ?? ["", ""];
   }
 
-  /** The place in the full picture under a point of the stage, CSS px. */
+  /** The place in the full image under a point of the stage, CSS px. */
   place(x, y) {
     const ratio = this.canvas.width / this.box.clientWidth;
     const at = [x * ratio, y * ratio];
@@ -290,7 +290,7 @@ export class Stage {
     return [(at[0] - area.x) / area.width * W, (at[1] - area.y) / area.height * H];
   }
 
-  /** Pixels of the full picture in a CSS px of the stage. */
+  /** Pixels of the full image in a CSS px of the stage. */
   scale() {
     return this.rig.file().W * this.canvas.width / (this.area().width * this.box.clientWidth);
   }
@@ -304,7 +304,7 @@ export class Stage {
     return [area.x + (fx * x / z + cx) / W * area.width, area.y + (fy * y / z + cy) / H * area.height];
   }
 
-  /** The pixel of the full picture under a point of the stage; outside the nearest one if `isNear`, else null. */
+  /** The pixel of the full image under a point of the stage; outside the nearest one if `isNear`, else null. */
   pixel(x, y, isNear = false) {
     const pixel = this.place(x, y);
     const { W, H } = this.rig.file();

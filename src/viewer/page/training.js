@@ -1,4 +1,4 @@
-// A training that runs: where it is, how it goes, and what can be asked of it.
+// A running training: progress, curves and controls.
 
 import { $, ask, bytes, duration, el, number, svg, toast } from "./dom.js";
 

@@ -80,7 +80,7 @@ pub(crate) fn score(args: &EvalArgs, context: &Context) -> Result<Scores> {
     Ok(scores)
 }
 
-/// What is scored, and how.
+/// A scoring task.
 struct Job<'a> {
     args: &'a EvalArgs,
     context: &'a Context,
@@ -124,7 +124,7 @@ impl Job<'_> {
         Ok(scores)
     }
 
-    /// Scores a model of which each picture takes a part.
+    /// Scores a model of which each image takes a part.
     fn score_parts(
         &self,
         gpu: &Arc<Gpu>,
@@ -190,7 +190,7 @@ struct Folders {
     scene: PathBuf,
     /// Outlines.
     amodal: Option<PathBuf>,
-    /// Pictures without occluders.
+    /// Images without occluders.
     objects: Option<PathBuf>,
 }
 
@@ -250,7 +250,7 @@ fn file_of(folder: &Path, id: u32, view: &View) -> Option<PathBuf> {
     file.is_file().then_some(file)
 }
 
-/// Scales a picture of `size` to the view by nearest pixels.
+/// Scales an image of `size` to the view by nearest pixels.
 fn at_view<T>(view: &View, size: (u32, u32), value: impl Fn(usize) -> T) -> Vec<T> {
     let (width, height) = (view.camera.width, view.camera.height);
     let nearest = |at: u32, side: u32, from: u32| ((f64::from(at) + 0.5) * f64::from(from) / f64::from(side)) as usize;

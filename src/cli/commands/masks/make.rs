@@ -29,7 +29,7 @@ const GRID_DEFAULT: u16 = 12;
 const SCORE_MIN_DEFAULT: f32 = 0.7;
 const STABILITY_MIN_DEFAULT: f32 = 0.5;
 
-/// The levels of nested masks, and the folders of their id pictures.
+/// The levels of nested masks, and the folders of their id images.
 const LEVEL_FOLDERS: [(Level, &str); 3] =
     [(Level::Objects, OBJECTS_FOLDER), (Level::Parts, "parts"), (Level::Wholes, "wholes")];
 
@@ -80,7 +80,7 @@ impl MakeArgs {
     }
 }
 
-/// How masks were made, beside them.
+/// Record of the options that masks were made with, stored beside them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct MaskRecord {
     schema_version: u32,

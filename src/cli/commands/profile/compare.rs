@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What is compared of the JSON.
+/// The compared part of the JSON.
 #[derive(Deserialize)]
 struct File {
     steps: Vec<Step>,

@@ -40,7 +40,7 @@ pub struct Window {
     pub overlap: bool,
 }
 
-/// What was measured of a training.
+/// Measurements of a training.
 pub(crate) struct Measurement {
     /// Times of further steps by the clocks of the host.
     pub clocks: Clocks,

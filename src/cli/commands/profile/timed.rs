@@ -1,10 +1,10 @@
-//! What the steps of a profile worked on.
+//! The workload of the steps of a profile.
 
 use crate::train::{LabelWork, StepReport};
 use crate::words::counted;
 use std::collections::BTreeSet;
 
-/// What the timed steps worked on.
+/// The workload of the timed steps.
 #[derive(Clone, Debug, Default)]
 pub struct TimedWork {
     /// Sizes of photos, px, the smallest first.

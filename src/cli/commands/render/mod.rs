@@ -81,7 +81,7 @@ pub struct RenderArgs {
 /// The views to draw.
 #[derive(Default)]
 struct Shots {
-    /// Cameras by the stem of the picture.
+    /// Cameras by the stem of the image.
     cameras: Vec<(String, Camera)>,
     /// The scene that has them.
     dataset: Option<Dataset>,
@@ -123,7 +123,7 @@ pub(crate) fn run(args: &RenderArgs, context: &Context) -> Result<()> {
     context.show(&json!({ "schema_version": 1, "files": files }), &text)
 }
 
-/// Returns the size of a picture of this size, px. Sides of a video are even, because its colours have half of them.
+/// Returns the size of an image of this size, px. Sides of a video are even, because its colours have half of them.
 fn sized(args: &RenderArgs, (width, height): (u32, u32)) -> (u32, u32) {
     if is_video(&args.output) { (width.next_multiple_of(2), height.next_multiple_of(2)) } else { (width, height) }
 }
@@ -239,7 +239,7 @@ fn index(args: &RenderArgs, model: ModelRef, context: &Context) -> Result<Gaussi
     }
 }
 
-/// Which labels are drawn.
+/// The choice of visible labels.
 struct Choice<'a> {
     /// The flag that says it.
     flag: &'static str,

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 const VIDEO_EXTENSION: &str = "mp4";
 /// Shares of what is drawn, along each axis, between which the turntable shows it.
 const FRAMED_QUANTILES: [f64; 2] = [0.02, 0.98];
-/// Focal length of the turntable, in the smaller side of the picture, and the least space around what is drawn.
+/// Focal length of the turntable, in the smaller side of the image, and the least space around what is drawn.
 const FOCAL_IN_SIDES: f64 = 1.4;
 const FRAME_MARGIN: f64 = 1.1;
 /// Height of the eye over what is drawn alone, in distances.
@@ -54,7 +54,7 @@ pub(super) fn is_video(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(VIDEO_EXTENSION))
 }
 
-/// Returns the kind of picture in a video; fails for several, and for values that are no colours.
+/// Returns the kind of image in a video; fails for several, and for values that are no colours.
 pub(super) fn kind_of_video(what: &[PictureKind]) -> Result<PictureKind> {
     match what {
         [PictureKind::TopId | PictureKind::TopWeight] => Err(Error::usage(
@@ -92,7 +92,7 @@ impl MotionArgs {
         let (middle, radius) = (0.5 * (low + high), 0.5 * low.distance(high).max(1e-6));
         let views = if alone { Vec::new() } else { views_of_model(model)? };
         let cameras = || views.iter().map(|view| &view.camera);
-        // The cosine makes a ball of the radius touch the edge of the picture.
+        // The cosine makes a ball of the radius touch the edge of the image.
         let distance = FRAME_MARGIN * radius * (2.0 * FOCAL_IN_SIDES).hypot(1.0);
         let (target, distance, raised) = match Overview::from_cameras(cameras()) {
             Some(all) => {

@@ -45,7 +45,7 @@ fn measured(has_device: bool, measure: impl FnOnce() -> Result<Value>) -> Value 
     measure().unwrap_or_else(|error| json!({ "error": error.to_string() }))
 }
 
-/// What the driver's compiler makes of every kernel.
+/// Compiler statistics of every kernel.
 fn compiler(options: GpuOptions) -> Result<Value> {
     let gpu = Gpu::new(&GpuOptions { statistics: true, ..options })?;
     Ok(json!(kernels_json(&compiled_kernels(&gpu)?)))

@@ -33,10 +33,10 @@ pub struct TrainArgs {
     /// training with these masks for a third of the steps. With --resume, an interrupted run resumes in its stage.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["masks", "block", "occluders"])]
     pub network: Option<PathBuf>,
-    /// How it trains.
+    /// Flags of the training.
     #[command(flatten)]
     pub how: TrainFlags,
-    /// A page that shows it.
+    /// The page that shows the run.
     #[command(flatten)]
     pub watch: WatchArgs,
 }
