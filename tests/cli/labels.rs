@@ -150,7 +150,7 @@ fn an_ablation_compares_variants() {
     args.extend(["--row", "half=--set label_weight=0.5"]);
     args.extend(common);
     let table = labelgs(&args, 0);
-    for part in ["no-labels", "ours", "half", "iou_hidden", "quoted from the paper", "0.925 / 34.26"] {
+    for part in ["no-labels", "ours", "half", "iou_hidden", "from the LabelGS paper", "0.925 / 34.26"] {
         assert!(table.contains(part), "{part} is not in\n{table}");
     }
     let record = json(&std::fs::read_to_string(Path::new(&out).join("ablation.json")).expect("record"));
@@ -158,7 +158,7 @@ fn an_ablation_compares_variants() {
     assert_eq!(rows.len(), 3);
     assert!(rows.iter().all(|row| row["runs"][0]["scores"]["psnr"].as_f64() > Some(5.0)), "{record}");
     let page = std::fs::read_to_string(Path::new(&out).join("report.html")).expect("a page");
-    assert!(page.contains("3 runs") && page.contains("half-0") && page.contains("quoted from the paper"));
+    assert!(page.contains("3 runs") && page.contains("half-0") && page.contains("from the LabelGS paper"));
     let wrong = labelgs(&["ablate", &scene, "--masks", &masks, "-o", &out, "--row", "x=--no-such-flag 1"], 2);
     assert!(wrong.contains("x: ") && wrong.contains("--no-such-flag"), "{wrong}");
 }

@@ -86,7 +86,7 @@ fn a_path_becomes_frames_and_a_video_of_them() {
 
     for (flags, part) in [
         (&["--camera", &single][..], "a video needs --path or --turntable"),
-        (&["--path", &file, "--what", "rgb,depth"], "a video shows one kind of picture"),
+        (&["--path", &file, "--what", "rgb,depth"], "a video shows one kind of image"),
         (&["--path", &file, "--format", "exr"], "a video has 8-bit colours"),
         (&["--path", &file, "--views", "all"], "cannot be used with"),
         (&["--path", &file, "--seconds", "3"], "cannot be used with"),

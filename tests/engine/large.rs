@@ -213,7 +213,7 @@ fn commands_take_large_models_and_large_ids() {
     let draw = |out: &str, flags: &[&str]| {
         let args = ["-v", "render", &path, "--scene", &scene, "-o", &place.text(out)];
         let said = succeeded(&place.labelgs(&[&args[..], &what, flags].concat()));
-        assert_eq!(said.contains("each picture takes what it may show"), flags.contains(&"--memory-limit"), "{said}");
+        assert_eq!(said.contains("only the Gaussians in view are loaded"), flags.contains(&"--memory-limit"), "{said}");
     };
     for (name, only) in
         [("all", vec![]), ("only", vec!["--only", "1-4,70000"]), ("without", vec!["--without", "70000"])]

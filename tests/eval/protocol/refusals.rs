@@ -84,7 +84,7 @@ fn the_command_line_refuses_before_a_device_is_needed() {
     says(&["--protocol", "lerf-mask"], 3, "no labels.json");
     let entry = LabelEntry { name: Some("spoon".into()), ..LabelEntry::new(3) };
     LabelTable::new(vec![entry]).write(&LabelTable::path_beside(Path::new(&model))).expect("written");
-    says(&["--protocol", "lerf-mask"], 3, "none of the benchmark's objects (cup); it names spoon");
+    says(&["--protocol", "lerf-mask"], 3, "contains no object of the benchmark (cup); its names are spoon");
     says(&["--protocol", "lerf-mask", "--by", "prompt"], 3, "scene");
     says(&["--protocol", "labelgs", "--masks", "m"], 2, "--masks");
 }
