@@ -1,6 +1,6 @@
 //! Other programs: where they are, how they are installed, and runs of them whose messages go to a file.
 
-use super::append::Lines;
+use super::append::LineFile;
 use labelgs_scene::{Error, Result};
 use std::collections::VecDeque;
 use std::env;
@@ -61,7 +61,7 @@ pub type Check<'a> = dyn Fn() -> Result<()> + 'a;
 /// A file with the messages of programs.
 #[derive(Debug)]
 pub struct ProgramLog {
-    lines: Lines,
+    lines: LineFile,
     /// The last of them.
     last: VecDeque<String>,
 }
@@ -69,7 +69,7 @@ pub struct ProgramLog {
 impl ProgramLog {
     /// Makes the file.
     pub fn new(path: &Path) -> Result<Self> {
-        Ok(Self { lines: Lines::open(path, 0)?, last: VecDeque::new() })
+        Ok(Self { lines: LineFile::open(path, 0)?, last: VecDeque::new() })
     }
 
     /// Runs a program to its end. `hear` gets each line of its two outputs. Where `check` fails, the program is ended.

@@ -18,13 +18,10 @@ pub type FrameSink<'a> = dyn FnMut(&[[u8; 3]]) -> Result<()> + 'a;
 
 /// Finds the encoder on the search path. Call this before any expensive work.
 pub fn find_encoder(path: &Path) -> Result<PathBuf> {
-    let name = format!("{ENCODER_NAME}{}", env::consts::EXE_SUFFIX);
-    let folders = env::var_os("PATH").unwrap_or_default();
-    env::split_paths(&folders).map(|folder| folder.join(&name)).find().ok_or_else(|| {
+    FFMPEG.find().ok_or_else(|| {
         let problem = format!(
-            "{ENCODER_NAME} makes videos, but is in no folder of PATH; install it (on Debian and Ubuntu: apt-get install \
-             {ENCODER_NAME}), or name a folder, which gets a PNG for each frame, or \
-             install it ({})",
+            "{ENCODER_NAME} makes videos, but is in no folder of PATH; install it ({}), or name a folder, which gets a PNG for \
+             each frame",
             FFMPEG.how_to_install()
         );
         Error::write(path)(io::Error::new(ErrorKind::NotFound, problem))

@@ -31,7 +31,7 @@ pub fn is_readable(path: &Path) -> bool {
 
 /// Returns true for the name of a photo of a kind that cannot be read.
 pub fn is_unreadable(path: &Path) -> bool {
-    extension_is_of(path, &UNREADABLE)
+    extension_is_of(path, &UNREADABLE_EXTENSIONS)
 }
 
 fn extension_is_of(path: &Path, extensions: &[&str]) -> bool {

@@ -3,7 +3,7 @@
 //! Each seed is cut at many lengths, changed at many bytes in four ways, and given hostile numbers at many places:
 //! as bytes of every width, and where it is text in place of every number.
 
-use super::targets::{ALL_TARGETS, TargetFolder, Target};
+use super::targets::{ALL_TARGETS, Target, TargetFolder};
 use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;

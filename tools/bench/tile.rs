@@ -1,6 +1,6 @@
 //! The blends alone: the chain of a single tile, and an image of equal tiles.
 
-use crate::kernels::{TestBed, ALL_MODES, Replacements};
+use crate::kernels::{ALL_MODES, Replacements, TestBed};
 use crate::measure::{median, table, write_json};
 use crate::{Common, device};
 use glam::DMat3;

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::{Context, quoted, signals};
-use crate::scenes::lens::{CameraModel, MODELS, model};
+use crate::scenes::lens::{CAMERA_MODELS, CameraModel, model};
 use crate::scenes::reconstruction::{Made, PHOTOS_MIN, Request, advice, reconstruct};
 use crate::words::counted;
 use clap::Args;
@@ -34,7 +34,7 @@ pub struct PhotosArgs {
 
 /// Takes the name of a camera model.
 fn lens() -> impl TypedValueParser<Value = &'static CameraModel> {
-    let names = PossibleValuesParser::new(MODELS.map(|model| model.name));
+    let names = PossibleValuesParser::new(CAMERA_MODELS.map(|model| model.name));
     names.try_map(|name| model(&name).ok_or("a camera model is gone"))
 }
 

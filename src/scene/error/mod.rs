@@ -2,8 +2,8 @@
 
 mod setting;
 
-pub use setting::speak_of;
 pub use setting::name_settings;
+pub use setting::{Setting, Verb};
 
 use std::path::{Path, PathBuf};
 

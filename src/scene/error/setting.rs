@@ -48,6 +48,27 @@ impl Display for Setting {
     }
 }
 
+/// A command in a message. The library knows no command line, so only the command line names it as it is typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Verb(pub &'static str);
+
+impl Verb {
+    /// Formats the command with its arguments, in backticks: `labelgs photos PHOTOS -o SCENE`. In other programs it is the
+    /// command's name alone.
+    pub fn with(self, arguments: impl Display) -> String {
+        self.typed(SETTING_NAMES.get().is_some(), &arguments.to_string())
+    }
+
+    fn typed(self, is_command_line: bool, arguments: &str) -> String {
+        let Self(name) = self;
+        if is_command_line {
+            format!("`labelgs {name} {arguments}`")
+        } else {
+            format!("the command `{name}` of labelgs")
+        }
+    }
+}
+
 /// Formats the name without quotes, for the start of a message.
 impl From<Setting> for String {
     fn from(setting: Setting) -> Self {

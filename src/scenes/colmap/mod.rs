@@ -125,7 +125,7 @@ pub struct Contents {
 
 /// Returns what the model in a folder holds; `None` if that holds no model.
 pub fn contents(folder: &Path) -> Result<Option<Contents>> {
-    let files = Files { folder: folder.to_owned() };
+    let files = ModelFiles { folder: folder.to_owned() };
     let Some((images, is_binary)) = files.path("images") else { return Ok(None) };
     let images = match is_binary {
         true => binary::images(&images, false)?,

@@ -5,7 +5,7 @@ use super::progress::frame;
 use super::workshop::Workshop;
 use crate::photo_finder::{count_photos, is_readable, is_unreadable};
 use labelgs_files::program::{FFMPEG, FFPROBE, Program};
-use labelgs_files::{atomic, image, kind, names, read};
+use labelgs_files::{atomic, content, image, names, read};
 use labelgs_scene::stage::Stage;
 use labelgs_scene::words::counted;
 use labelgs_scene::{Error, Result};
@@ -120,7 +120,7 @@ fn place(from: &Path, to: &Path) -> Result<()> {
 
 /// Takes frames of a video at equal distances.
 fn take_frames(workshop: &mut Workshop, video: &Path) -> Result<Photos> {
-    let content = kind::of_file(video)?.filter(|content| !content.what.starts_with("a video"));
+    let content = content::identify_file(video)?.filter(|found| !found.what.starts_with("a video"));
     if let Some(content) = content {
         let problem = format!("is {}; expected a folder of photos or a video", content.what);
         return Err(Error::data(video, "", problem));

@@ -84,7 +84,8 @@ pub fn run(options: &Options) -> Result<()> {
             for kind in &kinds {
                 for &steps in &kind.lengths {
                     let (name, flags) = (kind.name.as_str(), kind.flags.as_slice());
-                    let row = rows.row(&Plan { name, program: &kind.program, flags, scene, seed, steps, lpips: None }, &own)?;
+                    let row =
+                        rows.row(&Plan { name, program: &kind.program, flags, scene, seed, steps, lpips: None }, &own)?;
                     println!("{}", line(&row));
                     found.push(row);
                 }
