@@ -124,7 +124,7 @@ pub(super) fn pointed(
         ObjectRequest::Click { from, pixel, on } => Some(Pointing::Click(at(from, &[*pixel])?, *on)),
         ObjectRequest::Box { from, corners: [x0, y0, x1, y1] } => {
             if x0 >= x1 || y0 >= y1 {
-                return Err(Error::usage("box", "is empty; drag a larger one"));
+                return Err(Error::usage("corners", "the box is empty; drag a larger one"));
             }
             let pixels = match from {
                 Viewpoint::View(_) => vec![[*x0, *y0], [*x1, *y1]],

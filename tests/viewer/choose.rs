@@ -192,7 +192,7 @@ fn exports_have_names_and_can_be_fetched() {
         page.hear("problem");
     }
     page.send(&json!({ "kind": "export", "what": { "labels": [], "chosen": true, "name": "x", "format": ".ply" } }));
-    assert!(page.hear("problem")["text"].to_string().contains("no Gaussian is chosen"));
+    assert!(page.hear("problem")["text"].to_string().contains("no Gaussians are selected"));
 }
 
 /// A model that is dropped on the page takes the place of the one before, whose changes are saved.

@@ -102,7 +102,7 @@ fn an_object_is_found_grows_and_becomes_a_label() {
     page.until("object", |object| object["count"].is_null() && object["asked"].is_null());
     for (what, word) in [
         (json!({ "object": "keep", "name": "x" }), "no object was found"),
-        (json!({ "object": "click", "from": { "view": 0 }, "pixel": pixel, "on": false }), "on the object first"),
+        (json!({ "object": "click", "from": { "view": 0 }, "pixel": pixel, "on": false }), "the object first"),
         (json!({ "object": "click", "from": { "view": 17 }, "pixel": pixel, "on": true }), "no view 17"),
     ] {
         page.send(&json!({ "kind": "object", "what": what }));

@@ -460,7 +460,7 @@ fn a_watched_and_paused_training_keeps_its_bits() {
         assert_eq!((u64::from(frame.step), frame.exact), (step, true));
     }
     page.edit(&json!({ "edit": "merge", "labels": [1, 2] }));
-    assert!(page.hear("problem")["text"].to_string().contains("while a training runs"));
+    assert!(page.hear("problem")["text"].to_string().contains("while training is running"));
     for _ in 0..2 {
         page.send(&json!({ "kind": "train", "what": "save" }));
         std::thread::sleep(Duration::from_millis(150));
