@@ -28,10 +28,10 @@ pub struct ReadModel {
 #[serde(rename_all = "lowercase")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum LabelType {
-    /// As floats in a PLY, PLY; every reader of 3DGS files accepts them.
+    /// Write float properties to a PLY; every reader of 3DGS files accepts them.
     #[default]
     Float,
-    /// As unsigned integers in a PLY; some programs refuse or misread such files.
+    /// Write unsigned integers to a PLY; some programs refuse or misread such files.
     Uint,
     /// Write no labels and no names, in any format.
     None,
@@ -41,7 +41,7 @@ pub enum LabelType {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SpzVersion {
-    /// A single gzip stream, stream; most viewers read it.
+    /// A gzip stream; most viewers read it.
     #[default]
     #[serde(rename = "3")]
     #[cfg_attr(feature = "cli", value(name = "3"))]

@@ -46,7 +46,7 @@ fn names<'a>(views: &[&'a View]) -> Vec<&'a str> {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// Detect the format. An ambiguous folder is an error.
+    /// Detect the format; an error if several match.
     #[default]
     Auto,
     /// DEVA with --use_short_id: 8-bit grey, value = id.
@@ -71,7 +71,7 @@ pub enum Format {
     #[serde(rename = "3d-ovs")]
     #[cfg_attr(feature = "cli", value(name = "3d-ovs"))]
     ThreeDOvs,
-    /// COCO instances as JSON, as also exported by exported by CVAT and Label Studio.
+    /// COCO instances as JSON, as also exported by CVAT and Label Studio.
     Coco,
     /// Folders from Segment Anything's amg.py: NAME/0.png and NAME/metadata.csv.
     SamFolders,
@@ -91,14 +91,14 @@ impl Format {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Overlap {
-    /// The format's rule: `Smaller` for Segment Anything, `Later` for COCO, otherwise `Error`.
+    /// Choose by format: smaller for Segment Anything, later for COCO, else error.
     #[default]
     Auto,
-    /// Fail, and report how many the number of shared pixels.
+    /// Fail, and report how many pixels overlap.
     Error,
-    /// The smaller mask in the photo wins, or the later one if they are equal.
+    /// The smaller mask in the photo wins; of equal masks, the later one wins.
     Smaller,
-    /// The later mask in the file wins; among black and white images, the one with the larger id wins.
+    /// The later mask in the file wins; of black and white images, the mask with the larger id wins.
     Later,
 }
 
@@ -107,15 +107,15 @@ pub enum Overlap {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum ObjectPer {
-    /// By track if every mask has a track id, by name if every mask has a name that repeats a photo, otherwise each mask
-    /// is an object.
+    /// Use track if every mask has a track id, else name if every mask has a name that is unique in its photo, else
+    /// mask.
     #[default]
     Auto,
     /// Masks with the same track id are one object in all photos.
     Track,
     /// Masks with the same name are one object in all photos.
     Name,
-    /// Every mask is a separate object, separate each photo has separate ids.
+    /// Every mask is a separate object; ids do not match between photos.
     Mask,
 }
 

@@ -18,11 +18,11 @@ const FLOAT_EXACT: i32 = 1 << 24;
 pub enum PictureKind {
     /// Colour.
     Rgb,
-    /// Mean z per pixel, world units: a PNG shows it in grey preview as PNG, the values as EXR.
+    /// Mean z per pixel, world units: a grey preview as PNG, the values as EXR.
     Depth,
     /// Opacity, 0 to 1.
     Alpha,
-    /// Label ids as 16-bit PNG, plus a coloured PNG. A look at; ids above 65535 gives a 32-bit EXR.
+    /// Label ids as 16-bit PNG, with a coloured PNG to look at; ids above 65535 need 32-bit EXR.
     Labels,
     /// Index of the Gaussian with the largest weight, -1 for none; EXR only. With indices above 16777216, the values
     /// are unsigned integers, 4294967295 for none.

@@ -20,26 +20,25 @@ crate::options! {
     /// Settings for intermediate outputs and photo memory. They do not affect results.
     pub struct RunOptions {
         "Output" {
-            /// Additional steps after which to save the model, comma-separated.
+            /// Extra steps after which to save the model, comma-separated.
             #[cfg_attr(feature = "cli", arg(value_delimiter = ','))]
             save_at <"LIST">: Vec<u32> = Vec::new(), setting;
 
-            /// Time between two preview images, such as 10min, or a number of steps; 0 for none.
+            /// Time between two preview images, such as 10min, or a number of steps; 0 makes none.
             ///
             /// Previews show the first held-out view.
             preview_every <"TIME">: Every = Every::Minutes(10.0), setting;
 
-            /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only if the run is
-            /// interruption.
+            /// Time between two checkpoints, such as 10min, or a number of steps; 0 writes one only on interruption.
             ///
-            /// A checkpoint is is also saved. --resume continues from the newest checkpoint.
+            /// A checkpoint is also written after the last step. --resume continues from the newest checkpoint.
             checkpoint_every <"TIME">: Every = Every::Minutes(10.0);
         }
         "Scene" {
             /// Host memory for photos and masks, such as 800M or 4G.
             ///
-            /// Photos beyond this limit are kept goes to a temporary file in OUT, decoded at training size, until the
-            /// process ends. The limit does not affect the model.
+            /// If the scene needs more, the rest goes to a temporary file in OUT, decoded and resized for training. The
+            /// file is deleted on exit. The result does not depend on this setting.
             #[cfg_attr(feature = "cli", arg(value_parser = bytes))]
             #[serde(with = "as_bytes")]
             photo_memory <"SIZE">: u64 = scenes::PHOTO_MEMORY;

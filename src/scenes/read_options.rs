@@ -8,31 +8,29 @@ labelgs_scene::options! {
     /// The settings for the pixels that a run trains on and the views that it holds out.
     pub struct ReadOptions {
         "Scene" {
-            /// Longest side of a photo, px. Larger photos are shrunk; and 0 keeps all sizes.
+            /// Longest side of a photo, px. Larger photos are shrunk; 0 keeps all sizes.
             ///
-            /// Smaller values are faster and lose fine texture. [default 0; the values train faster and lose fine 1080]
+            /// Smaller values train faster and lose fine texture. The reference code shrinks to a height of 1080.
             max_resolution <"PX">: u32 = 0, fixed;
 
             /// Hold out every N-th view, by name, for scoring.
             ///
-            /// 0 trains on all views. If the scene's own, other values keep that split. takes precedence, except over 8. [default 8, as LabelGS and
-            /// 3DGS]
+            /// 0 trains on all views. If the scene has a split of its own, other values keep that split. LabelGS and
+            /// 3DGS use 8.
             test_every <"N">: u32 = 8, fixed;
 
-            /// Pose convention of the scene file, if it deviates from its format's convention.
+            /// Pose convention of the scene file, if it differs from its format's convention.
             ///
-            /// Comma-separated words: c2w or w2c (camera-to-world or world-to-camera), opencv or opengl (camera axes:
-            /// y
-            /// down, looking along z, or y up, looking along -z), and xyzw (quaternions with the real part last).
+            /// Comma-separated list of c2w or w2c (camera-to-world or world-to-camera), opencv or opengl (camera axes:
+            /// y down, looking along z, or y up, looking along -z), and xyzw (quaternions with the real part last).
             poses <"WORDS">: PoseConvention = PoseConvention::default(), fixed;
 
-            /// Train only the objects of the masks, without their surroundings.
+            /// Train only the masked objects and ignore their surroundings.
             ///
-            /// Use this for an object on a turntable, where the surroundings do not turn with the object. Masks become
-            /// the
-            /// opacity of the photos, with soft edges free of background colour. Photos are
-            /// cropped to their objects,
-            /// and those without an object are omitted. Each step uses a random background colour (random_background).
+            /// Use it for an object on a turntable, where the surroundings do not turn with the object. Masks become
+            /// the opacity of the photos, with soft edges from which the surrounding colour is removed. Photos are
+            /// cropped to their objects, and photos without an object are skipped. Each step uses a random background
+            /// colour (random_background).
             masked_only <"SWITCH">: bool = false, fixed;
         }
     }

@@ -43,14 +43,13 @@ pub enum Preset {
     Default,
     /// Three objects, for quick tests.
     Simple,
-    /// Objects that are hard to label: thin, nested, touching, or cut by the image border, touching, or with the
-    /// ground's colours.
+    /// Objects that are hard to label: thin, black, coloured like the ground, nested, touching, or cut by the image
+    /// border.
     Hard,
-    /// A city of sixty houses, trees, vehicles and lamps on 24 x 16 world units, seen from above and from its
-    /// streets: for for training in blocks.
+    /// A city of sixty houses, trees, vehicles and lamps on 24 x 16 world units, seen from above and from its streets,
+    /// for training in blocks.
     City,
-    /// A bright object on a turntable in front of a white wall turned in front of a fixed camera: the surroundings do not
-    /// match the
+    /// A bright object on a turntable in front of a white wall and a fixed camera: the surroundings do not match the
     /// poses.
     Turntable,
     /// The same object, turned upside down between two series of photos.

@@ -15,11 +15,11 @@ pub enum Fault {
     Swap,
     /// Shrink masks by a factor of 2.25 and enlarge them again.
     Coarse,
-    /// Ids differ in every view except the first, as a single-image segmenter does.
+    /// Give every view except the first its own ids, as a single-image segmenter does.
     PerView,
     /// Leave out the masks of some views.
     Missing,
-    /// Give an object another object's id in some views.
+    /// Give an object the id of another object in some views.
     Merge,
 }
 

@@ -24,7 +24,7 @@ pub struct ScoreArgs {
     #[command(flatten)]
     pub sure: MinConfidenceArg,
     /// Also compute LPIPS, with the weights of LPIPS v0.1 (VGG16) in this safetensors file (see the guide, page
-    /// scores). Takes seconds to minutes per image.
+    /// benchmarks). Takes seconds to minutes per image.
     #[arg(long, value_name = "WEIGHTS", help_heading = "Scores")]
     pub lpips: Option<PathBuf>,
     /// Write a web page to this new folder, with ground truth, prediction and difference of every image.

@@ -29,7 +29,7 @@ pub(super) const MODEL_FORMAT: ModelFormat = ModelFormat {
 
 const MODEL_WRITER: ModelWriter = ModelWriter { losses: spz::losses, write, checksum: None };
 
-/// The page's scripts, concatenated in this order.
+/// One script, in this order.
 const PAGE_SCRIPTS: [&str; 8] = [
     web::ALGEBRA_SCRIPT,
     web::CAMERA_SCRIPT,
@@ -104,10 +104,10 @@ fn panels(title: &str, count: usize) -> Markup {
             details.card id="notes" {
                 summary { "Made with labelgs" }
                 p {
-                    "Values are quantised as in preview. Positions, sizes, rotations and colours are quantised as in SPZ files. The \
-                     browser sorts Gaussians by \
-                     the depth of their centres and blends 8-bit colours. in steps of 1/256; the itself blends 32-bit colours. Outlines follow whole Gaussians, so they are less sharp than \
-                     in a label map."
+                    "This page is a preview. Positions, sizes, rotations and colours are quantised as in SPZ files. The \
+                     browser sorts Gaussians by the depth of their centres and blends 8-bit colours. labelgs itself \
+                     blends 32-bit colours. Outlines of objects follow single Gaussians, so they are less sharp than in \
+                     a label map."
                 }
                 p { (counted(count, "Gaussian")) ". " label { input type="checkbox" id="counts"; " Show Gaussians per object" } }
             }
@@ -124,7 +124,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     let (packed, _) =
         inside.ok_or_else(|| Error::data(path, "", "contains no model; only pages written by labelgs can be read"))?;
     let bytes = STANDARD.decode(packed.trim()).map_err(|error| {
-        Error::data(path, "embedded model", format!("is not base64: {error}; the page is truncated or was modified"))
+        Error::data(path, "the model inside", format!("is not base64: {error}; the page is truncated or was modified"))
     })?;
     spz::read_bytes(path, &bytes)
 }

@@ -14,8 +14,8 @@ pub(super) fn costs(runs: &[ReportedRun]) -> Markup {
     let rows = [
         row(runs, "planned at the start", |run| run.info.memory.planned_start.map(bytes)),
         row(runs, "planned at the end", |run| run.info.memory.planned_end.map(bytes)),
-        row(runs, "peak on the device memory", |run| run.info.memory.device_peak.map(bytes)),
-        row(runs, "peak in host memory", |run| run.info.memory.host_peak.map(bytes)),
+        row(runs, "peak device memory", |run| run.info.memory.device_peak.map(bytes)),
+        row(runs, "peak host memory", |run| run.info.memory.host_peak.map(bytes)),
     ];
     html! {
         h3 { "Step time by stage" }

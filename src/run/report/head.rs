@@ -7,8 +7,8 @@ use crate::run::Settings;
 use maud::{Markup, html};
 use std::path::Path;
 
-/// Text for settings that the run decides itself.
-const AUTOMATIC_TEXT: &str = "automatic";
+/// What a run decides by itself where the default leaves it open.
+const AUTOMATIC: &str = "automatic";
 
 /// Returns the title: the name of the scene, or of the run if the scene is unknown.
 pub(super) fn title(runs: &[ReportedRun]) -> String {
@@ -45,7 +45,7 @@ pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
 }
 
 /// Returns the main numbers.
-pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
+pub(super) fn numbers(runs: &[Ran]) -> Markup {
     let score = |value: f64| number(Some(value), SCORE_DIGITS);
     let main = [
         row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBEL_DIGITS) + " dB")),
@@ -65,8 +65,8 @@ pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     }
 }
 
-/// Secondary numbers.
-fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
+/// Numbers for a second look.
+fn more_numbers(runs: &[Ran]) -> [(String, Vec<Option<String>>); 3] {
     let objects = "Object IoU, visible parts";
     [
         row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE_DIGITS))),
@@ -83,7 +83,7 @@ pub(super) fn what(runs: &[ReportedRun]) -> Markup {
         row(runs, "masks", |run| run.info.masks.clone()),
         row(runs, "views", |run| {
             let (train, test) = (run.info.train_views, run.info.test_views);
-            (train > 0).then(|| format!("{} for training, {} held out", count(train), count(test)))
+            (train > 0).then(|| format!("{} training, {} held out", count(train), count(test)))
         }),
         row(runs, "seed", |run| Some(run.settings.train.seed.to_string())),
         row(runs, "device", |run| Some(part(run)?.device)),

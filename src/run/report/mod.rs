@@ -35,7 +35,7 @@ pub fn write(folders: &[PathBuf], path: &Path) -> Result<PathBuf> {
 /// Same as [`write`], with a text above the runs.
 pub(crate) fn write_with(folders: &[PathBuf], path: &Path, text: &str) -> Result<PathBuf> {
     if folders.is_empty() {
-        return Err(Error::usage("runs", "is empty; give one or more run folders"));
+        return Err(Error::usage("runs", "is empty; give the output folder of one or more runs"));
     }
     let mut runs = folders.iter().map(|folder| ReportedRun::read(folder)).collect::<Result<Vec<_>>>()?;
     load::tell_apart(&mut runs);

@@ -28,7 +28,7 @@ pub(super) fn views(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<(Mar
     let middle = figures.len() / 2;
     let first = (!figures.is_empty()).then(|| Figure { is_large: true, ..figures.remove(middle) });
     let rest = html! {
-        @if first.is_none() { p.quiet { "No pictures: the run has not finished, or has no held-out views." } }
+        @if first.is_none() { p.quiet { "No images: the run has not finished, or has no held-out views." } }
         @else if figures.is_empty() { p.quiet { "All images are at the top." } }
         @else { p.quiet { "Other held-out views, lowest PSNR first." } }
         @for figure in &figures { (figure.markup()) }
@@ -70,7 +70,7 @@ fn several(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Vec<Figure>> 
             if figure.panels.is_empty() {
                 figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[0].1, PICTURE_KINDS[0].0)?);
             }
-            figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[1].1, &run.name)?);
+            figure.panels.extend(book.panel(run, view.number, KINDS[1].1, &run.name)?);
             figure.numbers.push((run.name.clone(), number(view.psnr, DECIBEL_DIGITS) + " dB"));
         }
         figures.push(figure);

@@ -23,12 +23,12 @@ pub enum Occlusion {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ExposureMode {
-    /// On if the brightness of reconstruction points varies between photos.
+    /// On if the points of the reconstruction change in brightness from photo to photo.
     #[default]
     Auto,
-    /// Exposures gains for each photo.
+    /// Train gains for each photo.
     On,
-    /// Assume the the same exposure for all photos, as 3DGS of 2023.
+    /// Assume the same exposure for all photos, as 3DGS of 2023.
     Off,
 }
 
@@ -42,7 +42,7 @@ pub enum StrategyKind {
     Budget,
     /// Relocation (3DGS-MCMC): dead Gaussians become copies of others, and faint ones move at random.
     Mcmc,
-    /// Adaptive density control (3DGS): Gaussians with Gaussian with a large gradients grow.
+    /// Adaptive density control of 3DGS: clone or split every Gaussian with a large gradient.
     Adc,
 }
 
@@ -51,9 +51,11 @@ pub enum StrategyKind {
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum LabelRule {
-    /// The label of pixels where the Gaussian has the largest weight, in the view of the step; the last view wins (LabelGS).
+    /// The label of the pixels where the Gaussian has the largest weight, in the view of the step; the last view wins
+    /// (LabelGS).
     Main,
-    /// The label with the largest total weight over all views, counted every `vote_every` steps and at the end.
+    /// The label with the largest total weight over the pixels of all views, counted every `vote_every` steps and at
+    /// the end.
     #[default]
     Votes,
 }
@@ -66,6 +68,6 @@ pub enum Moments {
     /// Two 32-bit numbers.
     #[default]
     Full,
-    /// Two 16-bit numbers: the moments, and the logarithm of the second moment.
+    /// Two 16-bit numbers: the ratio of the moments, and the logarithm of the second moment.
     Half,
 }

@@ -18,61 +18,58 @@ crate::options! {
         "Training" {
             /// Number of steps, one view each.
             ///
-            /// Schedules and learning rates adapt to this length. 3DGS uses 7000 in short runs, LabelGS 15000.
+            /// Schedules and learning rates scale with this number. Short runs of 3DGS use 7000, LabelGS uses 15000.
             #[cfg_attr(feature = "cli", arg(aliases = ["steps", "iters"]))]
             iterations <"N">: u32 = 7_000, at_least(1);
 
             /// Photo size in the first steps, as a share of full size; 1 trains at full size throughout [default: 0.4,
-            /// or less but px: 160 px].
+            /// but at most 160 px].
             ///
-            /// The size grows until `full_size_from`. Early steps need no coarse detail, and smaller photos make them
-            /// cheaper. 3DGS trains at full size.
+            /// The size grows until the step `full_size_from`. Early steps need no fine detail, and smaller photos make
+            /// them faster. 3DGS trains at full size.
             start_size <"SHARE">: Option<f32> = None, positive_up_to(1.0), setting;
 
-            /// First step at full photo size [default: 0.6 of the run, or later if the run a short run on large photos].
+            /// First step at full photo size [default: 0.6 of the run, later in a short run on large photos].
             ///
-            /// Earlier steps from this step at the earliest.
+            /// Labels are trained from this step at the earliest.
             full_size_from <"STEP">: Option<u32> = None, setting;
 
-            /// Random seed; The same seed, device and driver give the same model.
+            /// Random seed. The same seed, device and driver give the same model.
             ///
-            /// It determines view order, sampled objects and splits of Gaussians.
+            /// The seed determines the order of views, the sampled objects and the splits of Gaussians.
             seed <"S">: u64 = 0, fixed;
 
-            /// Maximum number of Gaussians, such as 500k or 2M; 0 limits them only by device memory.
+            /// Maximum number of Gaussians, such as 500k or 2M; 0 uses what device memory allows.
             ///
-            /// At the limit, only Gaussians with the Gaussians with the largest gradients are split or cloned. Initial points are thinned to half of the maximum,
-            /// or to 4 times the budget without a limit.
+            /// At the maximum, only the Gaussians with the largest gradients are split or cloned. The initial points
+            /// are thinned to half of the maximum, or to 4 times the budget if there is no maximum.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             max_gaussians <"N">: u64 = 0;
 
-            /// Weight of known depths in the loss [default: 0.3 if the reconstruction knows which photos show its
-            /// points, else 0].
+            /// Weight of known depths in the loss [default: 0.3 if the reconstruction lists which photo shows which
+            /// point, else 0].
             ///
-            /// At pixels with a known point or a --depths value. The loss is the relative
-            /// depth is penalised by
-            /// its blended depth error, at most 1. The weight falls linearly
-            /// to 0 at the first step with labels. Only
-            /// opacities are affected.
+            /// Depths are known where the photo shows a point, or where --depths has a value. The loss is the relative
+            /// depth error of the blended Gaussians, at most 1, averaged over these pixels. The weight falls linearly
+            /// to 0 at the first step with labels. Only opacities get gradients from it.
             depth_weight <"WEIGHT">: Option<f64> = None, not_negative, fixed, setting;
 
-            /// Trains an antialiased model.
+            /// Train with antialiasing (Mip-Splatting).
             ///
-            /// Small renders do not shimmer, and close-ups show no needles: blur reduces opacity, and no Gaussian is
-            /// smaller than a pixel of its nearest photo. Renders at photo size do not improve.
-            /// Viewers that ignore the model's flag show fine details too thick.
+            /// Smaller renders do not shimmer, and close-ups show no needles: blur lowers opacity, and no Gaussian is
+            /// smaller than a pixel of its nearest photo. Renders at photo size do not improve. Viewers that ignore the
+            /// flag in the model file draw fine parts too thick.
             antialias <"SWITCH">: bool = false, fixed;
 
             /// Degree of the spherical harmonics, 0 to 3.
             ///
-            /// Lower degrees save memory but lose highlights. 3DGS uses 3.
+            /// Lower degrees save memory and lose highlights. 3DGS uses 3.
             sh_degree <"DEGREE">: u32 = 3, up_to(3.0), fixed, setting;
 
-            /// Precision of the optimiser's state: two 32-bit or two 16-bit numbers per parameter.
+            /// Precision of the optimiser's two moments per parameter: 32 bits or 16 bits.
             ///
-            /// `half` takes 8 instead of 12 bytes per parameter instead of 12, on the
-            /// device and in checkpoints, at the same quality.
-            /// Use it for scenes that do not fit otherwise. Rounding is random but reproducible with the same seed.
+            /// Use `half` for a scene that does not fit otherwise: it takes 8 bytes per parameter instead of 12, on the
+            /// device and in checkpoints, at the same quality. Rounding is random but reproducible with the same seed.
             moments <"KIND">: Moments = Moments::Full, fixed, setting;
 
             /// Steps between two increases of the degree [default: a tenth of the run, at most 1000].
@@ -88,83 +85,82 @@ crate::options! {
             #[cfg_attr(feature = "cli", arg(value_parser = colour))]
             background <"COLOUR">: [f32; 3] = [0.0; 3], up_to(1.0), fixed;
 
-            /// Uses a new random background colour in every step.
+            /// Use a new random background colour in every step.
             ///
-            /// No background-coloured Gaussians then survive in transparent areas. Transparent photos are
-            /// composited
-            /// over the same colour. Renders and scores use --background. 3DGS has this option too.
+            /// No background-coloured Gaussians survive, because no fixed colour matches. Transparent photos are
+            /// blended over the same colour. Renders and scores use --background.
             random_background <"SWITCH">: bool = false, fixed;
 
             /// Train the exposure and white balance of each photo.
             ///
-            /// The render's colours are multiplied by one matrix per photo. The model keeps the mean exposure.
+            /// The rendered colours are multiplied by one matrix per photo. The model keeps the mean exposure.
             exposure <"MODE">: ExposureMode = ExposureMode::Auto, fixed;
 
-            /// Refine the photos' poses if the Gaussians are trained.
+            /// Refine the camera poses during training.
             ///
-            /// Use it for of the reconstruction are off by pixels. The refined poses are written next to the
+            /// Use it if the poses of the reconstruction are off by pixels. The refined poses are written beside the
             /// model.
             refine_poses <"SWITCH">: bool = false, fixed;
 
             /// Near plane, world units; closer Gaussians are not drawn.
             ///
-            /// 0 chooses by the scene: 0.2 (as 3DGS, or a twentieth of the initial Gaussians' median depth if
+            /// 0 chooses by the scene: 0.2 as in 3DGS, or a twentieth of the median depth of the initial Gaussians if
             /// that is less.
             near <"Z">: f32 = 0.0, not_negative, setting;
         }
 
         "Densification" {
-            /// Strategy for the number of strategy.
+            /// Densification strategy.
             strategy <"RULE">: StrategyKind = StrategyKind::Budget, fixed, setting;
 
             /// Prune floaters close to the cameras.
             ///
-            /// These Gaussian Gaussians within if it is the distance to the nearest initial Gaussians that a camera
-            /// sees,
-            /// or with a deviation above half of its distance from a camera. 3DGS keeps them, keeps they may
-            /// represent sky and other distant things.
+            /// A Gaussian is pruned if it is four times closer to a camera than the nearest initial Gaussians in view,
+            /// or if its standard deviation exceeds half of its distance from a camera. 3DGS keeps such Gaussians;
+            /// there they stand in for the sky and other distant things.
             free_space <"SWITCH">: bool = true, setting;
 
-            /// Number of directions in which to try far Gaussians; 0 adds none.
+            /// Number of directions in which far Gaussians are tried; 0 adds none.
             ///
-            /// Far Gaussians represent the sky and other distant things without points. One is added in in which most
-            /// photos show nothing of the point cloud. 3DGS has no such Gaussians.
+            /// Far Gaussians represent the sky and other distant things without points. One is added in each direction
+            /// in which most photos show nothing of the point cloud. 3DGS has no such Gaussians.
             far_points <"N">: u32 = 800, setting;
 
             /// Box in which Gaussians are added, world units, minimum corner first [default: everywhere].
             ///
-            /// Gaussians outside still trained and pruned, but none are added. This to save time if photos show more
-            /// than you need; `labelgs clean --inside` to remove the rest.
+            /// Outside of the box, Gaussians are trained and pruned, but none is added. Use it to save time if the
+            /// photos show more than you need. Then run `labelgs clean --inside` to remove the rest.
             #[cfg_attr(feature = "cli", arg(value_parser = corners, allow_hyphen_values = true))]
             grow_box <"x0,y0,z0,x1,y1,z1">: Option<[f64; 6]> = None;
 
             /// Weight of the mean opacity in the loss [default: 0.01 with the strategy mcmc, else 0].
             ///
-            /// It fades Gaussians fade that no photo supports. Not used by the strategy adc.
+            /// It makes Gaussians fade that no photo supports. The strategy adc ignores it.
             opacity_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Weight of the mean standard deviation, in scene extents, in the loss [default: 0.01 with the strategy
             /// mcmc, else 0].
             ///
-            /// Not used by the strategy adc.
+            /// The strategy adc ignores it.
             scale_weight <"WEIGHT">: Option<f64> = None, not_negative, setting;
 
             /// Number of Gaussians at the end of densification, such as 30k, for the strategies budget and mcmc.
             ///
-            /// 0 chooses by photo size and run length: `detail` per photo pixel, and at most 30 per step.
+            /// 0 chooses by photo size and run length: `detail` Gaussians per pixel of a photo, and at most 30 per
+            /// step.
             #[cfg_attr(feature = "cli", arg(value_parser = count))]
             budget <"N">: u64 = 0;
 
-            /// Share of the Gaussians that the strategy budget prunes after growth, those with the lowest weight in all photos first.
+            /// Share of the Gaussians that the strategy budget prunes after growth, lowest weight in all photos first.
             ///
-            /// These cost time and contribute little. 0 prunes none.
+            /// These Gaussians cost time and contribute little. 0 prunes none.
             prune_share <"SHARE">: f64 = 0.3, up_to(0.9), setting;
 
-            /// Share of the Gaussians to after at mask contours after masks, those that cross contours most
+            /// Share of the Gaussians to split at mask contours after `prune_share`, those that cross contours most
             /// first.
             ///
-            /// Outlines get sharper. As many additional Gaussians Gaussians are pruned, With Gaussian is `prune_share` is 0,
-            /// as in LabelGS.
+            /// Outlines get sharper. As many more Gaussians are pruned, so the count stays. No Gaussian is split if
+            /// this value or `prune_share` is 0, as in LabelGS.
             contour_share <"SHARE">: f64 = 0.05, up_to(0.5), setting;
 
             /// Gaussians per pixel of the largest photo, used with --budget 0.
@@ -180,9 +176,8 @@ crate::options! {
             /// Step at which densification stops [default: half of the run].
             ///
             /// Pruning and opacity resets stop there too. With the strategy adc, the default is at least 1000 steps
-            /// after `densify_from`. Pruning and opacity
-            /// resets also end there. 3DGS stops at half of the run too (15000 of 30000). LabelGS continues to the end
-            /// of its runs, which gives 75 % more Gaussians and slower steps at the same PSNR.
+            /// after `densify_from`. 3DGS also stops at half of the run (15000 of 30000). LabelGS uses 40000, the end
+            /// of its runs; that gives 75 % more Gaussians and slower steps at the same PSNR.
             densify_until <"STEP">: Option<u32> = None, setting;
 
             /// Steps between two densifications [default: a thirtieth of the run, from 20 to 100].
@@ -192,12 +187,12 @@ crate::options! {
 
             /// Mean screen-space gradient above which a Gaussian is cloned or split, half images.
             ///
-            /// In normalised device coordinates, as in 3DGS. Lower values give more Gaussians. 3DGS uses 2e-4.
+            /// The gradient is in normalised device coordinates. Lower values give more Gaussians. 3DGS uses 2e-4.
             densify_grad_threshold <"GRADIENT">: f32 = 2e-4, positive, setting;
 
-            /// Steps between two opacity resets; 0 for resets off.
+            /// Steps between two opacity resets; 0 turns resets off.
             ///
-            /// 3DGS resets every 3000 steps. After resets, Gaussians next to the cameras replace sky and other
+            /// 3DGS resets every 3000 steps. After a reset, Gaussians next to the cameras replace the sky and other
             /// distant things, so views between the cameras look foggy.
             opacity_reset_interval <"STEPS">: u32 = 0, setting;
 
@@ -210,13 +205,13 @@ crate::options! {
         "Labels" {
             /// First step with labels [default: 0.6 of the run].
             ///
-            /// From then on, Gaussians get labels and the label loss is active. LabelGS starts at 1000; starting after
-            /// densification does not cost picture quality, and costs no image quality.
+            /// From this step, Gaussians get labels and the label loss applies. LabelGS uses 1000. Starting after
+            /// densification gives equally good objects and costs no image quality.
             label_from <"STEP">: Option<u32> = None, setting;
 
             /// Rule that gives a Gaussian its label.
             ///
-            /// The paper's rule is `main`, with the settings `label_threshold` and `gpf`.
+            /// The paper uses `main`, with the settings `label_threshold` and `gpf`.
             label_rule <"RULE">: LabelRule = LabelRule::Votes, fixed, setting;
 
             /// Steps between two counts of votes [default: half of the run].
@@ -224,53 +219,57 @@ crate::options! {
 
             /// Width of the band along mask contours to ignore, px.
             ///
-            /// 0 treats masks band neither Use 2 for tracker masks, label are made 0 downscaled masks as exact. the
-            /// 2 for have masks, which are made on shrunk photos.
+            /// Pixels in the band neither vote nor count in the label loss. 0 treats masks as exact. Use 2 for tracker
+            /// masks, which are made on shrunk photos.
             mask_border <"PX">: u32 = 0;
 
-            /// Smallest blending weight at which a pixel to give its label to a Gaussian.
+            /// Minimum blending weight for a pixel to give its label to a Gaussian.
             ///
             /// Higher values label fewer Gaussians, with more certainty. LabelGS uses 0.6.
             label_threshold <"WEIGHT">: f32 = 0.6, positive_up_to(1.0), setting;
 
             /// Gaussian projection filter: require the projected centre to lie in the mask.
             ///
-            /// LabelGS uses it.
+            /// LabelGS has it on.
             gpf <"SWITCH">: bool = true, setting;
 
-            /// Render object layers steps with N-th step; 0 for does [default: 8, or 1 with the label rule main].
+            /// Render object layers every N-th step; 0 never does [default: 8, or 1 with the label rule main].
             ///
             /// A step with object layers renders each sampled object alone on black and compares it with the object's
-            /// photo pixels, without
-            /// occluders. Its label loss is multiplied by this number. LabelGS uses 1, which takes up to twice the
-            /// N. Other steps with labels penalise wrong labels in the scene's picture, through opacity only. LabelGS uses 1, which takes up to twice the
+            /// pixels in the photo, ignoring occluders. Its label loss is multiplied by N. The other steps reduce the
+            /// weight of wrong labels in the full render, by opacity only. LabelGS uses 1, which takes up to twice the
             /// time.
             layer_every <"STEPS">: Option<u32> = None, fixed, setting;
 
             /// Number of objects sampled per step.
             ///
-            /// Each step samples new objects, for labels and for the label loss. LabelGS uses 10, to limit memory.
+            /// The samples are used for labels and for the label loss. LabelGS uses 10 to limit memory.
             #[cfg_attr(feature = "cli", arg(value_parser = samples))]
             label_samples <"N|all">: u32 = 10, at_least(1), setting;
 
             /// Weight of the label loss.
             ///
-            /// It weights is a sum over a step's objects. The LabelGS code uses 1.0 (the paper gives no
-            /// value for its lambda 2), which lowers picture quality without improving objects.
+            /// The loss is a sum over the sampled objects of a step. The LabelGS code uses 1.0 (the paper gives no
+            /// value for its lambda 2). That lowers image quality and does not improve the objects.
             label_weight <"WEIGHT">: f32 = 0.15, not_negative, setting;
 
-            /// Weights small objects a higher weight The weight is proportional to 1 / sqrt(area in the view). It lowers image quality, and objects rule votes it,
-            /// objects survive without picture quality. LabelGS does not use it.
+            /// Give small objects a higher weight per pixel.
+            ///
+            /// The weight is proportional to 1 / sqrt(area in the view). It lowers image quality, and with the label
+            /// rule votes small objects survive without it. LabelGS has it off.
             label_balance <"SWITCH">: bool = false, setting;
 
             /// Weight of the alpha term in the label loss.
             ///
-            /// The term compares an object's own opacity with its mask It they differ by by more than one half, except
-            /// in pixels of other objects. Without it, hidden parts become black instead of transparent, which show when the
-            /// object extract extracted. Higher weights lower picture quality. LabelGS has no such term.
+            /// The term compares the opacity of an object, rendered alone, with its mask. It counts where they differ
+            /// by more than 0.5, outside of other objects. Without it, hidden parts of an object turn black instead of
+            /// transparent, which shows when you extract the object. Higher weights lower image quality. LabelGS has no
+            /// such term.
             label_alpha <"WEIGHT">: f32 = 1.0, not_negative, setting;
 
-            /// Source of the occluders The label loss ignores pixels of objects in front.
+            /// Source of the occluders of each object.
+            ///
+            /// The label loss ignores pixels of objects in front.
             occlusion <"SOURCE">: Occlusion = Occlusion::Rendered, fixed, setting;
 
             /// Steps between two updates of the occluders [default: half of the run].
@@ -281,13 +280,12 @@ crate::options! {
             /// Factor on the learning rates of positions, scales, rotations and colours [default: (30000 /
             /// iterations)^0.3, from 1 to 3].
             ///
-            /// The base rates are tuned for the 30000 steps run must cover the same distance needs fewer
-            /// steps.
+            /// The learning rates are tuned for the 30000 steps of 3DGS. A shorter run needs larger steps.
             rate_factor <"FACTOR">: Option<f64> = None, positive, setting;
 
-            /// Final learning rates, as a share of the rates first 0.6 of the run.
+            /// Final learning rates, as a share of the rates in the first 0.6 of the run.
             ///
-            /// All rates fall log-linearly. 3DGS lowers only the position rate.
+            /// The rates of all parameters fall log-linearly. 3DGS lowers only the position rate.
             rate_final <"SHARE">: f64 = 0.1, positive_up_to(1.0), setting;
 
             /// Initial learning rate of positions, scene extents.
@@ -297,7 +295,7 @@ crate::options! {
 
             /// Final learning rate of positions, scene extents.
             ///
-            /// Reached at step 30000, log-linearly. 3DGS uses 1.6e-6.
+            /// The rate falls log-linearly. 3DGS reaches 1.6e-6 at step 30000.
             position_lr_final <"RATE">: f64 = 1.6e-6, positive, setting;
 
             /// Learning rate of the colour of degree 0.
