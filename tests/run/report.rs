@@ -92,7 +92,7 @@ fn damaged(place: &Place, out: &str) {
     report(0, "Curves");
     assert!(read(&folder.join("report.html")) == page, "a line without an end does not count");
     std::fs::write(&history, whole.replacen("\"kind\"", "\"kin\"", 1)).expect("damaged");
-    report(3, "history.jsonl: line 1: is not a line of a history");
+    report(3, "history.jsonl: line 1: is not a valid history line");
     let mut lines: Vec<&str> = whole.lines().collect();
     lines.reverse();
     std::fs::write(&history, lines.join("\n") + "\n").expect("damaged");

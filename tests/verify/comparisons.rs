@@ -21,8 +21,8 @@ fn fails(verdict: Verdict, because: &str) {
 #[test]
 fn exact_sees_values_and_lengths() {
     assert!(exact(&[1, 2], &[1, 2]).is_ok());
-    fails(exact(&[1, 2], &[1, 3]), "1 of 2 elements differ, first at 1: 2 where 3");
-    fails(exact(&[1, 2], &[1]), "2 elements where 1");
+    fails(exact(&[1, 2], &[1, 3]), "1 of 2 elements differ, first at 1: 2, expected 3");
+    fails(exact(&[1, 2], &[1]), "2 elements, expected 1");
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn close_bounds_each_element() {
     assert!(close(&[100.0, 0.0], &[100.09, 0.0009], TIGHT).is_ok());
     fails(close(&[100.0], &[100.2], TIGHT), "element 0");
     fails(close(&[0.0, 0.0], &[0.0, 0.0011], TIGHT), "element 1");
-    fails(close(&[0.0], &[], TIGHT), "1 elements where 0");
+    fails(close(&[0.0], &[], TIGHT), "1 elements, expected 0");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn band_bounds_the_size_of_a_flip_and_wants_proof() {
 #[test]
 fn band_caps_the_number_of_flips() {
     let (actual, margins) = ([1.3, 0.7, 1.3, 1.0], [0.0; 4]);
-    fails(close_with_band(&actual, &[1.0; 4], &margins, (TIGHT, BAND), |_, _| true), "3 flips among 4 elements, 1 are");
+    fails(close_with_band(&actual, &[1.0; 4], &margins, (TIGHT, BAND), |_, _| true), "3 flips among 4 elements; 1 are");
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn band_wants_flips_both_ways() {
 
 #[test]
 fn band_checks_lengths() {
-    fails(close_with_band(&[1.0], &[1.0], &[], (TIGHT, BAND), |_, _| true), "0 elements where 1");
+    fails(close_with_band(&[1.0], &[1.0], &[], (TIGHT, BAND), |_, _| true), "0 elements, expected 1");
 }
 
 /// Expected values of both signs over some decades.
@@ -150,5 +150,5 @@ fn gradients_refuse_nan_and_need_zero_where_all_is_zero() {
     fails(changed(|i, e| if i == 7 { f64::NAN } else { e }), "element 7 is NaN");
     assert!(gradients(&[0.0; 3], &[0.0; 3], BOUNDS).is_ok());
     fails(gradients(&[0.0, 1e-9, 0.0], &[0.0; 3], BOUNDS), "element 1");
-    fails(gradients(&[0.0], &[0.0; 3], BOUNDS), "1 elements where 3");
+    fails(gradients(&[0.0], &[0.0; 3], BOUNDS), "1 elements, expected 3");
 }

@@ -56,7 +56,7 @@ fn lerf_mask_chooses_by_name_and_averages_over_prompts() {
     let compat = run(true);
     assert_eq!((compat.headline.iou, compat.mean.object_count), (Some(0.75), 1), "what is absent is not counted");
     assert!(compat.left_out.iter().any(|text| text.contains("old camera")), "{:?}", compat.left_out);
-    assert!(compat.rules.iter().any(|rule| rule.contains("left out")));
+    assert!(compat.rules.iter().any(|rule| rule.contains("excluded")));
 }
 
 #[test]
