@@ -89,7 +89,7 @@ fn frozen_gaussians_are_drawn_and_stay() {
         let mut resumed = Trainer::resume(turn.gpu(), &small(), half.clone(), options()).expect("it goes on");
         assert_eq!(go_on(&mut resumed, 60).planes, last.planes, "{strategy:?} goes on bit for bit");
         let without = Trainer::resume(turn.gpu(), &small(), half, TrainerOptions::default()).err().expect("refused");
-        assert!(without.to_string().contains("0 frozen Gaussians, 40 are in"), "{without}");
+        assert!(without.to_string().contains("0 frozen Gaussians, but 40 are in"), "{without}");
     }
 }
 
@@ -217,7 +217,9 @@ fn a_merge_lists_all_that_is_wrong() {
     let text = stderr(&none);
     assert_eq!(none.status.code(), Some(3), "{text}");
     assert!(
-        text.contains("2 problems") && text.contains("b000: no training") && text.contains("b001: no training"),
+        text.contains("2 problems")
+            && text.contains("b000: no block was trained")
+            && text.contains("b001: no block was trained"),
         "{text}"
     );
     assert!(!place.path("city").exists(), "nothing is written");
@@ -264,7 +266,7 @@ fn a_block_is_trained_with_its_scene_only() {
     succeeded(&train_block(&place, "b000", &["--checkpoint-every", "10"]));
     let other = place.text("blocks/b001");
     let again = place.trained("models/b000", &["--block", &other, "--resume", "--iterations", "130"]);
-    assert!(stderr(&again).contains("holds a training of block b000"), "{}", stderr(&again));
+    assert!(stderr(&again).contains("contains a run of block b000"), "{}", stderr(&again));
     // Exposures of the coarse training stay as they are.
     let folder = place.path("blocks/b001");
     let file = BlockFile::read(&folder).expect("a block");

@@ -49,7 +49,7 @@ pub(super) fn find(request: &Request, changed: &ResumeSettings) -> Result<Option
                 return decide(request, changed, resumed).map(Some);
             }
             Err(error) => {
-                tracing::warn!("{error}; the checkpoint before it is tried");
+                tracing::warn!("{error}; trying the previous checkpoint");
                 first.get_or_insert(error);
             }
         }

@@ -123,7 +123,7 @@ fn a_list_of_devices_means_the_first_that_is_free() {
     // Without a list nobody looks at locks; another device is free.
     assert_eq!(devices("0").status.code(), Some(0));
     let output = devices("0,no such device");
-    assert!(text(&output.stderr).contains("none matches no such device"), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("no device matches no such device"), "{}", text(&output.stderr));
     if let Some(drivers) = two_drivers() {
         let mut command = Command::cargo_bin("labelgs").expect("the tool is built");
         command.env("LABELGS_VALIDATION", "off").env("LABELGS_CACHE", place.path("cache"));

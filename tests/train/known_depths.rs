@@ -64,7 +64,7 @@ fn depths_that_are_not_there_are_an_error() {
         let message = stderr(&place.trained("out", flags));
         expected.iter().for_each(|part| assert!(message.contains(part), "{part:?} in {message}"));
     };
-    refused(&["--depths", &maps, "--set", "depth_weight=0"], &["--depths", "--set depth_weight above 0"]);
+    refused(&["--depths", &maps, "--set", "depth_weight=0"], &["--depths", "--set depth_weight is above 0"]);
     refused(&with(&["--depths", &place.text("nowhere")]), &["nowhere", "there is no such folder"]);
     refused(&with(&["--depths", &masks]), &["masks", "depth needs 16-bit grey"]);
     let holes = written(&place, "holes", [0.0; 2]);
