@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const REPOSITORY_ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Columns of the names in the table of floors.
 const NAMES: usize = 23;
@@ -13,7 +13,7 @@ const NAMES: usize = 23;
 /// only; modules of one floor do not use each other.
 fn floors() -> &'static [Vec<String>] {
     static FLOORS: LazyLock<Vec<Vec<String>>> = LazyLock::new(|| {
-        let text = fs::read_to_string(Path::new(ROOT).join("src/guide/inside.md")).expect("inside.md");
+        let text = fs::read_to_string(Path::new(REPOSITORY_ROOT).join("src/guide/inside.md")).expect("inside.md");
         let floors = text.split("## Floors").nth(1).expect("a part about floors");
         let table = floors.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a table");
         let names = |line: &str| line.chars().take(NAMES).collect::<String>();
@@ -45,7 +45,7 @@ fn files(folder: &str, extension: &[&str]) -> Vec<(PathBuf, String)> {
         }
     }
     let mut found = Vec::new();
-    walk(&Path::new(ROOT).join(folder), &mut found);
+    walk(&Path::new(REPOSITORY_ROOT).join(folder), &mut found);
     found.retain(|path| path.extension().is_some_and(|found| extension.iter().any(|wanted| found == *wanted)));
     found.sort();
     found.into_iter().map(|path| (path.clone(), fs::read_to_string(path).expect("text"))).collect()
@@ -53,7 +53,7 @@ fn files(folder: &str, extension: &[&str]) -> Vec<(PathBuf, String)> {
 
 /// Top module of a file of `src`.
 fn module(path: &Path) -> String {
-    let inside = path.strip_prefix(Path::new(ROOT).join("src")).expect("in src");
+    let inside = path.strip_prefix(Path::new(REPOSITORY_ROOT).join("src")).expect("in src");
     let first = inside.components().next().expect("a component").as_os_str().to_string_lossy().into_owned();
     first.trim_end_matches(".rs").to_owned()
 }
@@ -103,7 +103,7 @@ fn modules_use_lower_floors_only() {
     for (path, text) in files("src", &["rs"]) {
         let own = module(&path);
         // The compiler checks crates.
-        if Path::new(ROOT).join("src").join(&own).join("Cargo.toml").exists() {
+        if Path::new(REPOSITORY_ROOT).join("src").join(&own).join("Cargo.toml").exists() {
             continue;
         }
         for other in used(&text) {
@@ -139,7 +139,7 @@ fn with_word(word: &str) -> Vec<String> {
         lines.any(|line| line.contains(word) && !line.trim_start().starts_with("#!["))
     };
     let found = files("src", &["rs"]).into_iter().filter(|(_, text)| has(text));
-    let name = |path: PathBuf| path.strip_prefix(ROOT).expect("inside").to_string_lossy().into_owned();
+    let name = |path: PathBuf| path.strip_prefix(REPOSITORY_ROOT).expect("inside").to_string_lossy().into_owned();
     found.map(|(path, _)| name(path)).collect()
 }
 

@@ -18,12 +18,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Gaussians at the end of the first models that stay as they are.
-const FROZEN: u32 = 40;
+const FROZEN_COUNT: u32 = 40;
 
 fn region() -> Region {
     let zone =
         Zone { low: DVec3::splat(f64::NEG_INFINITY), high: DVec3::splat(f64::INFINITY), ..Zone::along_world([0.0; 6]) };
-    Region { frozen: FROZEN, zone, extent: 3.0, exposures: BTreeMap::new() }
+    Region { frozen: FROZEN_COUNT, zone, extent: 3.0, exposures: BTreeMap::new() }
 }
 
 fn options() -> TrainerOptions {
@@ -64,8 +64,8 @@ fn settings(strategy: StrategyKind) -> TrainConfig {
 fn frozen_gaussians_are_drawn_and_stay() {
     let Some(turn) = device() else { return };
     let first = start();
-    let kept = first.len() - FROZEN as usize;
-    let tail = |model: &Gaussians| model.filtered(|row| row + FROZEN as usize >= model.len());
+    let kept = first.len() - FROZEN_COUNT as usize;
+    let tail = |model: &Gaussians| model.filtered(|row| row + FROZEN_COUNT as usize >= model.len());
     let bare = |model: Gaussians| Gaussians {
         label_confidence: None,
         antialiased: false,
@@ -83,8 +83,8 @@ fn frozen_gaussians_are_drawn_and_stay() {
         assert!(tail(&model).sh_rest.iter().all(|&triple| triple == [0.0; 3]));
         assert!(model.means[..kept].iter().zip(&first.means).any(|(a, b)| a != b), "the others are trained");
         let plane = |name: &str| last.planes.iter().find(|plane| plane.name == name).expect("a plane");
-        assert_eq!(plane("m_means").data.len() / 4, model.len() - FROZEN as usize, "frozen ones have no moments");
-        assert_eq!((plane("means").data.len() / 4, last.frozen), (model.len(), FROZEN));
+        assert_eq!(plane("m_means").data.len() / 4, model.len() - FROZEN_COUNT as usize, "frozen ones have no moments");
+        assert_eq!((plane("means").data.len() / 4, last.frozen), (model.len(), FROZEN_COUNT));
 
         let mut resumed = Trainer::resume(turn.gpu(), &small(), half.clone(), options()).expect("it goes on");
         assert_eq!(go_on(&mut resumed, 60).planes, last.planes, "{strategy:?} goes on bit for bit");

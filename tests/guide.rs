@@ -12,27 +12,28 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const REPOSITORY_ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Steps that every long training of the pages loses.
 const STEPS_LESS: u32 = 2980;
 
 /// The line of the guide at which a person runs a tracker of their own.
-const TRACKER: &str = "# your tracker reads video/frames/NNNNN.png and writes id images tracked/NNNNN.png";
+const TRACKER_COMMENT: &str = "# your tracker reads video/frames/NNNNN.png and writes id images tracked/NNNNN.png";
 
 /// The lines of the boxes of shell commands in a page.
 fn commands(page: &Path) -> Vec<String> {
     let text = fs::read_to_string(page).expect("a page");
     let boxes = text.split("\n```").collect::<Vec<_>>();
     let shell = boxes.iter().filter_map(|part| part.strip_prefix("sh\n"));
-    let lines =
-        shell.flat_map(str::lines).filter(|line| !line.is_empty() && (!line.starts_with('#') || *line == TRACKER));
+    let lines = shell
+        .flat_map(str::lines)
+        .filter(|line| !line.is_empty() && (!line.starts_with('#') || *line == TRACKER_COMMENT));
     lines.map(str::to_owned).collect()
 }
 
 /// Pages of the guide, in its order.
 fn pages() -> Vec<PathBuf> {
-    let folder = Path::new(ROOT).join("src/guide");
+    let folder = Path::new(REPOSITORY_ROOT).join("src/guide");
     let text = fs::read_to_string(folder.join("mod.rs")).expect("the guide");
     let table = text.split("\npages! {").nth(1).expect("the pages");
     let names = table.lines().filter_map(|line| line.trim().split_once(": \"")).map(|(name, _)| name);
@@ -137,7 +138,7 @@ fn run(pages: &[PathBuf]) {
             if !done.insert(line.clone()) {
                 continue;
             }
-            if line == TRACKER {
+            if line == TRACKER_COMMENT {
                 track(folder.path());
                 continue;
             }
@@ -151,7 +152,8 @@ fn run(pages: &[PathBuf]) {
                 stroke(page, folder.path());
             }
             if words[0] != "labelgs" {
-                let is_known = words[0] == "cargo" || words.iter().any(|word| Path::new(ROOT).join(word).is_file());
+                let is_known =
+                    words[0] == "cargo" || words.iter().any(|word| Path::new(REPOSITORY_ROOT).join(word).is_file());
                 assert!(is_known, "{}: no command is known for: {line}", page.display());
                 continue;
             }
@@ -180,7 +182,7 @@ fn run(pages: &[PathBuf]) {
 
 #[test]
 fn every_command_of_readme_and_guide_runs() {
-    run(&[vec![Path::new(ROOT).join("README.md")], pages()].concat());
+    run(&[vec![Path::new(REPOSITORY_ROOT).join("README.md")], pages()].concat());
 }
 
 /// Commands in the tables of README, which need files that nobody has here, are commands of the program.
@@ -198,6 +200,6 @@ fn commands_of_tables_are_understood() {
 
 #[test]
 fn readme_has_at_most_150_lines() {
-    let lines = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("README.md").lines().count();
+    let lines = fs::read_to_string(Path::new(REPOSITORY_ROOT).join("README.md")).expect("README.md").lines().count();
     assert!(lines <= 150, "{lines} lines: what is long goes into the guide");
 }

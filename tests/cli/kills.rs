@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Kills of each command.
-const KILLS: u32 = 3;
+const KILL_COUNT: u32 = 3;
 
 /// Bytes of all files below a folder, without temporary files.
 fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -34,7 +34,7 @@ fn exports_may_be_killed_at_any_moment() {
         (vec!["render", &run, "--scene", &scene, "--views", "all", "--what", "rgb,labels", "-o"], out.clone()),
         (vec!["eval", &run, "--scene", &scene, "--masks", &masks, "--json"], file("scores.json")),
     ];
-    let kills = kills(KILLS);
+    let kills = kills(KILL_COUNT);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
     for (args, to) in commands {
         let name = args[0];

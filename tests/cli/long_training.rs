@@ -5,8 +5,8 @@ use crate::support::runs::{Place, succeeded};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-const STEPS: u32 = 400;
-const MIDDLE: u32 = 200;
+const STEP_COUNT: u32 = 400;
+const MIDDLE_STEP: u32 = 200;
 
 const SETTINGS: &str = "
 iterations = 400
@@ -36,9 +36,10 @@ fn a_long_training_is_the_same_to_the_last_bit() {
     let start = Instant::now();
     succeeded(&place.trained("straight", &flags));
     let patience = start.elapsed() * 20 + Duration::from_secs(60);
-    let expected = place.model("straight", STEPS);
-    let gaussians =
-        labelgs::formats::read_model(place.path(&format!("straight/point_cloud/iteration_{STEPS}/point_cloud.ply")));
+    let expected = place.model("straight", STEP_COUNT);
+    let gaussians = labelgs::formats::read_model(
+        place.path(&format!("straight/point_cloud/iteration_{STEP_COUNT}/point_cloud.ply")),
+    );
     let gaussians = gaussians.expect("a model").gaussians;
     let labelled = gaussians.labels.as_ref().map_or(0, |labels| labels.iter().filter(|&&id| id > 0).count());
     assert!(gaussians.len() > 300 && labelled > 100, "{} Gaussians, {labelled} of them labelled", gaussians.len());
@@ -52,9 +53,9 @@ fn a_long_training_is_the_same_to_the_last_bit() {
     }
     child.kill().expect("killed or done");
     child.wait().expect("a child");
-    assert_eq!(place.checkpoints("killed").first().map(|found| found.step), Some(MIDDLE));
+    assert_eq!(place.checkpoints("killed").first().map(|found| found.step), Some(MIDDLE_STEP));
     succeeded(&place.trained("killed", &["--resume"]));
-    assert!(place.model("killed", STEPS) == expected, "killed and resumed: another model");
+    assert!(place.model("killed", STEP_COUNT) == expected, "killed and resumed: another model");
 
     if !turn.is_cpu() {
         return;
@@ -69,6 +70,6 @@ fn a_long_training_is_the_same_to_the_last_bit() {
             .env("LABELGS_CACHE", place.path("cache"));
         command.args(place.train(&place.text(&out), &flags));
         succeeded(&command.output().expect("it runs"));
-        assert!(place.model(&out, STEPS) == expected, "{threads} threads: another model");
+        assert!(place.model(&out, STEP_COUNT) == expected, "{threads} threads: another model");
     }
 }

@@ -13,9 +13,9 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 /// Number of kills.
-const KILLS: u32 = 6;
+const KILL_COUNT: u32 = 6;
 /// Steps of a run.
-const STEPS: u32 = 40;
+const STEP_COUNT: u32 = 40;
 
 fn wait_until(child: &mut Child, what: impl Fn() -> bool) {
     let start = Instant::now();
@@ -38,7 +38,7 @@ fn kills_at_any_moment_cost_no_bit() {
     let count = |kind: &str| kinds.iter().filter(|found| found.trim_matches('"') == kind).count();
     assert_eq!((count("steps"), count("preview"), count("scores")), (4, 6, 1), "{kinds:?}");
     assert!(count("densified") > 0, "{kinds:?}");
-    let kills = kills(KILLS);
+    let kills = kills(KILL_COUNT);
     let mut random = Pcg32::seed_from_u64(u64::from(kills));
     let newest = || place.checkpoints("out").first().map_or((0, 0), |found| (found.number, found.step));
     // Steps of the checkpoints after each kill.
@@ -67,12 +67,12 @@ fn kills_at_any_moment_cost_no_bit() {
         // The run ended before the kill.
         assert!(status.success(), "{status}");
         assert!(
-            place.model("out", STEPS) == place.model("straight", STEPS),
+            place.model("out", STEP_COUNT) == place.model("straight", STEP_COUNT),
             "killed after {steps:?}: the models differ"
         );
         assert_eq!(place.history("out"), place.history("straight"), "killed after {steps:?}");
         assert!(files(&place.path("out")).iter().all(|path| path.extension().is_none_or(|name| name != "tmp")));
-        assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEPS]);
+        assert_eq!(place.checkpoints("out").iter().map(|found| found.step).collect::<Vec<_>>(), [STEP_COUNT]);
         std::fs::remove_dir_all(place.path("out")).expect("removed");
         (ended, steps) = (ended + 1, Vec::new());
     }

@@ -18,7 +18,7 @@ use labelgs::scheduler::SchedulerOptions;
 use rand::Rng;
 use std::path::Path;
 
-const SIZE: (u32, u32) = (61, 45);
+const IMAGE_SIZE: (u32, u32) = (61, 45);
 
 /// Gaussians all around the cameras: small ones, large ones and needles, at the borders of views and around near planes.
 fn crowd(count: usize) -> Gaussians {
@@ -34,7 +34,7 @@ fn crowd(count: usize) -> Gaussians {
 
 /// Cameras in the crowd, which look to all sides.
 fn cameras() -> Vec<Camera> {
-    let (mut random, (width, height)) = (generator(6), SIZE);
+    let (mut random, (width, height)) = (generator(6), IMAGE_SIZE);
     let turned = |index: usize| {
         let camera = camera(&mut random, width, height);
         Camera { rotation: camera.rotation * DMat3::from_rotation_y(index as f64 * 1.3), ..camera }
@@ -73,13 +73,13 @@ fn views_of_a_large_model_are_those_of_the_whole() {
     let whole = read_model(&path).expect("read").gaussians;
     let stored = LazyModel::open(&path).expect("opened");
     assert!(matches!(stored, LazyModel::Stored(_)));
-    let mut engine = Engine::for_model(turn.gpu(), &whole, [SIZE]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &whole, [IMAGE_SIZE]).expect("an engine");
     let options = RenderOptions::default();
     let expected: Vec<Render> =
         cameras().iter().map(|camera| render(&mut engine, camera, &options).expect("a picture")).collect();
     // A fifth of the model and a third of the picture.
-    let little = limited(memory_of(&turn, 800, (SIZE.0, 16)));
-    assert!(!fits(&turn, stored.view(), SIZE, little).expect("an answer"));
+    let little = limited(memory_of(&turn, 800, (IMAGE_SIZE.0, 16)));
+    assert!(!fits(&turn, stored.view(), IMAGE_SIZE, little).expect("an answer"));
     for source in [stored.view(), ModelRef::Whole(&whole)] {
         let (index, notes) = GaussianIndex::new(source, 0.0, |_, _| true).expect("an index");
         assert_eq!(notes, Vec::<String>::new());
@@ -119,7 +119,7 @@ fn objects_of_a_large_model_are_drawn_alone() {
     let (camera, options) = (&cameras()[1], RenderOptions::new(0.2, Parts::COLOUR));
     for label in [2, 7] {
         let part = edit::extract(&model, &[label], 0.6).expect("an object");
-        let mut engine = Engine::for_model(turn.gpu(), &part, [SIZE]).expect("an engine");
+        let mut engine = Engine::for_model(turn.gpu(), &part, [IMAGE_SIZE]).expect("an engine");
         assert!(painter.show(Some(&[label])));
         let found = painter.render(camera, &options).expect("a picture");
         assert!(found == render(&mut engine, camera, &options).expect("a picture"), "label {label}");
@@ -141,7 +141,7 @@ fn large_ids_are_drawn_as_small_ones() {
     let mut large = small.clone();
     large.labels.iter_mut().flatten().for_each(|label| *label = wide(*label));
     let (camera, options) = (&cameras()[0], RenderOptions::default());
-    let mut engine = Engine::for_model(turn.gpu(), &small, [SIZE]).expect("an engine");
+    let mut engine = Engine::for_model(turn.gpu(), &small, [IMAGE_SIZE]).expect("an engine");
     let expected = render(&mut engine, camera, &options).expect("a picture");
     engine.upload_model(&large).expect("uploaded");
     let found = render(&mut engine, camera, &options).expect("a picture");
@@ -179,7 +179,7 @@ fn more_labels_than_a_device_tells_apart_are_drawn_in_bands() {
         model.sh_rest.extend([[0.0; 3]; 3]);
         model.labels.as_mut().expect("labels").push(WALL);
     }
-    let error = Engine::for_model(turn.gpu(), &model, [SIZE]).err().expect("too many labels").to_string();
+    let error = Engine::for_model(turn.gpu(), &model, [IMAGE_SIZE]).err().expect("too many labels").to_string();
     assert!(error.contains("90001 different labels"), "{error}");
     let (index, _) = GaussianIndex::new((&model).into(), 0.0, |_, _| true).expect("an index");
     let mut painter = Painter::new(turn.gpu(), (&model).into(), index, SchedulerOptions::default());

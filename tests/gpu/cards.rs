@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 /// Families that Mesa 22.3 knows: two generations with subgroups of 64 only, two with 32 and 64.
-const FAMILIES: [&str; 4] = ["polaris10", "vega20", "navi10", "navi21"];
+const GPU_FAMILIES: [&str; 4] = ["polaris10", "vega20", "navi10", "navi21"];
 
-const TABLES: &str = "tests/golden/kernels";
+const TABLE_FOLDER: &str = "tests/golden/kernels";
 
 /// The driver's file, or `None` with a message.
 fn driver() -> Option<PathBuf> {
@@ -61,12 +61,12 @@ fn kernels_compile_for_cards_as_the_tables_say() {
     let mut differences = String::new();
     let out = Path::new("target/kernels");
     fs::create_dir_all(out).expect("a folder");
-    for family in FAMILIES {
+    for family in GPU_FAMILIES {
         let output = on(&driver, family, &["kernels"]);
         // The status is 1 if a kernel spills.
         assert_eq!(output.status.code(), Some(0), "{family}: {}", text(&output.stderr));
         let (new, file) = (text(&output.stdout), format!("{family}.txt"));
-        let old = fs::read_to_string(Path::new(TABLES).join(&file)).unwrap_or_default();
+        let old = fs::read_to_string(Path::new(TABLE_FOLDER).join(&file)).unwrap_or_default();
         let compiler = |table: &str| table.lines().next().unwrap_or_default().to_owned();
         if !old.is_empty() && compiler(&old) != compiler(&new) {
             eprintln!("not compared: the tables are of {}, this is {}", compiler(&old), compiler(&new));
@@ -85,14 +85,14 @@ fn kernels_compile_for_cards_as_the_tables_say() {
     let hash = format!("{:08x}", tables.finalize());
     assert!(
         differences.is_empty(),
-        "kernels compile to something else. If that is meant: cp target/kernels/*.txt {TABLES}, and add a line to \
-         {TABLES}/changes.txt: {hash} and why.\n{differences}"
+        "kernels compile to something else. If that is meant: cp target/kernels/*.txt {TABLE_FOLDER}, and add a line to \
+         {TABLE_FOLDER}/changes.txt: {hash} and why.\n{differences}"
     );
-    let changes = fs::read_to_string(Path::new(TABLES).join("changes.txt")).expect("changes.txt");
+    let changes = fs::read_to_string(Path::new(TABLE_FOLDER).join("changes.txt")).expect("changes.txt");
     let why = changes.lines().last().unwrap_or_default().strip_prefix(&hash).unwrap_or_default().trim();
     assert!(
         why.len() > 20,
-        "the last line of {TABLES}/changes.txt must begin with {hash} and say why the tables changed"
+        "the last line of {TABLE_FOLDER}/changes.txt must begin with {hash} and say why the tables changed"
     );
 }
 

@@ -5,10 +5,10 @@ use crate::support::runs::{Place, files, stderr, succeeded};
 use std::path::Path;
 
 /// Four storage buffers.
-const FEW: (&str, &str) = ("LABELGS_LIMIT_BUFFERS", "4");
+const BUFFER_LIMIT: (&str, &str) = ("LABELGS_LIMIT_BUFFERS", "4");
 
 /// Kernels of a card, which read no texels on the least device.
-const CARD: [(&str, &str); 6] = [
+const CARD_LIMITS: [(&str, &str); 6] = [
     ("LABELGS_LIMIT_TEXELS", "64K"),
     ("LABELGS_LOSS", "shared"),
     ("LABELGS_WALK", "group"),
@@ -33,8 +33,8 @@ fn pictures(place: &Place, run: &str, out: &str) -> Vec<Vec<u8>> {
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn buffers_that_share_bindings_change_no_bit() {
     let Some(_turn) = device() else { return };
-    for forms in [&[][..], &CARD] {
-        let few = [forms, &[FEW]].concat();
+    for forms in [&[][..], &CARD_LIMITS] {
+        let few = [forms, &[BUFFER_LIMIT]].concat();
         let mut place = Place::new();
         let settings = place.settings();
         let flags = ["--config", settings.as_str()];
@@ -71,7 +71,7 @@ fn buffers_that_share_bindings_change_no_bit() {
 fn the_selftest_passes_with_four_storage_buffers() {
     let Some(_turn) = device() else { return };
     let mut place = Place::new();
-    place.choose(&[&CARD[..4], &[FEW]].concat());
+    place.choose(&[&CARD_LIMITS[..4], &[BUFFER_LIMIT]].concat());
     let output = place.labelgs(&["selftest", "--json"]);
     succeeded(&output);
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
@@ -87,7 +87,7 @@ fn a_model_that_four_bindings_do_not_hold_is_refused() {
     let (scene, out) = (place.text("many"), place.text("out"));
     let made = ["synth", &scene, "--preset", "simple", "--size", "64x48", "--views", "6", "--points", "1500"];
     succeeded(&place.labelgs(&made));
-    place.choose(&[FEW, ("LABELGS_LIMIT_SSBO", "160K")]);
+    place.choose(&[BUFFER_LIMIT, ("LABELGS_LIMIT_SSBO", "160K")]);
     let output = place.labelgs(&["train", &scene, "--iterations", "1", "-o", &out]);
     let said = stderr(&output);
     assert!(!output.status.success() && said.contains("storage bindings of this device"), "{said}");

@@ -10,11 +10,11 @@ use std::sync::LazyLock;
 
 /// Most places of a seed that are changed; longer seeds are changed at evenly spaced places. `LABELGS_TEST_PLACES` has another
 /// number.
-static PLACES: LazyLock<usize> =
+static FOLDER_COUNT: LazyLock<usize> =
     LazyLock::new(|| std::env::var("LABELGS_TEST_PLACES").ok().and_then(|places| places.parse().ok()).unwrap_or(12));
 
 /// Numbers that a field may be given, as text.
-const WORDS: [&str; 11] = [
+const HOSTILE_WORDS: [&str; 11] = [
     "0",
     "-1",
     "2147483648",
@@ -45,9 +45,9 @@ fn numbers() -> Vec<Vec<u8>> {
     all
 }
 
-/// Up to [`PLACES`] places below `length`.
+/// Up to [`FOLDER_COUNT`] places below `length`.
 fn places(length: usize) -> impl Iterator<Item = usize> {
-    (0..length).step_by(length.div_ceil(*PLACES).max(1))
+    (0..length).step_by(length.div_ceil(*FOLDER_COUNT).max(1))
 }
 
 /// Every change of a file.
@@ -65,7 +65,7 @@ fn changes(seed: &[u8], visit: &mut impl FnMut(Vec<u8>)) {
         numbers.iter().for_each(|number| changed(at, number));
     }
     for (start, end) in words(seed) {
-        for word in WORDS {
+        for word in HOSTILE_WORDS {
             visit([&seed[..start], word.as_bytes(), &seed[end..]].concat());
         }
     }
@@ -85,7 +85,7 @@ fn words(text: &[u8]) -> Vec<(usize, usize)> {
         }
         at += length.max(1);
     }
-    let step = found.len().div_ceil(*PLACES / 4).max(1);
+    let step = found.len().div_ceil(*FOLDER_COUNT / 4).max(1);
     found.into_iter().step_by(step).collect()
 }
 

@@ -6,7 +6,7 @@ use labelgs::scene::Dataset;
 use labelgs::scenes::{self, LoadOptions};
 use std::path::Path;
 
-const IDENTITY: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+const IDENTITY_MATRIX: &str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
 fn open(scene: &Path, allow_outside: bool) -> Result<Dataset> {
     scenes::open(
@@ -54,7 +54,7 @@ fn transforms_that_leave_the_scene_need_the_flag() {
     let around = outside();
     let absolute = around.path().join("photos/a.png").to_str().expect("UTF-8").to_owned();
     for listed in ["../photos/a.png", "..\\\\photos\\\\a", absolute.as_str()] {
-        let frame = format!(r#"{{"file_path": "{listed}", "transform_matrix": {IDENTITY}}}"#);
+        let frame = format!(r#"{{"file_path": "{listed}", "transform_matrix": {IDENTITY_MATRIX}}}"#);
         around.write("scene/transforms.json", format!(r#"{{"fl_x": 10, "frames": [{frame}]}}"#));
         let scene = around.path().join("scene");
         let text = refusal(open(&scene, false));
@@ -70,7 +70,7 @@ fn transforms_that_leave_the_scene_need_the_flag() {
 fn drives_of_windows_are_absolute_here_too() {
     let scene = Scene::new();
     for listed in ["C:\\\\photos\\\\a.png", "d:/a.png", "\\\\\\\\server\\\\share\\\\a.png"] {
-        let frame = format!(r#"{{"file_path": "{listed}", "w": 12, "h": 8, "transform_matrix": {IDENTITY}}}"#);
+        let frame = format!(r#"{{"file_path": "{listed}", "w": 12, "h": 8, "transform_matrix": {IDENTITY_MATRIX}}}"#);
         scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{frame}]}}"#));
         assert!(refusal(open(scene.path(), false)).contains("outside the scene"), "{listed}");
     }
@@ -82,7 +82,7 @@ fn points_that_leave_the_scene_need_the_flag() {
     let cloud = &super::seeds::ply_cloud()[0];
     around.write("points.ply", cloud);
     around.photo("scene/images/a.png", 12, 8);
-    let frame = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {IDENTITY}}}"#);
+    let frame = format!(r#"{{"file_path": "images/a.png", "transform_matrix": {IDENTITY_MATRIX}}}"#);
     let text = format!(r#"{{"fl_x": 10, "ply_file_path": "../points.ply", "frames": [{frame}]}}"#);
     around.write("scene/transforms.json", text);
     let scene = around.path().join("scene");
@@ -94,7 +94,7 @@ fn points_that_leave_the_scene_need_the_flag() {
 fn one_name_for_two_photos_is_an_error() {
     let around = outside();
     around.photo("scene/photos/a.png", 12, 8);
-    let frame = |name: &str| format!(r#"{{"file_path": "{name}", "transform_matrix": {IDENTITY}}}"#);
+    let frame = |name: &str| format!(r#"{{"file_path": "{name}", "transform_matrix": {IDENTITY_MATRIX}}}"#);
     let frames = [frame("photos/a.png"), frame("../photos/a.png")].join(",");
     around.write("scene/transforms.json", format!(r#"{{"fl_x": 10, "frames": [{frames}]}}"#));
     let text = refusal(open(&around.path().join("scene"), true));
@@ -105,7 +105,7 @@ fn one_name_for_two_photos_is_an_error() {
 fn names_that_are_no_files_are_refused() {
     let scene = Scene::new();
     let refused = |name: &str, allow: bool| {
-        let frame = format!(r#"{{"file_path": "{name}", "w": 12, "h": 8, "transform_matrix": {IDENTITY}}}"#);
+        let frame = format!(r#"{{"file_path": "{name}", "w": 12, "h": 8, "transform_matrix": {IDENTITY_MATRIX}}}"#);
         scene.write("transforms.json", format!(r#"{{"fl_x": 10, "frames": [{frame}]}}"#));
         open(scene.path(), allow)
     };

@@ -8,12 +8,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::process::Command;
 
 /// Set in the children, which then print the hash.
-const CHILD: &str = "LABELGS_TEST_CHILD";
+const CHILD_VARIABLE: &str = "LABELGS_TEST_CHILD";
 
 /// Not a test by itself: child processes of the tests below run it.
 #[test]
 fn hash_of_a_training() {
-    if std::env::var_os(CHILD).is_none() {
+    if std::env::var_os(CHILD_VARIABLE).is_none() {
         return;
     }
     let Some(turn) = device() else { return };
@@ -28,7 +28,7 @@ fn hash_of_a_training() {
 /// Runs tests of this binary with environment variables, requires that they pass, and returns standard output.
 fn child(tests: &[&str], environment: &[(&str, &str)]) -> String {
     let mut command = Command::new(std::env::current_exe().expect("this program has a path"));
-    command.args(tests).args(["--nocapture", "--test-threads", "1"]).env(CHILD, "1");
+    command.args(tests).args(["--nocapture", "--test-threads", "1"]).env(CHILD_VARIABLE, "1");
     command.envs(environment.iter().copied());
     let output = command.output().expect("this program runs again");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -50,7 +50,7 @@ fn is_lavapipe() -> bool {
 
 #[test]
 fn a_training_is_the_same_on_any_number_of_threads() {
-    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+    if std::env::var_os(CHILD_VARIABLE).is_some() || !is_lavapipe() {
         return;
     }
     let run = |threads: &str| {
@@ -68,7 +68,7 @@ fn a_training_is_the_same_on_any_number_of_threads() {
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn without_optional_features_a_training_is_the_same() {
-    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+    if std::env::var_os(CHILD_VARIABLE).is_some() || !is_lavapipe() {
         return;
     }
     let hash = ["invariants::processes::hash_of_a_training"];
@@ -94,7 +94,7 @@ const OTHER_SIZES: [&str; 6] = ["--skip", "emulated_subgroups", "--skip", "pass:
 /// Subgroups of 16 where the processor has vectors for them (elsewhere the same size again).
 #[test]
 fn passes_agree_with_their_mirrors_on_wide_vectors() {
-    if std::env::var_os(CHILD).is_some() || !is_lavapipe() {
+    if std::env::var_os(CHILD_VARIABLE).is_some() || !is_lavapipe() {
         return;
     }
     let text = child(

@@ -22,7 +22,7 @@ fn long(rule: LabelRule) -> TrainConfig {
 }
 
 /// Right after an opacity reset; after a densification; before votes; after everything; the last one.
-const STOPS: [u32; 5] = [20, 24, 27, 33, 60];
+const STOP_STEPS: [u32; 5] = [20, 24, 27, 33, 60];
 
 fn plain() -> Dataset {
     let mut dataset = small();
@@ -60,9 +60,9 @@ fn resume(turn: &Turn, file: &Path, dataset: &Dataset, options: SchedulerOptions
 fn same_when_resumed(turn: &Turn, config: TrainConfig, data: fn() -> Dataset, options: SchedulerOptions) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a folder");
     let first = go_on(&mut fresh(turn, config.clone(), &data(), options), &[], folder.path());
-    let stopped = go_on(&mut fresh(turn, config, &data(), options), &STOPS, folder.path());
+    let stopped = go_on(&mut fresh(turn, config, &data(), options), &STOP_STEPS, folder.path());
     assert!(stopped == first, "to look at the state changes nothing");
-    for stop in STOPS {
+    for stop in STOP_STEPS {
         let file = folder.path().join(stop.to_string());
         let mut trainer = resume(turn, &file, &data(), options).expect("it goes on");
         let again = folder.path().join("again");

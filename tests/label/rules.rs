@@ -12,8 +12,8 @@ use crate::reference::{Group, Model, Row, Rules};
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::scenes::{Shape, scene};
 
-const BLACK: [f64; 3] = [0.0; 3];
-const EQUAL: Tolerance = Tolerance { absolute: 1e-13, relative: 1e-10 };
+const BLACK_RGB: [f64; 3] = [0.0; 3];
+const EQUAL_TOLERANCE: Tolerance = Tolerance { absolute: 1e-13, relative: 1e-10 };
 
 /// A splat of alpha `opacity` at the middle of the only pixel.
 fn on_ray(gaussian: usize, opacity: f64) -> Splat {
@@ -23,7 +23,7 @@ fn on_ray(gaussian: usize, opacity: f64) -> Splat {
 
 fn one_pixel(opacities: &[f64]) -> BlendedImage {
     let splats: Vec<Splat> = opacities.iter().enumerate().map(|(i, &o)| on_ray(i, o)).collect();
-    blend_forward(&Rules::default(), &splats, (1, 1), BLACK)
+    blend_forward(&Rules::default(), &splats, (1, 1), BLACK_RGB)
 }
 
 /// Labels after lifting label 7 from a one-pixel image.
@@ -54,7 +54,7 @@ fn the_nearer_of_equal_weights_is_main() {
     let hit = |splat, alpha, transmittance| Contribution { splat, alpha, transmittance, clamped: false };
     let contributions = vec![hit(0, 0.25, 1.0), hit(1, 0.5, 0.5)];
     let ray = Trace { contributions, transmittance: 0.375, ..Trace::default() };
-    let pixel = shade(&[on_ray(0, 0.25), on_ray(1, 0.5)], &ray, BLACK);
+    let pixel = shade(&[on_ray(0, 0.25), on_ray(1, 0.5)], &ray, BLACK_RGB);
     assert_eq!((pixel.main, pixel.main_weight, pixel.margins.main), (0, 0.25, 0.0));
     // Alpha 1/3 behind alpha 0.25 has weight 0.25 too, up to rounding; the margin shows it.
     assert!(one_pixel(&[0.25, 1.0 / 3.0]).pixels[0].margins.main < 1e-7);
@@ -69,7 +69,7 @@ fn two_saturated_splats_stop_as_they_do_in_f32() {
     assert!(pixel.margins.stop < 1e-5);
     // The same constants as decimal text fall on the other side.
     let decimal = Rules { alpha_max: 0.99, transmittance_min: 1e-4, ..Rules::default() };
-    let image = blend_forward(&decimal, &[on_ray(0, 0.999), on_ray(1, 0.999)], (1, 1), BLACK);
+    let image = blend_forward(&decimal, &[on_ray(0, 0.999), on_ray(1, 0.999)], (1, 1), BLACK_RGB);
     assert_eq!(image.pixels[0].count, 2);
 }
 
@@ -90,7 +90,7 @@ fn spanning() -> (BlendedImage, Vec<Option<[f64; 2]>>, Vec<u32>) {
         ..on_ray(gaussian, opacity)
     };
     let splats = [splat(0, 7.5, 8.0, 0.985), splat(1, 10.5, 60.0, 0.95)];
-    let image = blend_forward(&Rules::default(), &splats, (48, 1), BLACK);
+    let image = blend_forward(&Rules::default(), &splats, (48, 1), BLACK_RGB);
     let label_map = (0..48)
         .map(|x| {
             if x < 14 {
@@ -209,12 +209,12 @@ fn label_loss_of_a_correct_object_is_0() {
     let s = scene(21, &Shape::default());
     let (photo, map, slot) = (&s.target.photo, &s.target.label_map, &s.target.slots[0]);
     let image: Vec<[f64; 3]> =
-        photo.colours.iter().zip(map).map(|(c, &l)| if l == slot.label { *c } else { BLACK }).collect();
+        photo.colours.iter().zip(map).map(|(c, &l)| if l == slot.label { *c } else { BLACK_RGB }).collect();
     let alphas: Vec<f64> = map.iter().map(|&l| f64::from(u8::from(l == slot.label))).collect();
     let loss = label_loss(&Rules::default(), (&image, &alphas), photo, map, slot);
     assert_eq!(loss.value, 0.0);
     assert!(loss.v_alpha.iter().all(|v| *v == 0.0));
-    assert!(loss.v_image.iter().all(|v| *v == BLACK));
+    assert!(loss.v_image.iter().all(|v| *v == BLACK_RGB));
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn pixels_near_a_contour_are_ignored_and_weights_scale() {
     };
     let (all, without) = (loss(&[1, 0, 1, 0], 1.0), loss(&[1, CONTOUR_BIT, 1 | CONTOUR_BIT, 0], 1.0));
     assert!((all.value - 2.0 * without.value).abs() < 1e-12 && without.value > 0.0);
-    assert_eq!(without.v_image[1..3], [BLACK, BLACK]);
+    assert_eq!(without.v_image[1..3], [BLACK_RGB, BLACK_RGB]);
     assert!((loss(&[1, 0, 1, 0], 2.5).value - 2.5 * all.value).abs() < 1e-12);
 }
 
@@ -261,7 +261,7 @@ fn occluded_and_invalid_pixels_are_ignored() {
     assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.8 - 0.5)) / 3.0).abs() < 1e-12);
     assert_eq!(loss.v_alpha, [0.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;
-    assert_eq!(loss.v_image, [[v; 3], BLACK, [v; 3], BLACK]);
+    assert_eq!(loss.v_image, [[v; 3], BLACK_RGB, [v; 3], BLACK_RGB]);
 }
 
 #[test]
@@ -276,19 +276,19 @@ fn object_layers_equal_separate_renders() {
         assert!(members.len() > 3);
         let alone = model.filtered(|i| model.labels[i] == slot.label);
         let splats = splats_of(&project_all(&rules, &s.camera, &alone));
-        let image = blend_forward(&rules, &splats, size, BLACK);
+        let image = blend_forward(&rules, &splats, size, BLACK_RGB);
         let (ours, theirs) = (out.layers[place + 1].colours(), image.colours());
-        check("image", close(ours.as_flattened(), theirs.as_flattened(), EQUAL));
+        check("image", close(ours.as_flattened(), theirs.as_flattened(), EQUAL_TOLERANCE));
         let loss = label_loss(&rules, (&theirs, &image.alphas()), &s.target.photo, &s.target.label_map, slot);
         assert!((loss.value - out.objects[place].value).abs() < 1e-13 && loss.value > 0.0);
-        let v = blend_backward(&rules, &splats, size, BLACK, &loss.upstream()).values;
+        let v = blend_backward(&rules, &splats, size, BLACK_RGB, &loss.upstream()).values;
         for (splat, v) in splats.iter().zip(&v) {
             let row = &mut rows[members[splat.gaussian]];
             *row = row.plus(&project_backward(&rules, &s.camera, &alone, splat.gaussian, v));
         }
     }
     for group in Group::ALL {
-        check("gradient", close(&flatten(&out.rows, group), &flatten(&rows, group), EQUAL));
+        check("gradient", close(&flatten(&out.rows, group), &flatten(&rows, group), EQUAL_TOLERANCE));
     }
     assert_ne!(out.rows, scene_only.rows);
     assert_eq!(out.gradient2d, scene_only.gradient2d, "densification does not see the label loss");

@@ -8,7 +8,7 @@ use labelgs::scene::{Camera, LabelMap};
 use labelgs::synth::{Fault, Preset, SynthOptions, spoil};
 use labelgs::synth::{World, ring_of_cameras, trace_view};
 
-const HOW: Overlap = Overlap { least: 0.1, memory: 5 };
+const OVERLAP_OPTIONS: Overlap = Overlap { least: 0.1, memory: 5 };
 
 fn row(ids: &[u16]) -> LabelMap {
     LabelMap { width: ids.len() as u32, height: 1, ids: ids.to_vec() }
@@ -23,17 +23,20 @@ fn tracked(frames: &[&[u16]], how: Overlap) -> Vec<Vec<u16>> {
 fn regions_keep_the_id_of_what_they_overlap_most() {
     let moving: [&[u16]; 3] = [&[9, 9, 9, 0, 4, 4, 0], &[0, 4, 4, 4, 7, 7, 7], &[0, 0, 8, 8, 8, 1, 0]];
     // Region 4 of the middle frame shares two of four pixels with 9 of the first, and 7 two of three with 4.
-    assert_eq!(tracked(&moving, HOW), [[2, 2, 2, 0, 1, 1, 0], [0, 2, 2, 2, 1, 1, 1], [0, 0, 2, 2, 2, 1, 0]]);
-    let strict = Overlap { least: 0.6, ..HOW };
+    assert_eq!(
+        tracked(&moving, OVERLAP_OPTIONS),
+        [[2, 2, 2, 0, 1, 1, 0], [0, 2, 2, 2, 1, 1, 1], [0, 0, 2, 2, 2, 1, 0]]
+    );
+    let strict = Overlap { least: 0.6, ..OVERLAP_OPTIONS };
     assert_eq!(tracked(&moving[..2], strict)[1], [0, 3, 3, 3, 1, 1, 1], "two of four are too few, two of three not");
 }
 
 #[test]
 fn an_object_out_of_sight_is_remembered_for_a_while() {
     let hidden: [&[u16]; 4] = [&[5, 5, 0], &[0, 0, 0], &[0, 0, 0], &[6, 6, 0]];
-    assert_eq!(tracked(&hidden, Overlap { memory: 2, ..HOW })[3], [1, 1, 0]);
-    assert_eq!(tracked(&hidden, Overlap { memory: 1, ..HOW })[3], [2, 2, 0]);
-    assert!(tracked(&[], HOW).is_empty());
+    assert_eq!(tracked(&hidden, Overlap { memory: 2, ..OVERLAP_OPTIONS })[3], [1, 1, 0]);
+    assert_eq!(tracked(&hidden, Overlap { memory: 1, ..OVERLAP_OPTIONS })[3], [2, 2, 0]);
+    assert!(tracked(&[], OVERLAP_OPTIONS).is_empty());
 }
 
 #[test]
@@ -41,7 +44,7 @@ fn too_many_objects_are_an_error() {
     // Missing for longer than the memory of the tracker, so every second frame has a new object.
     let frames = [row(&[1]), row(&[0])];
     let many: Vec<LabelMap> = frames.iter().cycle().take(2 * 65_536).cloned().collect();
-    let forgetful = Overlap { memory: 0, ..HOW };
+    let forgetful = Overlap { memory: 0, ..OVERLAP_OPTIONS };
     assert_eq!(track(&many[..2 * 65_535], forgetful).expect("just enough")[2 * 65_534].ids, [65_535]);
     let error = track(&many, forgetful).expect_err("one too many").to_string();
     assert!(error.contains("65535 objects") && error.contains("min_overlap"), "{error}");
@@ -113,7 +116,7 @@ fn frames_between_sparse_photos_keep_ids() {
         let stops = video(&cameras, between, Interpolation::Centres);
         let truth: Vec<LabelMap> = stops.iter().zip(0..).map(|(stop, at)| ids_at(&stop.camera, at)).collect();
         let segmented: Vec<LabelMap> = spoil(&truth, Fault::PerView, 1.0, 5).into_iter().flatten().collect();
-        let found = track(&segmented, HOW).expect("few objects");
+        let found = track(&segmented, OVERLAP_OPTIONS).expect("few objects");
         let photos = |maps: &[LabelMap]| -> Vec<LabelMap> {
             maps.iter().zip(&stops).filter(|(_, stop)| stop.camera_index.is_some()).map(|(m, _)| m.clone()).collect()
         };

@@ -9,7 +9,7 @@ use crate::support::scenes::{Shape, scene};
 use labelgs::pass::GroupBlend;
 
 /// Weight of the depths, far above that of the photo.
-const WEIGHT: f64 = 1e5;
+const PRIOR_WEIGHT: f64 = 1e5;
 
 #[test]
 fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else() {
@@ -22,7 +22,7 @@ fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else_of(form: Op
     let mut fixture = Fixture::blending(turn, scene(64, &shape), false, form);
     // Constant over the first step of many.
     (fixture.config.iterations, fixture.config.label_from) = (1_000_000_000, None);
-    fixture.config.depth_weight = Some(WEIGHT);
+    fixture.config.depth_weight = Some(PRIOR_WEIGHT);
     fixture.train();
     let splats = fixture.splats();
     let count = splats.len();
@@ -38,7 +38,7 @@ fn known_depths_move_opacities_as_their_mirror_says_and_nothing_else_of(form: Op
     };
     check("all but opacities", exact(&others(&with), &others(&without)));
     let inverse: Vec<f64> = fixture.view.depths.iter().map(|&inverse| f64::from(inverse)).collect();
-    let weight = WEIGHT / inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f64;
+    let weight = PRIOR_WEIGHT / inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f64;
     let change = |row: usize| f64::from(with[row][5]) - f64::from(without[row][5]);
     prove("known depths", &["alpha_min", "alpha_max"], |rules| {
         let expected = depth_error(rules, &splats, fixture.size(), &inverse, weight);

@@ -12,9 +12,9 @@ use labelgs::shaders::structs::StepUniforms;
 use rand::Rng;
 
 /// Gaussians: more than the grid has invocations, and a few more.
-const ROWS: usize = 16_400;
+const ROW_COUNT: usize = 16_400;
 /// A plane of one vec4, the widest one, and one of other width.
-const PLANES: [(Buf, usize); 3] = [(Buf::MEANS, 4), (Buf::U_SH3, 20), (Buf::DENSIFY_STATS, 2)];
+const CHECKED_PLANES: [(Buf, usize); 3] = [(Buf::MEANS, 4), (Buf::U_SH3, 20), (Buf::DENSIFY_STATS, 2)];
 
 /// A wrong search.
 type Mutant = fn(&[f64], usize) -> Option<usize>;
@@ -30,9 +30,9 @@ const MUTANTS: [(&str, Mutant); 4] = [
 #[test]
 fn the_first_row_of_each_plane_that_is_not_finite_is_found() {
     let Some(turn) = device() else { return };
-    let size = EngineSize::new(ROWS as u64, (64, 64)).for_training();
+    let size = EngineSize::new(ROW_COUNT as u64, (64, 64)).for_training();
     let mut engine = Engine::new(turn.gpu(), size, readable()).expect("the engine starts");
-    let list = pass::find_nonfinite(engine.shape(), engine.capacity(), &PLANES.map(|(buf, _)| buf));
+    let list = pass::find_nonfinite(engine.shape(), engine.capacity(), &CHECKED_PLANES.map(|(buf, _)| buf));
     let id = engine.raw_mut().prepare(&list).expect("the list is planned");
     let mut random = generator(91);
     let mut seen = [0; MUTANTS.len()];
@@ -40,9 +40,10 @@ fn the_first_row_of_each_plane_that_is_not_finite_is_found() {
     let plain = [0.0, -0.0, f32::MAX, f32::MIN, f32::MIN_POSITIVE, f32::from_bits(1), 1.5];
     for turn in 0..20 {
         // All rows, fewer, or none; those behind have NaNs, as rows of removed Gaussians may.
-        let rows = [ROWS, ROWS - 1, 65, 1, 0][turn % 5];
-        let planes = PLANES.map(|(_, words)| {
-            let mut values: Vec<f32> = (0..ROWS * words).map(|_| plain[random.random_range(0..plain.len())]).collect();
+        let rows = [ROW_COUNT, ROW_COUNT - 1, 65, 1, 0][turn % 5];
+        let planes = CHECKED_PLANES.map(|(_, words)| {
+            let mut values: Vec<f32> =
+                (0..ROW_COUNT * words).map(|_| plain[random.random_range(0..plain.len())]).collect();
             values[rows * words..].fill(f32::NAN);
             for place in 0..if rows == 0 { 0 } else { turn % 4 } {
                 let at = if place == 0 { rows * words - 1 } else { random.random_range(0..rows * words) };
@@ -54,13 +55,13 @@ fn the_first_row_of_each_plane_that_is_not_finite_is_found() {
         let step = StepUniforms { gaussian_count: count, trained_count: count, ..StepUniforms::zeroed() };
         let sched = engine.raw_mut();
         sched.upload(Buf::STEP, 0, 0, &[step]).expect("upload");
-        for ((buf, _), values) in PLANES.iter().zip(&planes) {
+        for ((buf, _), values) in CHECKED_PLANES.iter().zip(&planes) {
             sched.upload(*buf, 0, 0, values).expect("upload");
         }
         sched.run(id, 0).expect("run");
         sched.check_guards().expect("no pass writes outside of its buffers");
-        let found = sched.download::<u32>(Buf::NONFINITE_ROWS, 0, 0, PLANES.len()).expect("download");
-        for ((values, (_, words)), found) in planes.iter().zip(PLANES).zip(found) {
+        let found = sched.download::<u32>(Buf::NONFINITE_ROWS, 0, 0, CHECKED_PLANES.len()).expect("download");
+        for ((values, (_, words)), found) in planes.iter().zip(CHECKED_PLANES).zip(found) {
             let values: Vec<f64> = values[..rows * words].iter().map(|&value| value.into()).collect();
             let found = (found != u32::MAX).then_some(found as usize);
             assert_eq!(found, first_nonfinite(&values, words), "{rows} rows, turn {turn}");

@@ -22,7 +22,7 @@ fn haze(objects: u32) -> Scene {
 }
 
 /// Pixels with a smaller distance of a decision to its opposite may go either way.
-const MARGIN: f64 = 2e-5;
+const DECISION_MARGIN: f64 = 2e-5;
 
 /// The map of a scene, with kernels of a shape, and the numbers of tiles that are undecided after one and after `walks`
 /// walks.
@@ -54,7 +54,7 @@ fn label_maps_of_any_number_of_walks_equal_the_mirror() {
         // Sums of up to 1 of some twenty terms, each rounded to 6e-8.
         let tolerance = Tolerance { absolute: 1e-6, relative: 0.0 };
         prove("label map", &["alpha_min", "label_sums"], |rules| {
-            judge::label_map((&ids, &weights), &mirror(rules, &splats, &labels, size), (tolerance, MARGIN))
+            judge::label_map((&ids, &weights), &mirror(rules, &splats, &labels, size), (tolerance, DECISION_MARGIN))
         });
     }
 }

@@ -19,10 +19,10 @@ use labelgs::shaders::constants::KEY_INVISIBLE;
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
 
-const ITEMS: usize = 5000;
+const ITEM_COUNT_MAX: usize = 5000;
 
 fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
-    let room = EngineSize::new(ITEMS as u64, (64, 64));
+    let room = EngineSize::new(ITEM_COUNT_MAX as u64, (64, 64));
     Engine::new(gpu, room, readable()).expect("the engine starts")
 }
 
@@ -52,7 +52,7 @@ pub fn counters(engine: &mut Engine) -> Counters {
     engine.raw_mut().download::<Counters>(Buf::COUNTERS, 0, 0, 1).expect("download")[0]
 }
 
-const COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEMS];
+const ITEM_COUNTS: [usize; 7] = [0, 1, 7, 63, 64, 1000, ITEM_COUNT_MAX];
 
 #[test]
 fn scan_is_exact_and_saturates() {
@@ -62,9 +62,9 @@ fn scan_is_exact_and_saturates() {
         scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Densified)
     });
     let mut random = generator(71);
-    for count in COUNTS {
+    for count in ITEM_COUNTS {
         // More than 2^32 in all, with the longest list.
-        let most = if count == ITEMS { u32::MAX / 1000 } else { 900 };
+        let most = if count == ITEM_COUNT_MAX { u32::MAX / 1000 } else { 900 };
         let values: Vec<u32> = (0..count).map(|_| random.random_range(0..most)).collect();
         announce(&mut engine, count);
         engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
@@ -73,7 +73,7 @@ fn scan_is_exact_and_saturates() {
         let (offsets, total) = exclusive_scan(&values);
         check("offsets", exact(&get(&mut engine, Buf::INSTANCE_OFFSETS, count), &offsets));
         assert_eq!(counters(&mut engine).densified_count, total);
-        assert_eq!(total == u32::MAX, count == ITEMS);
+        assert_eq!(total == u32::MAX, count == ITEM_COUNT_MAX);
     }
 }
 
@@ -83,7 +83,7 @@ fn scan_of_visible_keys_is_exact() {
     let mut engine = engine(turn.gpu());
     let id = list(&mut engine, |b| scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS));
     let mut random = generator(72);
-    for count in COUNTS {
+    for count in ITEM_COUNTS {
         let key = |random: &mut rand_pcg::Pcg32| if random.random_bool(0.4) { KEY_INVISIBLE } else { random.random() };
         let keys: Vec<u32> = (0..count).map(|_| key(&mut random)).collect();
         announce(&mut engine, count);
@@ -100,7 +100,8 @@ fn scan_of_visible_keys_is_exact() {
 #[test]
 fn sort_of_keys_and_values_is_exact_and_stable() {
     let Some(turn) = device() else { return };
-    let cases = [(ITEMS, u32::MAX), (ITEMS, 3), (ITEMS, 1), (1000, 300), (9, 4), (1, 9), (0, 1)];
+    let cases =
+        [(ITEM_COUNT_MAX, u32::MAX), (ITEM_COUNT_MAX, 3), (ITEM_COUNT_MAX, 1), (1000, 300), (9, 4), (1, 9), (0, 1)];
     sort_exactly(&mut engine(turn.gpu()), &cases);
 }
 
@@ -144,7 +145,7 @@ fn sort_with_the_lanes_of_a_large_scene_is_exact() {
         ..*engine.capacity()
     };
     engine.set_capacity(large).expect("room");
-    sort_exactly(&mut engine, &[(ITEMS, u32::MAX), (ITEMS, 3)]);
+    sort_exactly(&mut engine, &[(ITEM_COUNT_MAX, u32::MAX), (ITEM_COUNT_MAX, 3)]);
 }
 
 /// From one pass of the sort to all that 32 bits take; the values are the places before the sort.
@@ -162,14 +163,14 @@ fn sort_by_some_bits_is_exact() {
         let mut found = None;
         let id = list(&mut engine, |b| found = Some(sort::sort(b, buffers, bits, Count::Splats, "by tile", true)));
         let (keys_out, values_out) = found.expect("the sort was declared");
-        let keys: Vec<u32> = (0..ITEMS).map(|_| random.random_range(0..1 << bits)).collect();
-        announce(&mut engine, ITEMS);
+        let keys: Vec<u32> = (0..ITEM_COUNT_MAX).map(|_| random.random_range(0..1 << bits)).collect();
+        announce(&mut engine, ITEM_COUNT_MAX);
         engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
         engine.raw_mut().run(id, 0).expect("run");
         let order = radix_sort(&keys);
         let sorted: Vec<u32> = order.iter().map(|&place| keys[place]).collect();
         let places: Vec<u32> = order.iter().map(|&place| place as u32).collect();
-        check("keys", exact(&get(&mut engine, keys_out, ITEMS), &sorted));
-        check("places", exact(&get(&mut engine, values_out, ITEMS), &places));
+        check("keys", exact(&get(&mut engine, keys_out, ITEM_COUNT_MAX), &sorted));
+        check("places", exact(&get(&mut engine, values_out, ITEM_COUNT_MAX), &places));
     }
 }

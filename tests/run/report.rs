@@ -4,7 +4,7 @@ use crate::support::device;
 use crate::support::runs::{Place, stderr, succeeded};
 use std::path::Path;
 
-const HOSTILE: &str = "<img src=x onerror=alert(1)>\"'&";
+const HOSTILE_TEXT: &str = "<img src=x onerror=alert(1)>\"'&";
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -29,7 +29,7 @@ fn a_report_is_made_anew_and_compares_runs() {
     let place = Place::new();
     let names = place.path("scene/masks/labels.json");
     let mut table: serde_json::Value = serde_json::from_str(&read(&names)).expect("names");
-    table["labels"][0]["name"] = HOSTILE.into();
+    table["labels"][0]["name"] = HOSTILE_TEXT.into();
     std::fs::write(&names, table.to_string()).expect("names");
     let out = "<b>bold out";
     let flags =

@@ -7,15 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-const CHILD: &str = "LABELGS_FAULT_CHILD";
+const CHILD_VARIABLE: &str = "LABELGS_FAULT_CHILD";
 
 /// How long the snapshot of a growth has no reader; a growth that does not wait for it takes milliseconds.
-const UNREAD: Duration = Duration::from_millis(500);
+const UNREAD_TIME: Duration = Duration::from_millis(500);
 
 /// Uses all parts of the scheduler. It is a test so that the other tests can run it in a child process.
 #[test]
 fn child() {
-    let Some(kind) = std::env::var_os(CHILD) else { return };
+    let Some(kind) = std::env::var_os(CHILD_VARIABLE) else { return };
     match if kind == "grow" { growth() } else { work().map(|()| "done") } {
         Ok(outcome) => println!("outcome: {outcome}"),
         Err(error) => println!("outcome: {} {error}", exit_status(&error)),
@@ -64,7 +64,7 @@ fn growth() -> labelgs::Result<&'static str> {
     let is_read = AtomicBool::new(false);
     thread::scope(|scope| {
         let reader = scope.spawn(|| {
-            thread::sleep(UNREAD);
+            thread::sleep(UNREAD_TIME);
             is_read.store(true, Ordering::Relaxed);
             snapshot.read()
         });
@@ -85,7 +85,7 @@ fn outcome_of(kind: &str, fault: &str) -> String {
     let program = std::env::current_exe().unwrap();
     let mut command = Command::new(program);
     command.args(["--exact", "scheduler::faults::child", "--nocapture", "--test-threads=1"]);
-    command.env(CHILD, kind).env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
+    command.env(CHILD_VARIABLE, kind).env("LABELGS_FAULT", fault).env("LABELGS_VALIDATION", "off");
     let output = command.output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{fault}: {}\n{text}", output.status);

@@ -21,7 +21,7 @@ toy_shader!(
     }"
 );
 
-const COUNT: u32 = 20_000;
+const CASE_COUNT: u32 = 20_000;
 const SCRATCH: [Buf; 6] = [A, B, C, D, E, F];
 
 /// A random list, and what `report` must hold after it.
@@ -36,7 +36,7 @@ fn random_list(seed: u64) -> (PassList, Vec<u32>) {
         if others.is_empty() || random.random_ratio(1, 6) {
             let word = random.random();
             list.fill(SCRATCH[to], word);
-            values[to] = Some(vec![word; COUNT as usize]);
+            values[to] = Some(vec![word; CASE_COUNT as usize]);
             continue;
         }
         let from = others[random.random_range(0..others.len())];
@@ -47,13 +47,15 @@ fn random_list(seed: u64) -> (PassList, Vec<u32>) {
             values[to] = Some(first.clone());
             continue;
         }
-        let by = random.random_range(0..COUNT);
-        let at = |values: &[u32], index: u32| values[(index % COUNT) as usize];
-        let result =
-            (0..COUNT).map(|i| at(first, i + by).wrapping_mul(5).wrapping_add(at(second, i + 2 * by)).wrapping_add(1));
+        let by = random.random_range(0..CASE_COUNT);
+        let at = |values: &[u32], index: u32| values[(index % CASE_COUNT) as usize];
+        let result = (0..CASE_COUNT)
+            .map(|i| at(first, i + by).wrapping_mul(5).wrapping_add(at(second, i + 2 * by)).wrapping_add(1));
         values[to] = Some(result.collect());
         let buffers = vec![SCRATCH[from], SCRATCH[other], SCRATCH[to]];
-        list.pass(PassDecl::new(shift(), buffers, Grid::Groups(COUNT.div_ceil(64), 1, 1)).spec(vec![by, COUNT]));
+        list.pass(
+            PassDecl::new(shift(), buffers, Grid::Groups(CASE_COUNT.div_ceil(64), 1, 1)).spec(vec![by, CASE_COUNT]),
+        );
     }
     let last = (0..6).rev().find(|&index| values[index].is_some()).unwrap();
     list.copy(SCRATCH[last], REPORT, 0);
@@ -67,7 +69,7 @@ fn plans_of_all_kinds_give_the_results_of_one_item_after_another() {
     for (alias, barrier_everywhere) in kinds {
         let plan = PlanOptions { alias, guards: false, barrier_everywhere };
         let with = SchedulerOptions { poison_step: true, ..options(plan) };
-        let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(u64::from(COUNT)), with).unwrap();
+        let mut scheduler = Scheduler::new(gpu.gpu(), TABLE, pixels(u64::from(CASE_COUNT)), with).unwrap();
         for seed in 0..12 {
             let (list, expected) = random_list(seed);
             let id = scheduler.prepare(&list).unwrap();

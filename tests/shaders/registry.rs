@@ -15,15 +15,16 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const ROOM: EngineSize = EngineSize::new(10_000, (320, 240))
+const REPOSITORY_ROOT: &str = env!("CARGO_MANIFEST_DIR");
+const ENGINE_SIZE: EngineSize = EngineSize::new(10_000, (320, 240))
     .for_training()
     .with_labels(Some(LabelSize { max_label: 40, layers: 8, vote_columns: 9 }))
     .with_shared_rows(5);
 
 /// Stem and text of every compute shader.
 fn sources() -> Vec<(String, String)> {
-    let families = fs::read_dir(Path::new(ROOT).join("glsl")).expect("glsl").map(|entry| entry.expect("entry").path());
+    let families =
+        fs::read_dir(Path::new(REPOSITORY_ROOT).join("glsl")).expect("glsl").map(|entry| entry.expect("entry").path());
     let files = families.filter(|path| path.is_dir()).flat_map(|folder| fs::read_dir(folder).expect("folder"));
     let files =
         files.map(|entry| entry.expect("entry").path()).filter(|path| path.extension().is_some_and(|e| e == "comp"));
@@ -57,10 +58,10 @@ fn lists() -> Vec<(Capacity, PassList)> {
     let late = shared_out.iter().map(|shape| KernelShape { update: Update::Lazy, ..*shape });
     for shape in one_by_one.iter().chain(&shared_out).copied().chain(late) {
         for (segments, half) in [(1, true), (1, false), (3, false)] {
-            let mut capacity = capacity(&shape, &ROOM.with_half_moments(half));
+            let mut capacity = capacity(&shape, &ENGINE_SIZE.with_half_moments(half));
             capacity.segments = segments;
             capacity.segment_pixels = if segments > 1 { 100_000 } else { 0 };
-            let size = ROOM.image;
+            let size = ENGINE_SIZE.image;
             let mut add = |list| all.push((capacity, list));
             for (supervision, sh_degree, update) in [
                 (Supervision::Layers { lift: true }, 3, true),
@@ -125,12 +126,14 @@ fn every_mirror_is_there() {
             assert!(reason.len() > 4, "{stem}: without a mirror the reason is needed");
             // Instead of a mirror, the header may name the test that covers the kernel.
             let named = reason.split([' ', ')', ';']).filter(|word| word.starts_with("tests/"));
-            named.for_each(|file| assert!(Path::new(ROOT).join(file).is_file(), "{stem}: there is no {file}"));
+            named.for_each(|file| {
+                assert!(Path::new(REPOSITORY_ROOT).join(file).is_file(), "{stem}: there is no {file}")
+            });
             continue;
         }
         for part in mirror.split(", ") {
             let (file, function) = part.split_once("::").unwrap_or_else(|| panic!("{stem}: {part} names no function"));
-            let file = Path::new(ROOT).join("src/reference").join(file.trim_start_matches("src/reference/"));
+            let file = Path::new(REPOSITORY_ROOT).join("src/reference").join(file.trim_start_matches("src/reference/"));
             let reference =
                 fs::read_to_string(&file).unwrap_or_else(|error| panic!("{stem}: {}: {error}", file.display()));
             assert!(
@@ -231,7 +234,7 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
         let named = report.rows.iter().filter(|row| labels.contains(&row.name)).map(|row| row.bytes).sum::<u64>();
         (named, report.total)
     };
-    let (with, without) = (bytes(&ROOM), bytes(&EngineSize { labels: None, ..ROOM }));
+    let (with, without) = (bytes(&ENGINE_SIZE), bytes(&EngineSize { labels: None, ..ENGINE_SIZE }));
     assert!(without.0 < 2048 && without.0 < with.0, "{without:?} {with:?}");
     assert!(without.1 < with.1, "{without:?} {with:?}");
 }
@@ -240,9 +243,10 @@ fn a_scene_without_masks_pays_nothing_for_labels() {
 /// `scenes::colmap`.
 fn module_file(path: &[&str]) -> Option<PathBuf> {
     let (first, rest) = path.split_first()?;
-    let in_crate =
-        rest.iter().fold(Path::new(ROOT).join("src").join(first).join("tests"), |folder, part| folder.join(part));
-    let place = path.iter().fold(Path::new(ROOT).join("tests"), |folder, part| folder.join(part));
+    let in_crate = rest
+        .iter()
+        .fold(Path::new(REPOSITORY_ROOT).join("src").join(first).join("tests"), |folder, part| folder.join(part));
+    let place = path.iter().fold(Path::new(REPOSITORY_ROOT).join("tests"), |folder, part| folder.join(part));
     [place.with_extension("rs"), place.join("mod.rs"), in_crate.with_extension("rs")]
         .into_iter()
         .find(|file| file.is_file())
@@ -251,7 +255,7 @@ fn module_file(path: &[&str]) -> Option<PathBuf> {
 /// Each test and module that `tests/README.md` names exists.
 #[test]
 fn every_test_that_the_list_of_faults_names_is_there() {
-    let text = fs::read_to_string(Path::new(ROOT).join("tests/README.md")).expect("the list");
+    let text = fs::read_to_string(Path::new(REPOSITORY_ROOT).join("tests/README.md")).expect("the list");
     let cells = text.lines().filter_map(|line| line.strip_suffix(" |")?.rsplit_once(" | ")).map(|(_, tests)| tests);
     let names: Vec<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
     assert!(names.len() > 80, "{}", names.len());

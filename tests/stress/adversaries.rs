@@ -21,7 +21,7 @@ struct Bound {
 }
 
 /// A decision nearer to its threshold than this may go either way.
-const MARGIN: f64 = 1e-4;
+const DECISION_MARGIN: f64 = 1e-4;
 
 /// Runs a step, compares, and prints the errors.
 fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
@@ -40,12 +40,12 @@ fn holds(name: &str, scene: Scene, labels: bool, bound: Bound) {
     let mut compared = 0;
     for (found, wanted) in image.iter().zip(&expected.layers[0].pixels) {
         assert!(found.iter().all(|v| v.is_finite()), "{name}: a pixel is {found:?}");
-        if wanted.margins.image() > MARGIN {
+        if wanted.margins.image() > DECISION_MARGIN {
             compared += 1;
             (0..3).for_each(|c| colour = colour.max((f64::from(found[c]) - wanted.colour[c]).abs()));
         }
     }
-    let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > MARGIN).collect();
+    let mut sure: Vec<usize> = (0..actual.len()).filter(|&i| expected.margins[i] > DECISION_MARGIN).collect();
     if sure.len() * 4 < actual.len() {
         // Every splat reaches its cut somewhere, so the bound includes flips there.
         sure = (0..actual.len()).collect();

@@ -14,7 +14,7 @@ use labelgs::train::Trainer;
 use std::sync::Arc;
 
 /// UTM coordinates of a place in Bavaria, m.
-const UTM: DVec3 = DVec3::new(691_607.25, 5_334_760.5, 519.0);
+const UTM_ORIGIN: DVec3 = DVec3::new(691_607.25, 5_334_760.5, 519.0);
 
 fn scene(scale: f64, offset: DVec3) -> Dataset {
     let options = SynthOptions {
@@ -70,8 +70,8 @@ fn scenes_of_any_size_and_place_train_alike() {
     for (name, scale, offset, near) in [
         ("1e-3 of the size", 1e-3, DVec3::ZERO, 1e-3),
         ("1e6 times the size", 1e6, DVec3::ZERO, 0.2),
-        ("in UTM coordinates", 1.0, UTM, 0.2),
-        ("1e-2 of the size, in UTM coordinates", 1e-2, UTM, 1e-2),
+        ("in UTM coordinates", 1.0, UTM_ORIGIN, 0.2),
+        ("1e-2 of the size, in UTM coordinates", 1e-2, UTM_ORIGIN, 1e-2),
     ] {
         let (found, plane, model) = train(&turn.gpu(), scene(scale, offset));
         println!("{name}: {found:.3} dB, {expected:.3} dB as it was; near {plane}");
@@ -102,8 +102,8 @@ fn pictures_are_the_same_at_any_size_and_place() {
     for (name, scale, offset) in [
         ("1e-3 of the size", 1e-3, DVec3::ZERO),
         ("1e6 times the size", 1e6, DVec3::ZERO),
-        ("in UTM coordinates", 1.0, UTM),
-        ("1e-2 of the size, in UTM coordinates", 1e-2, UTM),
+        ("in UTM coordinates", 1.0, UTM_ORIGIN),
+        ("1e-2 of the size, in UTM coordinates", 1e-2, UTM_ORIGIN),
     ] {
         let found = picture(scale, offset);
         let squares: f64 =
@@ -118,14 +118,14 @@ fn pictures_are_the_same_at_any_size_and_place() {
 #[test]
 fn far_models_are_saved_without_loss() {
     let Some(turn) = device() else { return };
-    let (before, near, model) = train(&turn.gpu(), scene(1.0, UTM));
+    let (before, near, model) = train(&turn.gpu(), scene(1.0, UTM_ORIGIN));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("far.ply");
     write_model(&path, &model).expect("written");
     let header = String::from_utf8_lossy(&std::fs::read(&path).expect("read")[..400]).into_owned();
     assert!(header.contains("property float x") && header.contains("comment labelgs world_origin"), "{header}");
     let read = read_model(&path).expect("read").gaussians;
-    assert!(read.origin.distance(UTM) < 100.0, "{}", read.origin);
+    assert!(read.origin.distance(UTM_ORIGIN) < 100.0, "{}", read.origin);
     for row in 0..model.len() {
         let moved = read.world(row).distance(model.world(row));
         assert_eq!(moved, 0.0, "Gaussian {row}");
@@ -133,7 +133,7 @@ fn far_models_are_saved_without_loss() {
     let room = EngineSize::new(read.len() as u64, (72, 52));
     let mut engine = Engine::new(turn.gpu(), room, SchedulerOptions::default()).expect("an engine");
     engine.upload_model(&read).expect("the model");
-    let after = psnr(&mut engine, near, &scene(1.0, UTM).train[0]);
+    let after = psnr(&mut engine, near, &scene(1.0, UTM_ORIGIN).train[0]);
     assert!((after - before).abs() < 0.01, "{after:.4} and {before:.4} dB");
     // An extracted part keeps its place.
     let part = read.filtered(|row| row % 5 == 0);

@@ -5,7 +5,7 @@ mod manual;
 
 use std::process::Command;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_labelgs");
+const PROGRAM_PATH: &str = env!("CARGO_BIN_EXE_labelgs");
 
 /// What a command prints, without the line's end; none if it fails or is not there.
 fn said(command: &mut Command) -> Option<String> {
@@ -65,8 +65,8 @@ fn every_command_has_a_page_and_completions() {
 #[test]
 fn the_version_tells_commit_and_features() {
     let version = env!("CARGO_PKG_VERSION");
-    assert_eq!(said(Command::new(PROGRAM).arg("-V")), Some(format!("labelgs {version}")));
-    let text = said(Command::new(PROGRAM).arg("--version")).expect("a version");
+    assert_eq!(said(Command::new(PROGRAM_PATH).arg("-V")), Some(format!("labelgs {version}")));
+    let text = said(Command::new(PROGRAM_PATH).arg("--version")).expect("a version");
     let rest = text.strip_prefix(&format!("labelgs {version} (commit ")).unwrap_or_else(|| panic!("{text}"));
     let (commit, features) = rest.split_once(", features ").unwrap_or_else(|| panic!("{text}"));
     let features: Vec<&str> = features.trim_end_matches(')').split(' ').collect();

@@ -10,11 +10,11 @@ use labelgs::scenes::init;
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::train::Trainer;
 
-const SIZE: (u32, u32) = (96, 72);
+const IMAGE_SIZE: (u32, u32) = (96, 72);
 /// Depths of a wall and of a ball before it: most Gaussians belong to the wall.
-const WALL: f64 = 4.0;
-const BALL: f64 = 0.3 * WALL;
-const STEPS: u32 = 300;
+const WALL_DEPTH: f64 = 4.0;
+const BALL_DEPTH: f64 = 0.3 * WALL_DEPTH;
+const STEP_COUNT: u32 = 300;
 
 fn camera(x: f64, y: f64) -> Camera {
     Camera {
@@ -24,8 +24,8 @@ fn camera(x: f64, y: f64) -> Camera {
         fy: 80.0,
         cx: 48.0,
         cy: 36.0,
-        width: SIZE.0,
-        height: SIZE.1,
+        width: IMAGE_SIZE.0,
+        height: IMAGE_SIZE.1,
     }
 }
 
@@ -41,7 +41,7 @@ fn wall() -> Gaussians {
     let mut model = Gaussians::default();
     for (x, y) in (-20..=20).flat_map(|x| (-16..=16).map(move |y| (f64::from(x), f64::from(y)))) {
         let colour = [0.3 + 0.2 * (0.7 * x).sin(), 0.5 + 0.2 * (0.5 * y).cos(), 0.4 + 0.1 * (0.3 * (x + y)).sin()];
-        add(&mut model, DVec3::new(0.2 * x, 0.2 * y, WALL), 0.12, colour);
+        add(&mut model, DVec3::new(0.2 * x, 0.2 * y, WALL_DEPTH), 0.12, colour);
     }
     model
 }
@@ -55,7 +55,7 @@ fn ball() -> Gaussians {
         let side = (1.0 - z * z).sqrt();
         let place = DVec3::new(side * turn.cos(), side * turn.sin(), z);
         let colour = [0.9, 0.75 + 0.2 * place.x, 0.1 + 0.1 * place.y];
-        add(&mut model, DVec3::new(0.05, 0.0, BALL) + 0.15 * place, 0.03, colour);
+        add(&mut model, DVec3::new(0.05, 0.0, BALL_DEPTH) + 0.15 * place, 0.03, colour);
     }
     model
 }
@@ -77,14 +77,14 @@ fn draw(engine: &mut Engine, camera: &Camera) -> Render {
 fn photo(picture: &Render) -> Photo {
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let rgba = picture.rgb.iter().map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect();
-    Photo { width: SIZE.0, height: SIZE.1, rgba }
+    Photo { width: IMAGE_SIZE.0, height: IMAGE_SIZE.1, rgba }
 }
 
 #[test]
 fn a_thing_at_a_third_of_the_median_depth_is_drawn() {
     let Some(turn) = device() else { return };
     let truth = joined(wall(), ball());
-    let engine = |model: &Gaussians| Engine::for_model(turn.gpu(), model, [SIZE]).expect("an engine");
+    let engine = |model: &Gaussians| Engine::for_model(turn.gpu(), model, [IMAGE_SIZE]).expect("an engine");
     let mut of_truth = engine(&truth);
     let places = (0..9).map(|i| (0.25 * f64::from(i % 3 - 1), 0.2 * f64::from(i / 3 - 1)));
     let train: Vec<View> = (places.enumerate())
@@ -99,10 +99,10 @@ fn a_thing_at_a_third_of_the_median_depth_is_drawn() {
     let point = |row: usize| Point { position: truth.world(row), colour: colour(truth.sh0[row]) };
     let points = (0..truth.len()).step_by(3).map(point).collect();
     let data = Dataset { train, points, ..Dataset::default() };
-    let config = TrainConfig { iterations: STEPS, ..TrainConfig::default() };
+    let config = TrainConfig { iterations: STEP_COUNT, ..TrainConfig::default() };
     let first = init::initial_gaussians(&data, 0, 100).expect("a model");
     let mut trainer = Trainer::new(turn.gpu(), config, &data, &first, SchedulerOptions::default()).expect("a trainer");
-    for _ in 0..STEPS {
+    for _ in 0..STEP_COUNT {
         trainer.step().expect("a step");
     }
     let model = trainer.labelled_model().expect("the model");
@@ -116,7 +116,8 @@ fn a_thing_at_a_third_of_the_median_depth_is_drawn() {
         |&index: &usize| (0..3).map(|c| f64::from(seen.rgb[index][c] - real.rgb[index][c]).powi(2)).sum::<f64>();
     let psnr = -10.0 * (ball.iter().map(error).sum::<f64>() / (3.0 * ball.len() as f64)).log10();
     let depths = seen.mean_depth().expect("a depth");
-    let before = ball.iter().filter(|&&index| depths[index] > 0.0 && f64::from(depths[index]) < 0.5 * WALL).count();
+    let before =
+        ball.iter().filter(|&&index| depths[index] > 0.0 && f64::from(depths[index]) < 0.5 * WALL_DEPTH).count();
     println!("ball: {psnr:.1} dB, {before} of {} pixels before the wall", ball.len());
     // Without the ball the wall's colours are there, at 8 dB.
     assert!(psnr > 30.0, "the ball has {psnr:.1} dB");

@@ -3,10 +3,10 @@
 use crate::support::runs::{Place, stderr, succeeded};
 use std::fs;
 
-const FLAGS: [&str; 6] = ["--iterations", "60", "--checkpoint-every", "20", "--set", "depth_weight=0.5"];
+const TRAIN_FLAGS: [&str; 6] = ["--iterations", "60", "--checkpoint-every", "20", "--set", "depth_weight=0.5"];
 
 fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    FLAGS.iter().copied().chain(more.iter().copied()).collect()
+    TRAIN_FLAGS.iter().copied().chain(more.iter().copied()).collect()
 }
 
 /// A stopped training goes on with the same depths, and without them the model is another one.
@@ -23,7 +23,7 @@ fn a_training_with_known_depths_goes_on_from_a_checkpoint() {
         succeeded(&place.trained(&again, &["--resume"]));
         assert!(place.model(&again, 60) == place.model(name, 60), "{name}: the same bits");
     }
-    succeeded(&place.trained("without", &[&FLAGS[..4], &["--set", "depth_weight=0"]].concat()));
+    succeeded(&place.trained("without", &[&TRAIN_FLAGS[..4], &["--set", "depth_weight=0"]].concat()));
     let models = ["points", "maps", "without"].map(|name| place.model(name, 60));
     assert!(models[0] != models[1] && models[0] != models[2] && models[1] != models[2]);
 }
@@ -75,5 +75,5 @@ fn depths_that_are_not_there_are_an_error() {
     refused(&["--set", "depth_weight=-1"], &["depth"]);
     // A reconstruction without points.
     fs::write(place.path("scene/sparse/0/points3D.bin"), 0_u64.to_le_bytes()).expect("written");
-    refused(&FLAGS, &["no points with known photos", "--depths"]);
+    refused(&TRAIN_FLAGS, &["no points with known photos", "--depths"]);
 }

@@ -8,7 +8,7 @@ use labelgs::scheduler::SchedulerOptions;
 use labelgs::synth::{Preset, SynthLens, SynthOptions, dataset};
 use labelgs::train::Trainer;
 
-const SCENE: SynthOptions = SynthOptions {
+const SCENE_OPTIONS: SynthOptions = SynthOptions {
     preset: Preset::Simple,
     width: 96,
     height: 72,
@@ -22,7 +22,7 @@ const SCENE: SynthOptions = SynthOptions {
 
 /// Model after a few labelled steps with initial capacity `room`, and whether the (splat, tile) pairs had to grow.
 fn trained(gpu: &std::sync::Arc<labelgs::gpu::Gpu>, room: u64) -> (Gaussians, bool) {
-    let data = dataset(&SCENE, 0);
+    let data = dataset(&SCENE_OPTIONS, 0);
     let config = TrainConfig { iterations: 100, label_from: Some(3), start_size: Some(1.0), ..TrainConfig::default() };
     let mut model = init::initial_gaussians(&data, 0, 100).expect("a model");
     // Large and opaque: many tiles each, and labels at once.

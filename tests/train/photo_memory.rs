@@ -9,8 +9,8 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Budgets of a scene of 6 photos of 64 x 48 px: some photos fit, none does.
-const BUDGETS: [&str; 2] = ["150K", "1K"];
-const STEPS: u32 = 40;
+const MEMORY_BUDGETS: [&str; 2] = ["150K", "1K"];
+const STEP_COUNT: u32 = 40;
 
 fn scene(folder: &Path, lens: &str) -> LoadOptions {
     let lens = lens.parse().expect("a lens");
@@ -92,14 +92,14 @@ fn a_training_has_the_same_bits_for_any_budget() {
         // Early steps are small, and each view comes at several sizes.
         let config = ["--config", &place.settings(), "--set", "start_size=0.5", "--set", "full_size_from=20"];
         let all = [&config[..], &["--exposure", "on"], flags].concat();
-        succeeded(&place.trained(out, &[&all[..], &["--iterations", &STEPS.to_string()]].concat()))
+        succeeded(&place.trained(out, &[&all[..], &["--iterations", &STEP_COUNT.to_string()]].concat()))
     };
     let text = train("whole", &[]);
     assert!(!text.contains("temporary file"), "{text}");
-    for budget in BUDGETS {
+    for budget in MEMORY_BUDGETS {
         let text = train(budget, &["--photo-memory", budget]);
         assert!(text.contains("photos stay in memory, the others in a temporary file"), "{text}");
-        assert!(place.model(budget, STEPS) == place.model("whole", STEPS), "{budget}: the models differ");
+        assert!(place.model(budget, STEP_COUNT) == place.model("whole", STEP_COUNT), "{budget}: the models differ");
         assert_eq!(place.history(budget), place.history("whole"), "{budget}");
         let names = |out: &str| {
             let mut all = files(&place.path(out))
@@ -114,16 +114,18 @@ fn a_training_has_the_same_bits_for_any_budget() {
     // A killed run goes on with another budget.
     let settings = place.settings();
     let flags = ["--config", &settings, "--set", "start_size=0.5", "--set", "full_size_from=20", "--exposure", "on"];
-    let mut child = place.spawned(&place.train("killed", &[&flags[..], &["--photo-memory", BUDGETS[0]]].concat()));
+    let mut child =
+        place.spawned(&place.train("killed", &[&flags[..], &["--photo-memory", MEMORY_BUDGETS[0]]].concat()));
     while place.checkpoints("killed").is_empty() && child.try_wait().expect("a child").is_none() {
         std::thread::sleep(Duration::from_millis(2));
     }
     child.kill().expect("killed or done");
     child.wait().expect("a child");
-    let args = ["train", &place.text("scene"), "-o", &place.text("killed"), "--resume", "--photo-memory", BUDGETS[1]];
+    let args =
+        ["train", &place.text("scene"), "-o", &place.text("killed"), "--resume", "--photo-memory", MEMORY_BUDGETS[1]];
     let text = succeeded(&place.labelgs(&args));
     assert!(text.contains("--photo-memory: 150K in the checkpoint, now 1K"), "{text}");
-    assert!(place.model("killed", STEPS) == place.model("whole", STEPS), "the models differ after a kill");
+    assert!(place.model("killed", STEP_COUNT) == place.model("whole", STEP_COUNT), "the models differ after a kill");
 }
 
 /// A disk that is full, or that returns other bytes, costs time and no bit.

@@ -10,13 +10,13 @@ use labelgs::{Error, Result};
 use std::collections::BTreeMap;
 
 /// Where the cameras look; there is a ball.
-const MIDDLE: DVec3 = DVec3::new(0.0, 0.0, 0.42);
-const RADIUS: f64 = 0.35;
+const OBJECT_CENTRE: DVec3 = DVec3::new(0.0, 0.0, 0.42);
+const OBJECT_RADIUS: f64 = 0.35;
 
 fn view((index, camera): (usize, Camera)) -> View {
     let (width, height) = (camera.width, camera.height);
-    let seen = camera.sees(MIDDLE).expect("it is before the camera");
-    let reach = camera.fx * RADIUS / camera.centre().distance(MIDDLE);
+    let seen = camera.sees(OBJECT_CENTRE).expect("it is before the camera");
+    let reach = camera.fx * OBJECT_RADIUS / camera.centre().distance(OBJECT_CENTRE);
     let inside = |p: u32| DVec2::new(f64::from(p % width) + 0.5, f64::from(p / width) + 0.5).distance(seen) < reach;
     let pixels = || (0..width * height).map(inside);
     let colour = |inside| if inside { [200, 60, 40, 255] } else { [90, 110, 130, 255] };
@@ -35,7 +35,7 @@ fn views() -> Vec<View> {
 
 /// The ball, too faint, and haze over and under it.
 fn object() -> Gaussians {
-    let places = [MIDDLE, MIDDLE + 1.2 * DVec3::Z, MIDDLE - 1.2 * DVec3::Z];
+    let places = [OBJECT_CENTRE, OBJECT_CENTRE + 1.2 * DVec3::Z, OBJECT_CENTRE - 1.2 * DVec3::Z];
     Gaussians {
         origin: DVec3::ZERO,
         means: places.iter().map(|place| place.as_vec3().to_array()).collect(),

@@ -6,11 +6,11 @@ use crate::reference::model::ROW_FLOATS;
 use crate::reference::{Row, Rules};
 use crate::support::scenes::{generator, uniform};
 
-const STEPS: u32 = 1000;
+const STEP_COUNT: u32 = 1000;
 
 /// Rates that fall, each in a way of its own.
 fn rates(step: u32) -> Rates {
-    let late = f64::from(step) / f64::from(STEPS);
+    let late = f64::from(step) / f64::from(STEP_COUNT);
     Rates([0, 1, 2, 3, 4, 5, 6, 7].map(|k| 0.01 / f64::from(1 << k) * (0.01_f64).powf(late * f64::from(k))))
 }
 
@@ -39,10 +39,10 @@ fn late_updates_equal_those_of_every_step() {
     let mut longest = 0;
     for _ in 0..8 {
         let (mut every, mut late, mut last) = (AdamState::default(), AdamState::default(), 0);
-        for step in 1..=STEPS {
+        for step in 1..=STEP_COUNT {
             let found = gradient(&mut random).filter(|_| !(40..=400).contains(&step));
             every = adam(&rules, &rates(step), step, &every, &found.unwrap_or_default());
-            if found.is_some() || step == STEPS {
+            if found.is_some() || step == STEP_COUNT {
                 let missed: Vec<Rates> = (last + 1..step).map(|step| corrected(&rules, &rates(step), step)).collect();
                 longest = longest.max(missed.len());
                 late = caught_up(&rules, &missed, &late);
@@ -89,8 +89,8 @@ fn late_updates_in_f32_are_as_near_as_those_of_every_step() {
     let (mut worst_late, mut worst_every) = (0.0_f64, 0.0_f64);
     for _ in 0..200 {
         let (mut exact, mut every, mut late, mut last) = ([1.0, 0.0, 0.0], [1.0_f32, 0.0, 0.0], [1.0_f32, 0.0, 0.0], 0);
-        for step in 1..=STEPS {
-            let found = uniform(&mut random, 0.0, 1.0) < 0.03 || step == STEPS;
+        for step in 1..=STEP_COUNT {
+            let found = uniform(&mut random, 0.0, 1.0) < 0.03 || step == STEP_COUNT;
             let g = if found { uniform(&mut random, -1.0, 1.0) as f32 } else { 0.0 };
             exact = adam_value(&rules, rate(step), step, exact, f64::from(g));
             every = step32(every, step, g);

@@ -8,7 +8,7 @@ use rand::{Rng, SeedableRng};
 use std::time::{Duration, Instant};
 
 /// The largest window.
-const LARGEST: (u32, u32) = (1500, 1000);
+const LARGEST_SIZE: (u32, u32) = (1500, 1000);
 /// Fewer seconds meet too little for a word on memory.
 const SECONDS_LEAST: u64 = 120;
 
@@ -30,7 +30,7 @@ pub fn random_events(browser: &mut Browser, tab: &Tab, server: &Server) {
         [heap, resident(server.child.id())]
     };
     // The server's buffers grow with the largest picture.
-    browser.resize(tab, LARGEST);
+    browser.resize(tab, LARGEST_SIZE);
     for layout in ["pair", "one"] {
         browser.click_on(tab, &format!("#layout-{layout}"));
         browser.until(tab, "labelgs.stage.asked === null && !labelgs.stage.isDirty && labelgs.stage.isStill");
@@ -91,7 +91,7 @@ fn any_events(browser: &mut Browser, tab: &Tab, dice: &mut SmallRng, time: Durat
                 let event = serde_json::json!({ "type": "mouseWheel", "x": at.0, "y": at.1, "deltaX": 0, "deltaY": dice.random_range(-900..900) });
                 drop(browser.call(Some(tab), "Input.dispatchMouseEvent", event));
             }
-            3 => browser.resize(tab, (dice.random_range(200..LARGEST.0), dice.random_range(200..LARGEST.1))),
+            3 => browser.resize(tab, (dice.random_range(200..LARGEST_SIZE.0), dice.random_range(200..LARGEST_SIZE.1))),
             _ => {
                 let (code, key) = keys[dice.random_range(0..keys.len())];
                 browser.key(tab, code, key, [0, 0, 0, 8][dice.random_range(0..4)]);

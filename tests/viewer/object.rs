@@ -10,7 +10,7 @@ use labelgs::formats::read_model;
 use serde_json::{Value, json};
 
 /// The label that an object gets: the first one after those of the model and its names.
-const NEW: u64 = 4;
+const NEW_LABEL: u64 = 4;
 
 /// Gives a place a network, and photos that it can read.
 fn prepare(place: &Place) {
@@ -50,9 +50,9 @@ fn an_object_is_found_grows_and_becomes_a_label() {
     // A photo is asked where it was clicked; the object is drawn with a label that no list has yet.
     let first = point(&mut page, &json!({ "object": "click", "from": { "view": 0 }, "pixel": pixel, "on": true }), 1);
     let click = format!("000.png:{},{}", pixel[0], pixel[1]);
-    assert_eq!((&first["label"], &first["flags"]), (&json!(NEW), &json!([["click", click]])));
+    assert_eq!((&first["label"], &first["flags"]), (&json!(NEW_LABEL), &json!([["click", click]])));
     assert!(first["count"].as_u64().is_some_and(|count| count > 10), "{first}");
-    assert_eq!(page.pick(&json!({ "view": 0 }), pixel)["label"], NEW, "it is drawn");
+    assert_eq!(page.pick(&json!({ "view": 0 }), pixel)["label"], NEW_LABEL, "it is drawn");
 
     // A free camera: the photo that looks most alike is asked. Then what does not belong to it.
     let other = pixel_of(&place.path("scene"), "001", object);
@@ -63,7 +63,7 @@ fn an_object_is_found_grows_and_becomes_a_label() {
     let rest = (0..3072_u32).map(|at| [at * 37 % 64, at * 29 % 48]);
     let mut is_other = |pixel: &[u32; 2]| {
         let found = page.pick(&json!({ "view": 0 }), *pixel);
-        found["label"] != NEW && found["opacity"].as_f64().is_some_and(|opacity| opacity > 0.7)
+        found["label"] != NEW_LABEL && found["opacity"].as_f64().is_some_and(|opacity| opacity > 0.7)
     };
     let [x, y] = rest.into_iter().find(|pixel| is_other(pixel)).expect("a pixel of something else");
     let third = point(&mut page, &json!({ "object": "click", "from": { "view": 0 }, "pixel": [x, y], "on": false }), 3);
@@ -71,8 +71,8 @@ fn an_object_is_found_grows_and_becomes_a_label() {
 
     // It becomes a label by the command that is shown, and most of it is the object.
     page.send(&json!({ "kind": "object", "what": { "object": "keep", "name": "it's one" } }));
-    assert_eq!(page.hear("kept")["label"], NEW);
-    let kept = json!([NEW, "it's one", third["count"]]);
+    assert_eq!(page.hear("kept")["label"], NEW_LABEL);
+    let kept = json!([NEW_LABEL, "it's one", third["count"]]);
     page.until("labels", |labels| {
         let rows = labels["rows"].as_array();
         rows.is_some_and(|rows| rows.iter().any(|row| json!([row["id"], row["name"], row["count"]]) == kept))
@@ -86,7 +86,7 @@ fn an_object_is_found_grows_and_becomes_a_label() {
     );
     let labels = |name: &str| read_model(place.path(name)).expect("a model").gaussians.labels.expect("labels");
     let (found, truth) = (labels("model-edits/001.ply"), labels("model.ply"));
-    let of = |label: u32| found.iter().zip(&truth).filter(|(a, b)| u64::from(**a) == NEW && **b == label).count();
+    let of = |label: u32| found.iter().zip(&truth).filter(|(a, b)| u64::from(**a) == NEW_LABEL && **b == label).count();
     let (own, others) = (of(u32::from(object)), (1..=3).map(of).sum::<usize>());
     assert!(own > 10 && 10 * own >= 8 * others, "{own} of {others}");
     same_by_command(&place, &command, "model-edits/001");

@@ -9,7 +9,7 @@ use labelgs::scenes::camera_json::CameraFile;
 use std::fmt::Write;
 
 /// Pictures of a page are blended in 8 bits: their error is a few steps of 1/256 where many Gaussians overlap.
-const LEAST: f64 = 44.0;
+const PSNR_MIN: f64 = 44.0;
 
 /// The pixels of the page's picture.
 fn pixels(browser: &mut Browser, tab: &Tab) -> Picture {
@@ -154,7 +154,7 @@ pub fn a_page_shows_its_model(browser: &mut Browser, place: &Place) {
     browser.js(&tab, "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
     let hidden = psnr(&pixels(browser, &tab), &place.picture("some/camera.rgb.png"));
     println!("a page in a browser against `render`: {whole:.1} dB, {hidden:.1} dB with a label hidden");
-    assert!(whole > LEAST && hidden > LEAST, "{whole} dB, {hidden} dB with a label hidden");
+    assert!(whole > PSNR_MIN && hidden > PSNR_MIN, "{whole} dB, {hidden} dB with a label hidden");
 
     browser.js(&tab, "document.querySelectorAll('#labels input')[3].click()");
     assert_eq!(browser.js(&tab, "document.title"), "page – labelgs", "the name of the file");

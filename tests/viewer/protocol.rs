@@ -8,7 +8,7 @@ use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
 /// Names of the views of the scene, in the order of the server.
-const VIEWS: [&str; 6] = ["000", "001", "002", "003", "004", "005"];
+const VIEW_NAMES: [&str; 6] = ["000", "001", "002", "003", "004", "005"];
 
 fn status(answer: &str) -> &str {
     answer.split(' ').nth(1).unwrap_or_default()
@@ -211,7 +211,7 @@ fn pictures_are_those_of_render() {
     let server = place.view(&[]);
     let mut page = server.page();
     let scene = page.hear("scene");
-    for (index, name) in VIEWS.iter().enumerate() {
+    for (index, name) in VIEW_NAMES.iter().enumerate() {
         let frame = page.still(&json!({ "view": index }), &["colour", "labels"]);
         assert!(frame.exact && frame.size == (64, 48) && frame.step == 0);
         assert_eq!(frame.pictures[0], place.picture(&format!("all/{name}.rgb.png")), "{name}");
@@ -423,7 +423,7 @@ pub(super) fn same_by_command(place: &Place, command: &str, stem: &str) {
     assert!(own == (read("ply"), read("labels.json")), "{stem} differs from that of {command}");
 }
 
-const TRAIN: [&str; 10] = [
+const TRAIN_FLAGS: [&str; 10] = [
     "train",
     "scene",
     "--masks",
@@ -437,7 +437,7 @@ const TRAIN: [&str; 10] = [
 ];
 
 fn train(place: &Place, out: &str, flags: &[&str]) -> std::process::Command {
-    place.command(&[&TRAIN[..], &["-o", out], flags].concat())
+    place.command(&[&TRAIN_FLAGS[..], &["-o", out], flags].concat())
 }
 
 #[test]

@@ -32,7 +32,7 @@ pub struct Columns {
 }
 
 /// The grey of photos and objects.
-const GREY: u8 = 204;
+const GREY_VALUE: u8 = 204;
 
 impl Subject for Columns {
     fn labels(&self) -> Option<&[u32]> {
@@ -48,7 +48,7 @@ impl Subject for Columns {
         assert_eq!((camera.width, camera.height), (SIDE as u32, SIDE as u32));
         let labels = self.labels.repeat(SIDE);
         let shown = |id: &u32| self.shown.as_ref().is_none_or(|shown| shown.contains(id));
-        let grey = |id: &u32| if self.dark.contains(id) { 0.0 } else { f32::from(GREY) / 255.0 };
+        let grey = |id: &u32| if self.dark.contains(id) { 0.0 } else { f32::from(GREY_VALUE) / 255.0 };
         Ok(Render {
             width: camera.width,
             height: camera.height,
@@ -82,7 +82,7 @@ pub fn view(name: &str) -> View {
         width: side,
         height: side,
     };
-    let photo = Photo { width: side, height: side, rgba: vec![[GREY, GREY, GREY, 255]; SIDE * SIDE] };
+    let photo = Photo { width: side, height: side, rgba: vec![[GREY_VALUE, GREY_VALUE, GREY_VALUE, 255]; SIDE * SIDE] };
     View { name: name.to_owned(), camera, photo: Some(photo.into()), mask: None }
 }
 
