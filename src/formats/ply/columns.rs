@@ -113,9 +113,8 @@ impl Columns {
         }
         let mut notes = Vec::new();
         if filter.is_some() {
-            notes.push(format!(
-                "the column `{FILTER_COLUMN}` of Mip-Splatting was applied to sizes and opacities, as in its fused export"
-            ));
+            let applied = "was applied to sizes and opacities, as in its fused export";
+            notes.push(format!("the column `{FILTER_COLUMN}` of Mip-Splatting {applied}"));
         }
         if flat {
             notes.push(format!("has no `scale_2`, as 2DGS: {DISC_NOTE}"));
