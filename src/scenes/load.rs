@@ -67,8 +67,7 @@ pub fn load(root: &Path, mut listing: Listing, options: &LoadOptions) -> Result<
         notes.push("photos and masks were undistorted to a pinhole camera; pixels without a source are ignored".into());
     }
     let is_wide = note_wide(&loaded, &mut notes);
-    let flaws: Vec<SceneProblem> =
-        listing.flaws.into_iter().chain(faults.into_iter().map(SceneProblem::LeftOut)).collect();
+    let flaws: Vec<_> = listing.flaws.into_iter().chain(faults.into_iter().map(SceneProblem::LeftOut)).collect();
     notes.extend(flaws.iter().map(|flaw| flaw.text().to_owned()));
     let (train, test) = divided(loaded, options.only.as_deref());
     let Listing { source, native, points, .. } = listing;
