@@ -188,7 +188,7 @@ fn every_command_of_readme_and_guide_runs() {
 /// Commands in the tables of README, which need files that nobody has here, are commands of the program.
 #[test]
 fn commands_of_tables_are_understood() {
-    let text = fs::read_to_string(Path::new(ROOT).join("README.md")).expect("README.md");
+    let text = fs::read_to_string(Path::new(REPOSITORY_ROOT).join("README.md")).expect("README.md");
     let rows = text.lines().filter(|line| line.starts_with("| "));
     let commands: Vec<&str> = rows.flat_map(|row| row.split('`').skip(1).step_by(2)).collect();
     assert!(commands.len() >= 8, "{commands:?}");

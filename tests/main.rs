@@ -35,4 +35,5 @@ mod stress; // error bounds on adversarial scenes
 mod tools; // scripts and packages
 mod train; // trainings, by what they train and by which losses
 mod verify; // mirrors, their gradients, the self-test
-mod viewer; // the server of the viewer, and its page in a browser
+mod viewer;
+mod words; // words that are not ours, names that say nothing // the server of the viewer, and its page in a browser

@@ -151,7 +151,7 @@ pub fn objects_of(ids: &[u16]) -> Vec<u16> {
 mod tests {
     use super::LabelMap;
 
-    /// Distances by the definition: to the nearest pixel that has not the id, the frame around the picture included.
+    /// Distances by definition: to the nearest pixel with another id, the frame around the picture included.
     #[test]
     fn depths_are_distances_to_the_next_pixel_without_the_id() {
         let (width, height) = (9_u32, 7_u32);

@@ -20,7 +20,7 @@ pub(super) struct Work<'a> {
     /// Before the first change; none without changes.
     first: Option<Document>,
     done: Vec<AppliedEdit>,
-    /// Changes that were taken back, the last one first.
+    /// Changes that were undone, the last one first.
     undone: Vec<Edit>,
     folder: PathBuf,
     /// The model that the changes make, once there are some, and whether it is written.
@@ -146,7 +146,7 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    /// Makes the change again that was taken back last.
+    /// Repeats the change that was undone last.
     pub(super) fn redo(&mut self, sights: &mut Sights) -> Result<()> {
         let none = || Error::usage("redo", "there is no edit to redo");
         let edit = self.undone.last().cloned().ok_or_else(none)?;

@@ -150,7 +150,7 @@ fn head(status: &str, kind: &str, more: &str, length: u64) -> String {
     )
 }
 
-/// A browser that went away misses nothing.
+/// A write error means that the browser has disconnected; ignore it.
 fn send_all(stream: &mut TcpStream, head: &str, mut body: impl Read) {
     let sent = stream.write_all(head.as_bytes()).and_then(|()| std::io::copy(&mut body, stream));
     let _ = sent.and_then(|_| stream.flush());

@@ -96,7 +96,7 @@ impl Object {
     /// Returns the change that makes a label of it.
     pub(super) fn edit(&self, name: &str) -> Result<Edit> {
         let none = || Error::usage("object", "no object was found yet");
-        let rows = Rows::of(self.rows().ok_or_else(none)?);
+        let rows = Rows::from_mask(self.rows().ok_or_else(none)?);
         let name = Some(name.trim().to_owned()).filter(|name| !name.is_empty());
         Ok(Edit::Assign { rows, label: None, name })
     }

@@ -1,4 +1,4 @@
-//! `labelgs check`: faults of a capture before training.
+//! `labelgs check`: problems in the photos, found before training.
 
 use crate::cli::support::{Context, ReadArgs};
 use crate::scenes::capture::{CaptureProblem, Finding, Report, scan};

@@ -13,11 +13,11 @@ use labelgs_scene::Gaussians;
 use labelgs_scene::harmonics::{sh0_of, value_of};
 
 /// Half of the side of a patch, in cells.
-const PATCH: isize = 4;
+const PATCH_RADIUS_CELLS: isize = 4;
 /// What is added to the data term, as a share of a step from black to white between two cells: flat patches are filled too.
 const DATA_OFFSET: f64 = 0.01;
 /// Distance within which colours change too fast to be those of the new place, in cells.
-const DETAIL: usize = 8;
+const DETAIL_CELLS: usize = 8;
 
 /// Where each cell of a hole has its Gaussians from.
 pub(super) struct Sources<'a> {
@@ -59,7 +59,8 @@ struct Growth<'a> {
 impl Growth<'_> {
     /// Returns the cells of the patch around a cell.
     fn patch(&self, index: usize) -> impl Iterator<Item = usize> {
-        let steps = (-PATCH..=PATCH).flat_map(|dy| (-PATCH..=PATCH).map(move |dx| [dx, dy]));
+        let steps = (-PATCH_RADIUS_CELLS..=PATCH_RADIUS_CELLS)
+            .flat_map(|dy| (-PATCH_RADIUS_CELLS..=PATCH_RADIUS_CELLS).map(move |dx| [dx, dy]));
         steps.filter_map(move |step| self.sheet.step(index, step))
     }
 
@@ -193,7 +194,7 @@ impl<'a> Sources<'a> {
     fn colour(&self, copies: &mut Gaussians, moved: &[Move], shadows: Option<&Shadows>) {
         let Some(lit) = self.sheet.continued(shadows, Some(self.pattern)) else { return };
         let lit: Vec<Option<DVec3>> = lit.into_iter().map(Some).collect();
-        let slow = means(self.sheet, &lit, DETAIL);
+        let slow = means(self.sheet, &lit, DETAIL_CELLS);
         let after = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.after(index));
         for (row, &Move { place, from, to }) in moved.iter().enumerate() {
             copies.means[row] = (place - copies.origin).as_vec3().to_array();

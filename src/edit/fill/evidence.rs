@@ -11,9 +11,10 @@ const DEPTH_TOLERANCE: f64 = 2.5;
 const OWN_SURFACE_TOLERANCES: f64 = 3.0;
 /// Least sine of the angle between a view and the plane: a flatter one cannot tell its places apart.
 const VIEW_SINE_MIN: f64 = 0.15;
-/// Views that have to show the removed object before a hole, and the share of them that may show something else: at
-/// contours a pixel is decided by chance.
-const HIDING: (u32, f64) = (2, 0.1);
+/// Views that have to show the removed object before a hole.
+const HIDING_VIEWS_MIN: u32 = 2;
+/// Share of these views that may show something else: at contours a pixel is decided by chance.
+const OTHER_VIEWS_SHARE_MAX: f64 = 0.1;
 
 /// Returns the distance up to which something is on a surface, world units.
 pub(super) fn on_surface(cell: f64) -> f64 {
@@ -125,7 +126,7 @@ impl Evidence {
     /// Returns what the views show together.
     pub(super) fn state(&self) -> State {
         let other = self.surface + self.through;
-        if self.removed >= HIDING.0 && f64::from(other) <= HIDING.1 * f64::from(self.removed) {
+        if self.removed >= HIDING_VIEWS_MIN && f64::from(other) <= OTHER_VIEWS_SHARE_MAX * f64::from(self.removed) {
             State::Hole
         } else if self.own > self.through {
             State::Seen

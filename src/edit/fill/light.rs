@@ -18,8 +18,8 @@ const DISCS_MAX: usize = 4000;
 /// Most cells along an object and as much again on either side of it.
 const SIDE_CELLS_MAX: f64 = 320.0;
 /// Directions that are tried, and rounds of 5 x 5 finer ones around the best, with half the step each.
-const DIRECTIONS: usize = 800;
-const ROUNDS: i32 = 4;
+const DIRECTION_COUNT: usize = 800;
+const REFINEMENT_ROUNDS: i32 = 4;
 const STEP_FIRST: f64 = 0.06;
 /// Score from which a light is one, and brightest shadow that it may throw. Where light comes from all sides, the best
 /// direction has a score of chance, and what is inside of its shadows is about as bright as what is outside. Windows of
@@ -55,8 +55,8 @@ impl Light {
             let scored: Vec<(f64, DVec3)> = tried.into_par_iter().map(|at| (score(&stands, at), at)).collect();
             scored.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
         };
-        let mut found = best((0..DIRECTIONS).map(|index| even_direction(index, DIRECTIONS)).collect());
-        for round in 0..ROUNDS {
+        let mut found = best((0..DIRECTION_COUNT).map(|index| even_direction(index, DIRECTION_COUNT)).collect());
+        for round in 0..REFINEMENT_ROUNDS {
             let (towards, step) = (found.1, STEP_FIRST * 0.5_f64.powi(round));
             let (u, v) = towards.any_orthonormal_pair();
             let near = |k: i32| (towards + step * (f64::from(k % 5 - 2) * u + f64::from(k / 5 - 2) * v)).normalize();

@@ -38,9 +38,10 @@ use std::sync::Arc;
 
 /// Longest side of a [`Sight`], px: finer ones take memory and add little.
 pub const SIGHT_SIDE: u32 = 640;
-/// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal, and its
-/// least width, in cells.
-const RING: (f64, f64) = (0.25, 8.0);
+/// Width of the ring around the object from which surfaces are continued, as a share of the object's diagonal.
+const RING_DIAGONAL_SHARE: f64 = 0.25;
+/// Least width of that ring, in cells.
+const RING_CELLS_MIN: f64 = 8.0;
 /// Width of the ring in which a pattern is looked for, in the same measures, the length of the object that counts there, in
 /// its widths, and the root of the number of cells.
 const PATTERN_RING: (f64, f64) = (0.75, 96.0);
@@ -52,10 +53,12 @@ const PATTERN_HOLE_MIN: usize = 81;
 const BLOCKER_SHARE_MAX: f64 = 0.25;
 /// Most points that one surface is looked for among.
 const POINTS_MAX: usize = 20_000;
-/// Standard deviation of a new Gaussian in and across its surface, in cells: neighbours overlap without gaps.
-const SPREAD: (f64, f64) = (0.7, 0.1);
+/// Standard deviation of a new Gaussian in its surface, in cells: neighbours overlap without gaps.
+const SPREAD_IN_CELLS: f64 = 0.7;
+/// The same across its surface.
+const SPREAD_ACROSS_CELLS: f64 = 0.1;
 /// Opacity of a new Gaussian before the sigmoid, 0.97.
-const OPACITY: f32 = 3.5;
+const OPACITY_LOGIT: f32 = 3.5;
 
 /// What a view shows of the whole model, row-major.
 #[derive(Clone, Debug)]
@@ -225,7 +228,7 @@ impl Place {
         let places: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
         let tree = tree(&places)?;
         let mut place = Self { tree: Arc::new(tree), discs: Vec::new(), low, high, cell, ring: 0.0 };
-        place.ring = (RING.0 * place.size()).max(RING.1 * cell);
+        place.ring = (RING_DIAGONAL_SHARE * place.size()).max(RING_CELLS_MIN * cell);
         place.discs = rows.iter().map(|&row| Disc::of(model, row)).filter(|disc| place.has(disc, place.ring)).collect();
         Ok(Some(place))
     }
@@ -312,13 +315,13 @@ impl Sight {
 fn flat(model: &Gaussians, (plane, cell): (&Plane, f64), places: &[(DVec3, DVec3)], label: u32) -> Gaussians {
     let turn = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal)).normalize();
     let quat = [turn.w, turn.x, turn.y, turn.z].map(|value| value as f32);
-    let scale = [SPREAD.0, SPREAD.0, SPREAD.1].map(|share| (share * cell).ln() as f32);
+    let scale = [SPREAD_IN_CELLS, SPREAD_IN_CELLS, SPREAD_ACROSS_CELLS].map(|share| (share * cell).ln() as f32);
     let count = places.len();
     Gaussians {
         means: places.iter().map(|(world, _)| (*world - model.origin).as_vec3().to_array()).collect(),
         quats: vec![quat; count],
         scales: vec![scale; count],
-        opacities: vec![OPACITY; count],
+        opacities: vec![OPACITY_LOGIT; count],
         sh0: places.iter().map(|(_, colour)| colour.to_array().map(sh0_of)).collect(),
         sh_rest: vec![[0.0; 3]; count * model.rest_per_gaussian()],
         labels: Some(vec![label; count]),

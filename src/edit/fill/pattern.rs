@@ -12,8 +12,8 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Most cells that two copies of the plane are compared at: to guess periods, and to know them.
-const GUESS_SAMPLES: usize = 1000;
-const SAMPLES: usize = 2500;
+const GUESS_CELLS_MAX: usize = 1000;
+const COMPARED_CELLS_MAX: usize = 2500;
 /// Seed of the choice of these cells.
 const SEED: u64 = 0;
 /// Fewest cells, and least share of the compared ones, that are seen in both copies.
@@ -39,7 +39,7 @@ const FALL_MIN: f64 = 0.15;
 /// Least share of the variance of what is seen that the pattern foretells.
 const FORETOLD_MIN: f64 = 0.15;
 /// Steps of the last adjustment of periods, in cells.
-const ADJUSTMENTS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+const ADJUSTMENT_CELLS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 
 /// The detail of a plane's colours in the light, as far as they are seen, on a grid of cells.
 struct Seen<'a> {
@@ -205,7 +205,7 @@ impl<'a> Seen<'a> {
         let (_, periods) = scored.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let mut periods = self.shortest(periods);
         let mut score = self.score(periods, best);
-        for step in ADJUSTMENTS {
+        for step in ADJUSTMENT_CELLS {
             for (which, by) in [0, 1]
                 .into_iter()
                 .flat_map(|which| [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|by| (which, step * by)))
@@ -239,12 +239,12 @@ impl<'a> Pattern<'a> {
     /// Finds the pattern of a plane by its colours in the light, `lit`, and their detail; `None` if it has none that foretells
     /// what is seen.
     pub(super) fn of(sheet: &'a Sheet, lit: &[Option<DVec3>], colours: &'a [Option<DVec3>]) -> Option<Self> {
-        if Seen::new(sheet, lit, GUESS_SAMPLES).roughness() < DEVIATION_MIN * DEVIATION_MIN {
+        if Seen::new(sheet, lit, GUESS_CELLS_MAX).roughness() < DEVIATION_MIN * DEVIATION_MIN {
             return None;
         }
-        let rough = Seen::new(sheet, colours, GUESS_SAMPLES);
+        let rough = Seen::new(sheet, colours, GUESS_CELLS_MAX);
         let periods = rough.periods()?;
-        let seen = Seen::new(sheet, colours, SAMPLES);
+        let seen = Seen::new(sheet, colours, COMPARED_CELLS_MAX);
         let offsets = seen.matches(periods);
         let likeness = offsets.iter().map(|(_, found)| found.likeness).sum::<f64>() / offsets.len() as f64;
         let halves = [periods[0], periods[1], periods[0] + periods[1]].map(|period| seen.compare(0.5 * period));

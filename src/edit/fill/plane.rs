@@ -5,11 +5,13 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 /// Number of random planes per fit.
-const TRIES: usize = 300;
+const PLANE_TRIES: usize = 300;
 /// Most planes per set of points.
 const PLANES_MAX: usize = 6;
-/// Least number of points on a plane, and its least share of the points.
-const LEAST: (usize, f64) = (60, 0.03);
+/// Least number of points on a plane.
+const PLANE_POINTS_MIN: usize = 60;
+/// Least share of the points on a plane.
+const PLANE_POINTS_SHARE_MIN: f64 = 0.03;
 /// Largest distance of a point from its plane, in cells.
 const PLANE_DISTANCE_MAX: f64 = 1.5;
 /// Distance of points from a plane that may lie on another, in cells, and the least cosine of the normals of two planes
@@ -74,7 +76,7 @@ impl Plane {
 pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
     let mut random = Pcg64::seed_from_u64(SEED);
     let (mut left, mut found) = (points.to_vec(), Vec::new());
-    let least = LEAST.0.max((LEAST.1 * points.len() as f64) as usize);
+    let least = PLANE_POINTS_MIN.max((PLANE_POINTS_SHARE_MIN * points.len() as f64) as usize);
     for _ in 0..PLANES_MAX {
         if left.len() < least {
             break;
@@ -82,7 +84,7 @@ pub(super) fn planes(points: &[DVec3], cell: f64) -> Vec<Plane> {
         let near = |plane: &Plane, point: &DVec3| plane.height(*point).abs() <= PLANE_DISTANCE_MAX * cell;
         let count = |plane: &Plane| left.iter().filter(|point| near(plane, point)).count();
         let mut best: Option<(usize, Plane)> = None;
-        for _ in 0..TRIES {
+        for _ in 0..PLANE_TRIES {
             let [a, b, c] = [(); 3].map(|()| left[random.random_range(0..left.len())]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             if normal == DVec3::ZERO {

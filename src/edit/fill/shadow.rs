@@ -16,7 +16,7 @@ pub(super) const LIGHT_SINE_MIN: f64 = 0.25;
 const DISC_RADIUS_MIN: f64 = 1.5;
 /// Spots of the light: one in the middle and a ring around it, and its radius as the tangent of the angle. A shadow has soft
 /// edges, those of a model more so than those of a photo.
-const SPOTS: usize = 6;
+const LIGHT_SPOTS: usize = 6;
 const LIGHT_RADIUS: f64 = 0.06;
 /// Distance from the edge of a shadow at which it is sure on which side a place is, in cells.
 const EDGE_CELLS: usize = 2;
@@ -119,7 +119,7 @@ fn is_mixed(sheet: &Sheet, shadow: &[f64], index: usize) -> bool {
 /// Returns the mean shadow over spots of the light.
 pub(super) fn soft(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<f64> {
     let (u, v) = towards.any_orthonormal_pair();
-    let around = (0..SPOTS).map(|spot| DVec2::from_angle(std::f64::consts::TAU * spot as f64 / SPOTS as f64));
+    let around = (0..LIGHT_SPOTS).map(|spot| DVec2::from_angle(std::f64::consts::TAU * spot as f64 / LIGHT_SPOTS as f64));
     let spots: Vec<DVec3> = std::iter::once(DVec2::ZERO)
         .chain(around)
         .map(|at| (towards + LIGHT_RADIUS * (at.x * u + at.y * v)).normalize())

@@ -20,8 +20,8 @@ const SLOW_CELLS: usize = 32;
 /// Largest change of a colour in a round that ends them: far less than a step of 8 bits.
 const CHANGE_MIN: f64 = 1e-5;
 /// Most rounds and over-relaxation of the colours.
-const ROUNDS: usize = 600;
-const RELAXATION: f64 = 1.9;
+const ROUNDS_MAX: usize = 600;
+const OVER_RELAXATION: f64 = 1.9;
 
 /// The cells of a plane around a removed object, row-major.
 pub(super) struct Sheet {
@@ -226,11 +226,11 @@ impl Sheet {
             .map(|index| (index, beside(index).filter(|&at| is_there(at)).collect()))
             .filter(|(_, around): &(usize, Vec<usize>)| !around.is_empty())
             .collect();
-        for _ in 0..ROUNDS {
+        for _ in 0..ROUNDS_MAX {
             let mut largest = 0.0_f64;
             for (index, around) in &unknown {
                 let goal = around.iter().map(|&at| colours[at]).sum::<DVec3>() / around.len() as f64;
-                let change = RELAXATION * (goal - colours[*index]);
+                let change = OVER_RELAXATION * (goal - colours[*index]);
                 colours[*index] += change;
                 largest = largest.max(change.abs().max_element());
             }

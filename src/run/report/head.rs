@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use std::path::Path;
 
 /// What a run decides by itself where the default leaves it open.
-const AUTOMATIC: &str = "automatic";
+const AUTOMATIC_TEXT: &str = "automatic";
 
 /// Returns the title: the name of the scene, or of the run if the scene is unknown.
 pub(super) fn title(runs: &[ReportedRun]) -> String {
@@ -45,7 +45,7 @@ pub(super) fn lead(runs: &[ReportedRun]) -> Markup {
 }
 
 /// Returns the main numbers.
-pub(super) fn numbers(runs: &[Ran]) -> Markup {
+pub(super) fn numbers(runs: &[ReportedRun]) -> Markup {
     let score = |value: f64| number(Some(value), SCORE_DIGITS);
     let main = [
         row(runs, "PSNR", |run| run.test()?.psnr.map(|value| number(Some(value), DECIBEL_DIGITS) + " dB")),
@@ -66,7 +66,7 @@ pub(super) fn numbers(runs: &[Ran]) -> Markup {
 }
 
 /// Numbers for a second look.
-fn more_numbers(runs: &[Ran]) -> [(String, Vec<Option<String>>); 3] {
+fn more_numbers(runs: &[ReportedRun]) -> [(String, Vec<Option<String>>); 3] {
     let objects = "Object IoU, visible parts";
     [
         row(runs, objects, |run| run.test()?.iou_object.map(|value| number(Some(value), SCORE_DIGITS))),

@@ -70,7 +70,7 @@ fn several(book: &mut PictureBook, runs: &[ReportedRun]) -> Result<Vec<Figure>> 
             if figure.panels.is_empty() {
                 figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[0].1, PICTURE_KINDS[0].0)?);
             }
-            figure.panels.extend(book.panel(run, view.number, KINDS[1].1, &run.name)?);
+            figure.panels.extend(book.panel(run, view.number, PICTURE_KINDS[1].1, &run.name)?);
             figure.numbers.push((run.name.clone(), number(view.psnr, DECIBEL_DIGITS) + " dB"));
         }
         figures.push(figure);

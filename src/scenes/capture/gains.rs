@@ -15,7 +15,7 @@ const POINTS_MIN: usize = 20;
 const BRIGHTNESS_MIN: f64 = 0.04;
 const BRIGHTNESS_MAX: f64 = 0.95;
 /// Iterations of reweighted least squares, and of conjugate gradients in each.
-const REWEIGHTINGS: usize = 15;
+const REWEIGHTING_ROUNDS: usize = 15;
 const GRADIENT_STEPS: usize = 60;
 /// Smaller differences of logarithms have equal weight.
 const DIFFERENCE_MIN: f64 = 0.02;
@@ -128,7 +128,7 @@ fn relative_gains(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec
         .flat_map(|view| shared(view).map(move |sample| entry(view, sample)))
         .collect();
     let mut logs = vec![0.0; samples.len()];
-    for _ in 0..REWEIGHTINGS {
+    for _ in 0..REWEIGHTING_ROUNDS {
         descend(&entries, points, &mut logs);
         let means = point_means(&entries, points, |entry| entry.value - logs[entry.view]);
         for entry in &mut entries {

@@ -1,6 +1,6 @@
 //! Attempts at poses and points: the usual one, then others for photos that have no pose yet.
 
-use super::options::{Choice, EXTRACTION, MAPPER, MATCHING, Options, READER, give};
+use super::options::{Choice, EXTRACTION_GROUPS, MAPPER_GROUPS, MATCHING_GROUPS, Options, READER_GROUPS, give};
 use super::progress::{item, pairs, placed};
 use super::sources::Photos;
 use super::unplaced;
@@ -24,21 +24,21 @@ struct Attempt {
     mapping: &'static [Choice],
 }
 
-const USUAL: Attempt =
+const USUAL_ATTEMPT: Attempt =
     Attempt { name: "usual", how: "", database: "usual.db", extraction: &[], matching: &[], mapping: &[] };
 
 /// Many faint features place smooth photos better than few good ones (affine shapes: twice the error of the poses).
-const FAINTER: Attempt = Attempt {
+const FAINTER_ATTEMPT: Attempt = Attempt {
     name: "fainter",
     how: "with fainter features",
     database: "fainter.db",
     extraction: &[("peak_threshold", "0.0003"), ("max_image_size", "1600")],
     matching: &[("guided_matching", "1")],
-    ..USUAL
+    ..USUAL_ATTEMPT
 };
 
 /// These limits may place a photo wrongly: only for photos that have no pose otherwise.
-const FEWER: Attempt = Attempt {
+const FEWER_COMMON_ATTEMPT: Attempt = Attempt {
     name: "fewer",
     how: "with fewer common features",
     mapping: &[
@@ -47,13 +47,13 @@ const FEWER: Attempt = Attempt {
         ("abs_pose_min_inlier_ratio", "0.15"),
         ("min_num_matches", "10"),
     ],
-    ..FAINTER
+    ..FAINTER_ATTEMPT
 };
 
 /// Most ordered photos of which all pairs are compared, which closes loops; of more, neighbours.
 const PAIRED_MAX: usize = 200;
 /// Photos of a side of a block of pairs, COLMAP's default.
-const BLOCK: usize = 50;
+const PAIR_BLOCK_PHOTOS: usize = 50;
 /// Fewest points of three photos for each placed photo with which the others are left out. A handful of photos has fewer.
 const SURE_POINTS_MIN: usize = 10;
 
@@ -70,7 +70,7 @@ pub(super) struct Found {
 pub(super) fn best_of_all(workshop: &mut Workshop, photos: &Photos) -> Result<Found> {
     let count = photos.names().count();
     let mut best: Option<Found> = None;
-    for attempt in [USUAL, FAINTER, FEWER] {
+    for attempt in [USUAL_ATTEMPT, FAINTER_ATTEMPT, FEWER_COMMON_ATTEMPT] {
         let most = best.as_ref().map_or(0, |best| best.contents.photos.len());
         if most == count {
             break;
@@ -105,7 +105,7 @@ impl Attempt {
         give(&mut command, "database_path", &database);
         give(&mut command, "image_path", workshop.images());
         give(&mut command, "output_path", &models);
-        self.mapping.iter().for_each(|&choice| options.set(&mut command, MAPPER, choice));
+        self.mapping.iter().for_each(|&choice| options.set(&mut command, MAPPER_GROUPS, choice));
         // It fails where no photos fit together, which the next attempt may change.
         workshop.run("finding poses and points", photos.names().count(), command, &placed)?;
         let mut found = Vec::new();
@@ -120,7 +120,7 @@ impl Attempt {
             let is_apart =
                 |other: &&(PathBuf, Contents)| other.1.photos.iter().all(|photo| !contents.photos.contains(photo));
             let apart = found.iter().filter(is_apart).map(|(_, other)| other.photos.len()).collect();
-            Found { folder, contents, apart, is_usual: self.name == USUAL.name }
+            Found { folder, contents, apart, is_usual: self.name == USUAL_ATTEMPT.name }
         }))
     }
 
@@ -135,10 +135,10 @@ impl Attempt {
             let mut command = workshop.command("feature_extractor");
             give(&mut command, "database_path", workshop.path(self.database));
             give(&mut command, "image_path", workshop.images());
-            options.set(&mut command, READER, ("single_camera", "1"));
-            options.set(&mut command, READER, ("camera_model", workshop.request.model.name));
-            set_gpu(workshop, &options, &mut command, EXTRACTION);
-            self.extraction.iter().for_each(|&choice| options.set(&mut command, EXTRACTION, choice));
+            options.set(&mut command, READER_GROUPS, ("single_camera", "1"));
+            options.set(&mut command, READER_GROUPS, ("camera_model", workshop.request.model.name));
+            set_gpu(workshop, &options, &mut command, EXTRACTION_GROUPS);
+            self.extraction.iter().for_each(|&choice| options.set(&mut command, EXTRACTION_GROUPS, choice));
             let mut what = "finding features".to_owned();
             if photos.by_size.len() > 1 {
                 let list = workshop.path("photos.txt");
@@ -160,14 +160,14 @@ impl Attempt {
         let options = Options::of(workshop.command(verb))?;
         let mut command = workshop.command(verb);
         give(&mut command, "database_path", workshop.path(self.database));
-        set_gpu(workshop, &options, &mut command, MATCHING);
-        self.matching.iter().for_each(|&choice| options.set(&mut command, MATCHING, choice));
+        set_gpu(workshop, &options, &mut command, MATCHING_GROUPS);
+        self.matching.iter().for_each(|&choice| options.set(&mut command, MATCHING_GROUPS, choice));
         let what = "comparing photos";
         if is_sequence {
             return workshop.must_run(what, count, command, &item);
         }
         // A single block tells nothing before its end.
-        let all = if count > BLOCK { count * (count - 1) / 2 } else { 0 };
+        let all = if count > PAIR_BLOCK_PHOTOS { count * (count - 1) / 2 } else { 0 };
         workshop.must_run(what, all, command, &|line| pairs(line, all))
     }
 }

@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// The groups of an option, the newest name first: COLMAP 3.12 moved what all kinds of features have in common.
-pub(super) const READER: &[&str] = &["ImageReader"];
-pub(super) const EXTRACTION: &[&str] = &["FeatureExtraction", "SiftExtraction"];
-pub(super) const MATCHING: &[&str] = &["FeatureMatching", "SiftMatching"];
-pub(super) const MAPPER: &[&str] = &["Mapper"];
+pub(super) const READER_GROUPS: &[&str] = &["ImageReader"];
+pub(super) const EXTRACTION_GROUPS: &[&str] = &["FeatureExtraction", "SiftExtraction"];
+pub(super) const MATCHING_GROUPS: &[&str] = &["FeatureMatching", "SiftMatching"];
+pub(super) const MAPPER_GROUPS: &[&str] = &["Mapper"];
 
 /// Adds an option that all versions have.
 pub(super) fn give(command: &mut Command, name: &str, value: impl AsRef<OsStr>) {
@@ -56,12 +56,12 @@ impl Options {
 
 #[cfg(test)]
 mod tests {
-    use super::{EXTRACTION, Options};
+    use super::{EXTRACTION_GROUPS, Options};
     use std::process::Command;
 
     fn words(help: &str, choice: (&str, &str)) -> Vec<String> {
         let mut command = Command::new("colmap");
-        Options::read(help).set(&mut command, EXTRACTION, choice);
+        Options::read(help).set(&mut command, EXTRACTION_GROUPS, choice);
         command.get_args().map(|word| word.to_string_lossy().into_owned()).collect()
     }
 

@@ -13,9 +13,9 @@ use std::time::Instant;
 use tempfile::TempDir;
 
 /// The messages of all programs, in the scene.
-const LOG: &str = "colmap.log";
+const LOG_FILE: &str = "colmap.log";
 /// A file of COLMAP with paths of the folder that is gone then.
-const PROJECT: &str = "project.ini";
+const PROJECT_FILE: &str = "project.ini";
 
 /// A folder beside the scene. It is removed with all that is in it, however the work ends.
 pub(super) struct Workshop<'a> {
@@ -45,7 +45,7 @@ impl<'a> Workshop<'a> {
         for made in [scene.join("images"), scene.join("sparse")] {
             fs::create_dir_all(&made).map_err(Error::write(&made))?;
         }
-        let log = ProgramLog::new(&scene.join(LOG))?;
+        let log = ProgramLog::new(&scene.join(LOG_FILE))?;
         Ok(Self { request, colmap, check, folder, log })
     }
 
@@ -109,7 +109,7 @@ impl<'a> Workshop<'a> {
 
     /// Puts the model into the scene, and the scene into its place.
     pub(super) fn finish(self, model: &Path) -> Result<()> {
-        atomic::remove(&model.join(PROJECT))?;
+        atomic::remove(&model.join(PROJECT_FILE))?;
         let (made, scene) = (self.path("scene"), &self.request.scene);
         let place = made.join("sparse/0");
         fs::rename(model, &place).map_err(Error::write(&place))?;
