@@ -99,6 +99,20 @@ fn flags_and_commands_are_found_as_hands_type_them() {
     );
 }
 
+/// What `view` was told of the scene goes to the command that repeats its edits.
+#[test]
+fn flags_of_a_scene_are_typed_again() {
+    let typed = "--test-every 4 --max-resolution 300 --ignore 'no faces' --images photos --max-bad-photos 0.5 --allow-outside \
+                 --poses w2c,opengl";
+    let words: Vec<&str> = typed.split(' ').collect();
+    let words = words.join("\n").replace("'no\nfaces'", "no faces");
+    let parsed =
+        |verb: &[&str]| Cli::try_parse_from(verb.iter().copied().chain(words.split('\n'))).expect("flags").command;
+    let Verb::View(view) = parsed(&["labelgs", "view", "out", "--scene", "scene"]) else { panic!("view") };
+    assert_eq!(view.reading.to_flags(), format!(" {typed}"));
+    assert!(matches!(parsed(&["labelgs", "edit", "out", "--replay", "e.json", "-o", "a.ply"]), Verb::Edit(_)));
+}
+
 #[test]
 fn a_number_that_is_none_is_called_so() {
     for (flag, value, problem) in [

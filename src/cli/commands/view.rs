@@ -4,7 +4,7 @@ use crate::cli::support::model_edit::open;
 use crate::cli::support::parsers::{near, share};
 use crate::cli::support::scene::open_photos;
 use crate::cli::support::{
-    Context, SceneArgs, TableArg, near_plane, open_gpu, open_scene, quoted, signals, warn_of_misfit,
+    Context, SceneArgs, TableArg, near_plane, open_gpu, open_scene, quoted_path, signals, warn_of_misfit,
 };
 use crate::render::{Parts, RenderOptions};
 use crate::run::models::first_view;
@@ -129,12 +129,21 @@ pub(crate) fn run(args: &ViewArgs, context: &Context) -> Result<()> {
         }
         (None, _) => None,
     };
-    let options = RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR);
+    // Where objects were trained alone, nothing else has a place in label maps: what is faint belongs to none.
+    let clear_labels = args.reading.of_run(&args.model)?.masked_only;
+    let options =
+        RenderOptions { clear_labels, ..RenderOptions::new(near_plane(&args.model, args.near)?, Parts::COLOUR) };
     let gpu = open_gpu(context)?;
     let viewer = args.server.start(1.0)?;
     let address = viewer.address();
     context.show(&json!({ "schema_version": 1, "address": address }), &format!("{address}\n"))?;
-    let words = TypedOptions { scene: args.scene.clone(), masks: args.masks.clone(), network: args.network.clone() };
+    let near = args.near.map_or(String::new(), |near| format!(" --near {near}"));
+    let words = TypedOptions {
+        scene: args.scene.clone(),
+        masks: args.masks.clone(),
+        network: args.network.clone(),
+        reading: args.reading.to_flags() + &near,
+    };
     let (path, table, dataset) = (&args.model, known.table, &dataset);
     let first_view = first_view(path)?;
     let finished = FinishedModel { path, model, table, dataset, options, words: &words, photos, first_view };
@@ -167,24 +176,28 @@ pub(crate) struct TypedOptions {
     pub(crate) scene: Option<PathBuf>,
     pub(crate) masks: Option<PathBuf>,
     pub(crate) network: Option<PathBuf>,
+    /// How the scene is read and drawn, as flags, each after a space.
+    pub(crate) reading: String,
 }
 
 impl ProgramCommands for TypedOptions {
     fn replay(&self, model: &Path, edits: &Path, output: &Path) -> String {
-        let scene = self.scene.as_ref().map_or(String::new(), |scene| format!(" --scene {}", path(scene)));
-        format!("labelgs edit {} --replay {}{scene} -o {}", path(model), path(edits), path(output))
+        let scene = self.scene.as_ref().map_or(String::new(), |scene| format!(" --scene {}", quoted_path(scene)));
+        let reading = &self.reading;
+        format!(
+            "labelgs edit {} --replay {}{scene}{reading} -o {}",
+            quoted_path(model),
+            quoted_path(edits),
+            quoted_path(output)
+        )
     }
 
     fn view(&self, model: &Path) -> String {
         let flag = |name: &str, value: &Option<PathBuf>| {
-            value.as_ref().map_or(String::new(), |value| format!(" --{name} {}", path(value)))
+            value.as_ref().map_or(String::new(), |value| format!(" --{name} {}", quoted_path(value)))
         };
         let [scene, masks, network] = [("scene", &self.scene), ("masks", &self.masks), ("network", &self.network)]
             .map(|(name, value)| flag(name, value));
-        format!("labelgs view {}{scene}{masks}{network}", path(model))
+        format!("labelgs view {}{scene}{masks}{network}{}", quoted_path(model), self.reading)
     }
-}
-
-fn path(path: &Path) -> String {
-    quoted(&path.display().to_string())
 }

@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::cli::support::parsers::share;
+use crate::cli::support::shell_words::quoted_path;
 use crate::run::Settings;
 use crate::scenes::{LoadOptions, Lookup, PoseConvention, ReadOptions};
 use clap::Args;
@@ -99,6 +100,22 @@ impl SceneArgs {
             read: ReadArgs { poses: self.read.poses.or(Some(poses)), ..self.read.clone() },
             ..self.clone()
         })
+    }
+
+    /// Returns the flags that were typed, each after a space.
+    pub fn to_flags(&self) -> String {
+        let FileArgs { images, max_bad_photos, allow_outside } = &self.read.files;
+        let typed = [
+            ("test-every", self.test_every.map(|value| value.to_string())),
+            ("max-resolution", self.max_resolution.map(|value| value.to_string())),
+            ("ignore", self.ignore.as_deref().map(quoted_path)),
+            ("images", images.as_deref().map(quoted_path)),
+            ("max-bad-photos", max_bad_photos.map(|value| value.to_string())),
+            ("allow-outside", allow_outside.then(String::new)),
+            ("poses", self.read.poses.map(|value| value.to_string())),
+        ];
+        let flag = |(name, value): (&str, Option<String>)| value.map(|value| format!(" --{name} {value}"));
+        typed.into_iter().filter_map(flag).map(|flag| flag.trim_end().to_owned()).collect()
     }
 
     /// Returns N where every N-th view is a test view; 0 for none.

@@ -36,4 +36,4 @@ pub(crate) use model_fit::{warn_of_misfit, warn_of_misfit_with};
 pub(crate) use model_format::WriteArgs;
 pub(crate) use scene::{near_plane, open_gpu, open_gpu_for_long, open_scene, pick_views};
 pub(crate) use scoring::{ScoreArgs, Watcher};
-pub(crate) use shell_words::quoted;
+pub(crate) use shell_words::{quoted, quoted_path};

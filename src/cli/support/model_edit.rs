@@ -3,7 +3,7 @@
 use crate::cli::support::context::Context;
 use crate::cli::support::model_format::WriteArgs;
 use crate::cli::support::parsers::{Picks, model_file, share};
-use crate::cli::support::shell_words::quoted;
+use crate::cli::support::shell_words::quoted_path;
 use crate::edit::Transform;
 use crate::edit::catalogue::Catalogue;
 use crate::edit::select::{MIN_LABEL_CONFIDENCE, Tally, extract};
@@ -178,10 +178,9 @@ impl MinConfidenceArg {
 /// Adds to an error about the labels of a model how to list them.
 pub(crate) fn or_list<T>(found: Result<T>, model: &Path) -> Result<T> {
     found.map_err(|error| match error {
-        Error::Usage { argument, problem } => Error::usage(
-            argument,
-            format!("{problem} (run `labelgs list {}` to see all)", quoted(&model.display().to_string())),
-        ),
+        Error::Usage { argument, problem } => {
+            Error::usage(argument, format!("{problem} (run `labelgs list {}` to see all)", quoted_path(model)))
+        }
         other => other,
     })
 }

@@ -119,7 +119,8 @@ fn is_mixed(sheet: &Sheet, shadow: &[f64], index: usize) -> bool {
 /// Returns the mean shadow over spots of the light.
 pub(super) fn soft(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<f64> {
     let (u, v) = towards.any_orthonormal_pair();
-    let around = (0..LIGHT_SPOTS).map(|spot| DVec2::from_angle(std::f64::consts::TAU * spot as f64 / LIGHT_SPOTS as f64));
+    let around =
+        (0..LIGHT_SPOTS).map(|spot| DVec2::from_angle(std::f64::consts::TAU * spot as f64 / LIGHT_SPOTS as f64));
     let spots: Vec<DVec3> = std::iter::once(DVec2::ZERO)
         .chain(around)
         .map(|at| (towards + LIGHT_RADIUS * (at.x * u + at.y * v)).normalize())

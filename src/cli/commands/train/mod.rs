@@ -7,7 +7,7 @@ use crate::Result;
 use crate::cli::commands::train::args::TrainArgs;
 use crate::cli::commands::view::TypedOptions;
 use crate::cli::support::shell_words::typed;
-use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted, signals};
+use crate::cli::support::{Context, Progress, log, open_gpu_for_long, quoted_path, signals};
 use crate::report::text::duration;
 use crate::run::{self, Event, Flow, LiveScene, Observer, Request, Settings, Summary};
 use crate::viewer::ViewerObserver;
@@ -42,7 +42,12 @@ pub(crate) fn train(request: Request, context: &Context) -> Result<Summary> {
 fn shown(args: &TrainArgs, request: Request, context: &Context) -> Result<Summary> {
     let viewer = args.watch.server.start(args.watch.view_share)?;
     tracing::info!("view this run at {}", viewer.address());
-    let words = TypedOptions { scene: Some(args.scene.clone()), masks: args.masks.clone(), network: None };
+    let words = TypedOptions {
+        scene: Some(args.scene.clone()),
+        masks: args.masks.clone(),
+        network: None,
+        reading: String::new(),
+    };
     let mut terminal = Terminal { context, progress: None };
     let title = args.output.display().to_string();
     observed(request, context, &mut ViewerObserver::new(&viewer, &mut terminal, title, &words))
@@ -94,7 +99,7 @@ impl Observer for Terminal<'_> {
 
 /// Returns the command that shows what was trained.
 fn next(args: &TrainArgs) -> String {
-    let [out, scene] = [&args.output, &args.scene].map(|path| quoted(&path.display().to_string()));
+    let [out, scene] = [&args.output, &args.scene].map(|path| quoted_path(path.as_path()));
     format!("View it: labelgs view {out} --scene {scene}\n")
 }
 
