@@ -10,7 +10,7 @@ const READ_PATHS: [&str; 7] = ["README.md", ".github", "src", "glsl", "tools", "
 /// Extensions of files with text.
 const TEXT_EXTENSIONS: [&str; 8] = ["md", "rs", "comp", "glsl", "js", "html", "css", "yml"];
 /// Names of one word that the field uses for exactly this.
-const FIELD_TERMS: [&str; 18] = [
+const FIELD_TERMS: &[&str] = &[
     "BOM",
     "COEFFICIENTS",
     "COLMAP",
@@ -24,6 +24,7 @@ const FIELD_TERMS: [&str; 18] = [
     "MAGIC",
     "NAME",
     "NAMES",
+    "ON",
     "PI",
     "SEED",
     "SPZ",
@@ -46,9 +47,13 @@ fn texts(path: &Path, found: &mut Vec<(PathBuf, String)>) {
 /// Words in small letters with their lines. Marks of comments are no words, so that a phrase may go over the end of a line.
 fn words(text: &str) -> Vec<(String, usize)> {
     let split = |line: &str| -> Vec<String> {
-        // What dots or colons join is code.
-        let words = line.split_whitespace().map(|word| word.trim_matches(|c: char| !c.is_alphanumeric()));
-        words.filter(|word| !word.is_empty()).map(str::to_lowercase).collect()
+        // What dots or colons join is code, and no phrase goes on after a mark.
+        let ends = |word: &str| word.ends_with([',', ';', '.', ')', ':']);
+        let words = line.split_whitespace().flat_map(|word| {
+            let trimmed = word.trim_matches(|c: char| !c.is_alphanumeric()).to_lowercase();
+            [trimmed, if ends(word) { "|".to_owned() } else { String::new() }]
+        });
+        words.filter(|word| !word.is_empty()).collect()
     };
     text.lines().enumerate().flat_map(|(at, line)| split(line).into_iter().map(move |word| (word, at + 1))).collect()
 }

@@ -1,7 +1,6 @@
 // Pictures of the viewer in use, by a browser without a window:
 //   node pictures.mjs NPM ADDRESS VIEW LABEL FOLDER
-// NPM is a folder with puppeteer-core. Shows VIEW, selects LABEL, removes it with and without filling, and writes viewer.jpg (the
-// whole page), selected.jpg, removed.jpg and filled.jpg (the stage) into FOLDER.
+// NPM is a folder with puppeteer-core. Shows VIEW, selects LABEL and writes viewer.jpg, the whole page, into FOLDER.
 import { createRequire } from 'module';
 import { join, resolve } from 'path';
 
@@ -28,26 +27,10 @@ const settle = async () => {
     await new Promise((done) => setTimeout(done, 1500));
     await until('window.labelgs?.stage.frame && labelgs.stage.asked === null && labelgs.stage.isStill && !labelgs.stage.isDirty');
 };
-const shoot = async (name, clip) => page.screenshot({ path: join(folder, `${name}.jpg`), quality: 88, clip });
-const box = async () => page.evaluate(`(({ x, y, width, height }) => ({ x, y, width, height }))(labelgs.stage.box.getBoundingClientRect())`);
-const changes = (count) => until(`labelgs.edits.state.changes.length === ${count}`);
-
 await settle();
 await page.evaluate(`labelgs.views.snapped(labelgs.rig.views.findIndex(({ name }) => name.startsWith(${JSON.stringify(view)})))`);
 await settle();
 await page.evaluate(`labelgs.labels.select([${Number(label)}])`);
 await settle();
-await shoot('viewer');
-await shoot('selected', await box());
-await page.click('#act-remove');
-await changes(1);
-await settle();
-await shoot('removed', await box());
-await page.evaluate(`document.querySelector('#edit-undo').click()`);
-await changes(0);
-await page.evaluate(`labelgs.labels.select([${Number(label)}])`);
-await page.click('#act-fill');
-await changes(1);
-await settle();
-await shoot('filled', await box());
+await page.screenshot({ path: join(folder, 'viewer.jpg'), quality: 88 });
 await browser.close();

@@ -40,8 +40,7 @@ pub enum Command {
     ///
     /// Example: labelgs synth scene
     Synth(synth::SynthArgs),
-    /// Make a scene of photos without poses, or of a video: COLMAP finds lens, poses and points. COLMAP, and ffmpeg for a
-    /// video, are programs that you install.
+    /// Make a scene from photos without poses, or from a video. Needs COLMAP, and ffmpeg for videos.
     ///
     /// Example: labelgs photos pictures -o scene
     Photos(photos::PhotosArgs),

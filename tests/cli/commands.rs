@@ -74,7 +74,7 @@ fn the_sizes_of_a_plan_add_up_to_its_total() {
     let staging = plan["memory"]["staging"].as_u64().expect("staging");
     let votes = plan["memory"]["total_while_counting_votes"].as_u64().expect("bytes");
     assert_eq!(plan["memory"]["total"], (sum("bytes") + pages + staging).max(votes));
-    assert!(table.contains("a count of votes, between steps: votes 4 MiB"), "8 bytes for each of 256 labels\n{table}");
+    assert!(table.contains("vote counting, between steps: votes 4 MiB"), "8 bytes for each of 256 labels\n{table}");
     let names: Vec<&str> =
         plan["passes"].as_array().expect("passes").iter().filter_map(|pass| pass["name"].as_str()).collect();
     assert!(names[0] == "step_begin" && names.iter().any(|name| name.starts_with("layer_list")), "{names:?}");

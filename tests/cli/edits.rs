@@ -158,7 +158,10 @@ fn labels_are_renumbered_merged_and_split() {
     assert_eq!((labels_of(&out), names(&beside)), (vec![0, 1, 1, 1, 1, 1], vec![(1, "cup".to_owned())]));
     succeeds(&["merge", from, "--labels", "1,3", "--into", "3", "--name", "set", "-o", to]);
     assert_eq!((labels_of(&out), names(&beside)), (vec![0, 3, 3, 3, 3, 3], vec![(3, "set".to_owned())]));
-    assert!(refused(&["merge", from, "--labels", "1", "--into", "3", "-o", to]).contains("label 3 spoon is another"));
+    assert!(
+        refused(&["merge", from, "--labels", "1", "--into", "3", "-o", to])
+            .contains("label 3 spoon is not one of them")
+    );
     assert!(refused(&["merge", from, "--labels", "1", "--name", "spoon", "-o", to]).contains("name of label 3"));
 
     let split = ["split-components", from, "--labels", "spoon", "-o", to];
@@ -357,7 +360,7 @@ fn nothing_is_written_under_a_wrong_extension() {
         let message = refused(args);
         assert!(message.contains(".obj is not a model extension") && message.contains(".ply, .spz"), "{message}");
     }
-    assert!(refused(&["convert", &none, &at("x.splat")]).contains("only read"));
+    assert!(refused(&["convert", &none, &at("x.splat")]).contains("can only be read"));
     let message = refused(&["occlusion", &none, "--masks", &none, "--model", &none, "-o", &at("x.ply")]);
     assert!(message.contains("expected the extension .json"), "{message}");
     assert!(refused(&["report", &none, "-o", &at("x.png")]).contains("extension .html"));

@@ -274,7 +274,7 @@ fn a_lost_device_is_opened_again() {
     // A driver may need a while until it has a device again.
     let fault = "vkQueueSubmit:300:DEVICE_LOST,vkEnumeratePhysicalDevices:2:INITIALIZATION";
     let said = succeeded(&place.trained_with(Some(fault), "slow", &flags));
-    assert!(said.contains("tried again in 1 s") && place.model("slow", 40) == expected, "{said}");
+    assert!(said.contains("trying again in 1 s") && place.model("slow", 40) == expected, "{said}");
     // `--restart` does not use checkpoints of an earlier run.
     let output =
         place.trained_with(Some("vkQueueSubmit:30:DEVICE_LOST"), "right", &["--restart", "--iterations", "40"]);

@@ -81,7 +81,7 @@ fn photos_become_objects_by_a_network_alone() {
     assert!(said.contains("in 1 photo; 11 were done before"), "{said}");
     assert!(std::fs::read(&list).expect("a list") == before);
     let refused = refusal(folder, "masks make scene --network net -o made --grid 6");
-    assert!(refused.contains("masks.json") && refused.contains("name a new folder"), "{refused}");
+    assert!(refused.contains("masks.json") && refused.contains("use a new folder"), "{refused}");
     let levels = best_ids(folder, "made/objects");
     assert_eq!(levels.len(), 3, "{levels:?}");
 

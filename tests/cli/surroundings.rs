@@ -37,7 +37,7 @@ fn folders_may_have_any_name() {
         succeeded(&train(&place, &scene, &out, &["--iterations", "4"]));
         // A name that is not UTF-8 cannot be kept in a checkpoint, so `--masks` is given again for every name.
         let said = succeeded(&train(&place, &scene, &out, &["--resume", "--iterations", "6"]));
-        assert!(said.contains("goes on after step 4"), "{name:?}: {said}");
+        assert!(said.contains("resuming after step 4"), "{name:?}: {said}");
         let pictures = place.path("pictures").join(name);
         let mut render = labelgs(&place);
         render.arg("render").arg(&out).arg("--scene").arg(&scene).arg("-o").arg(&pictures);

@@ -138,7 +138,7 @@ fn a_setting_is_given_once_and_by_a_known_name() {
         (&["--set", "label_rule=most"], "`most` is not one of main, votes"),
         (&["--set", "label_from=soon"], "`soon` is not a whole number"),
         (&["--set", "rate_final=half"], "`half` is not a number"),
-        (&["--set", "sh_degree=4"], "--set sh_degree: is 4, needs 0 to 3"),
+        (&["--set", "sh_degree=4"], "--set sh_degree: is 4; expected 0 to 3"),
         (&["--block", "b", "--set", "grow_box=0,0,0,1,1,1"], "grow-box: cannot be given with a block"),
         (&["--occluders", "o.json", "--set", "occlusion=none"], "--set occlusion: cannot be given with --occluders"),
     ] {

@@ -75,7 +75,7 @@ fn a_message_names_a_flag_only_if_the_command_has_it() {
     assert!(train.contains("error: --random-background: is on, which needs --exposure off"), "{train}");
     let row = ["ablate", text(&scene), "--masks", text(&scene), "-o", text(&out), "--row", "x=--iterations 0"];
     let ablate = said(&row, 2);
-    assert!(ablate.contains("error: --row: x: --iterations: is 0, needs at least 1"), "{ablate}");
+    assert!(ablate.contains("error: --row: x: --iterations: is 0; expected at least 1"), "{ablate}");
 }
 
 #[test]

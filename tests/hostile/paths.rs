@@ -98,7 +98,7 @@ fn one_name_for_two_photos_is_an_error() {
     let frames = [frame("photos/a.png"), frame("../photos/a.png")].join(",");
     around.write("scene/transforms.json", format!(r#"{{"fl_x": 10, "frames": [{frames}]}}"#));
     let text = refusal(open(&around.path().join("scene"), true));
-    assert!(text.contains("another photo is called `photos/a.png`") && text.contains("frame 1"), "{text}");
+    assert!(text.contains("another photo is also called `photos/a.png`") && text.contains("frame 1"), "{text}");
 }
 
 #[test]

@@ -161,7 +161,7 @@ fn another_scene_is_refused_with_what_differs() {
         assert!(parts.iter().all(|part| text.contains(part)), "{text}");
     };
     refusal(&|dataset| *dataset = plain(), 2, &["masks: ", "no masks"]);
-    refusal(&|dataset| drop(dataset.train.pop()), 3, &["4 training views, 5"]);
+    refusal(&|dataset| drop(dataset.train.pop()), 3, &["4 training views, but 5"]);
     refusal(&|dataset| dataset.train[1].name = "other.png".into(), 3, &["other.png", "replaces"]);
     refusal(&|dataset| dataset.train[2].camera.fx += 1e-9, 3, &["another camera"]);
     refusal(

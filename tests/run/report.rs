@@ -103,7 +103,7 @@ fn damaged(place: &Place, out: &str) {
         let path = folder.join(file);
         let text = read(&path);
         std::fs::write(&path, "[1,").expect("damaged");
-        report(3, &format!("{file}: line 1: EOF while parsing a value; this is not a valid record"));
+        report(3, &format!("{file}: line 1: EOF while parsing a value; this is not a valid training record"));
         std::fs::write(&path, text).expect("as before");
     }
     std::fs::remove_file(folder.join("run.json")).expect("removed");

@@ -112,7 +112,7 @@ fn guards_detect_a_write_beyond_the_end() {
         let outside = scheduler.prepare(&write(count + 3)).unwrap();
         scheduler.run(outside, 1).unwrap();
         let message = scheduler.check_guards().expect_err("the guard is broken").to_string();
-        let expected = format!("0x00000007 at byte 12 behind the end of buffer {name}");
+        let expected = format!("0x00000007 at byte 12 past the end of buffer {name}");
         assert!(message.contains(&expected), "{message}");
     }
 }

@@ -14,20 +14,20 @@ use std::time::Instant;
 /// `labelgs photos`.
 #[derive(Args, Clone, Debug)]
 pub struct PhotosArgs {
-    /// Folder of photos, PNG or JPEG; folders below it are not read. Or a video that ffmpeg reads.
+    /// Folder of PNG or JPEG photos, without its subfolders; or a video in any format of ffmpeg.
     #[arg(value_name = "PHOTOS|VIDEO")]
     pub source: PathBuf,
-    /// Folder for the scene; must be new or empty. It gets the photos that have poses, linked where the disk can.
+    /// New or empty folder for the scene. Photos with poses are linked into it, or copied.
     #[arg(short, long, value_name = "SCENE")]
     pub output: PathBuf,
-    /// Most frames to take of a video, at equal distances.
+    /// Maximum number of frames to take from a video, at equal intervals.
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = clap::value_parser!(u32).range(PHOTOS_MIN as i64..))]
     pub frames: u32,
-    /// Lens: a camera model of COLMAP. OPENCV fits phones and cameras, OPENCV_FISHEYE action cameras, PINHOLE pictures
-    /// without distortion. Photos of one size share its parameters.
+    /// COLMAP camera model: OPENCV for phones and cameras, OPENCV_FISHEYE for action cameras, PINHOLE for images without
+    /// distortion. Photos of the same size share a lens.
     #[arg(long, value_name = "MODEL", default_value = "OPENCV", hide_possible_values = true, value_parser = lens())]
     pub model: &'static CameraModel,
-    /// Find and compare features on the GPU. Needs a COLMAP that was built with CUDA.
+    /// Find and match features on the GPU. Needs a COLMAP built with CUDA.
     #[arg(long)]
     pub gpu: bool,
 }
@@ -35,7 +35,7 @@ pub struct PhotosArgs {
 /// Takes the name of a camera model.
 fn lens() -> impl TypedValueParser<Value = &'static CameraModel> {
     let names = PossibleValuesParser::new(CAMERA_MODELS.map(|model| model.name));
-    names.try_map(|name| model(&name).ok_or("a camera model is gone"))
+    names.try_map(|name| model(&name).ok_or("is not a camera model"))
 }
 
 /// Most names of photos in a warning.
