@@ -124,7 +124,7 @@ fn read(path: &Path) -> Result<ReadModel> {
     let (packed, _) =
         inside.ok_or_else(|| Error::data(path, "", "contains no model; only pages written by labelgs can be read"))?;
     let bytes = STANDARD.decode(packed.trim()).map_err(|error| {
-        Error::data(path, "the model inside", format!("is not base64: {error}; the page is truncated or was modified"))
+        Error::data(path, "embedded model", format!("is not base64: {error}; the page is truncated or was modified"))
     })?;
     spz::read_bytes(path, &bytes)
 }
