@@ -28,7 +28,7 @@
 //!
 //!     let camera = scenes::open(scene, &scenes::LoadOptions::default())?.test[0].camera.clone();
 //!     let size = (camera.width, camera.height);
-//!     let mut engine = Engine::of_model(Gpu::new(&GpuOptions::default())?, &rest, [size])?;
+//!     let mut engine = Engine::for_model(Gpu::new(&GpuOptions::default())?, &rest, [size])?;
 //!     let picture = render::render(&mut engine, &camera, &render::RenderOptions::default())?;
 //!     render::write_rgb(Path::new("rest.png"), size, &picture.rgb, render::Format::Png)
 //! }

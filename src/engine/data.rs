@@ -3,8 +3,10 @@
 use super::{Engine, late, model};
 use crate::error::Result;
 use crate::pass::SHARED_PLANES;
+use crate::scheduler::Scheduler;
+#[cfg(feature = "cli")]
+use crate::scheduler::Traffic;
 use crate::scheduler::plan::Buf;
-use crate::scheduler::{Scheduler, Traffic};
 use crate::shaders::constants::LABEL_MASK;
 
 impl Engine {
@@ -21,6 +23,7 @@ impl Engine {
     }
 
     /// Bytes transferred between host and device so far.
+    #[cfg(feature = "cli")]
     pub(crate) fn traffic(&self) -> Traffic {
         self.sched.traffic()
     }

@@ -21,7 +21,9 @@ pub(crate) mod state;
 pub(crate) mod uniforms;
 
 pub(crate) use bands::Band;
-pub(crate) use card::{card, predict_for, predict_votes};
+#[cfg(feature = "cli")]
+pub(crate) use card::predict_votes;
+pub(crate) use card::{card, predict_for};
 pub(crate) use growth::{GrownSizes, capacity};
 pub(crate) use input::{Input, LayerInput, SharedRow, TrainInput, VoteInput};
 pub(crate) use label_ids::tell_apart;

@@ -6,6 +6,7 @@
 pub mod large;
 pub mod mesh;
 pub(crate) mod pictures;
+#[cfg(feature = "viewer")]
 pub(crate) mod portrait;
 
 pub use pictures::{Format, PictureKind, write_pictures, write_rgb};

@@ -105,6 +105,7 @@ fn narrow(labels: &[u32], wide: bool, format: Format) -> Result<Option<Vec<u16>>
 
 /// Returns the colours of a video frame; fails for kinds that are not colours. Depth is grey between two bounds, which
 /// the first frame with depth sets, so that surfaces do not flicker.
+#[cfg(feature = "cli")]
 pub(crate) fn frame(rendered: &Render, what: PictureKind, depths: &mut Option<[f32; 2]>) -> Result<Vec<[u8; 3]>> {
     check_size("a video", rendered, what)?;
     Ok(match what {

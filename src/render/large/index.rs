@@ -76,6 +76,7 @@ impl GaussianIndex {
     }
 
     /// Returns the world positions of the Gaussians.
+    #[cfg(feature = "cli")]
     pub(crate) fn places(&self) -> impl Iterator<Item = DVec3> + Clone {
         self.means.iter().map(|mean| self.origin + mean.as_dvec3())
     }

@@ -262,6 +262,7 @@ impl Trainer {
     }
 
     /// Stops collecting step times: the next steps run without timestamps. Nothing may be in flight.
+    #[cfg(feature = "cli")]
     pub(crate) fn stop_times(&mut self) -> Result<()> {
         self.timing = None;
         self.context.engine.time_items(false, false)
