@@ -1,4 +1,5 @@
-//! Integration tests in one binary. Without the feature `lab` those that inject faults or hide what a device has are ignored.
+//! Integration tests in one binary. Without the feature `lab` those that inject faults or hide what a device has are
+//! ignored.
 #![allow(
     clippy::disallowed_methods,
     clippy::too_many_lines,

@@ -44,7 +44,8 @@ fn texts(path: &Path, found: &mut Vec<(PathBuf, String)>) {
     }
 }
 
-/// Words in small letters with their lines. Marks of comments are no words, so that a phrase may go over the end of a line.
+/// Words in small letters with their lines. Marks of comments are no words, so that a phrase may go over the end of a
+/// line.
 fn words(text: &str) -> Vec<(String, usize)> {
     let split = |line: &str| -> Vec<String> {
         // What dots or colons join is code, and no phrase goes on after a mark.

@@ -15,8 +15,8 @@ Exit status: 0 done, 1 finished but a requested check failed, 2 usage, 3 bad inp
 6 device lost, 7 output, 8 numerical failure, 70 a bug, 130 or 143 interrupted.
 Results go to standard output, everything else to standard error.";
 
-/// Label-aware 3D Gaussian Splatting on Vulkan compute: train a model of a scene, then list, extract, remove, render and
-/// score its objects.
+/// Label-aware 3D Gaussian Splatting on Vulkan compute: train a model of a scene, then list, extract, remove, render
+/// and score its objects.
 ///
 /// Example: labelgs synth scene && labelgs train scene --masks scene/masks -o out && labelgs list out
 #[derive(Debug, Parser)]

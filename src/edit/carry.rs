@@ -170,8 +170,8 @@ fn position_bits(mean: [f32; 3]) -> [u32; 3] {
     mean.map(|value| (value + 0.0).to_bits())
 }
 
-/// Returns colour (r, g, b), opacity and sizes as numbers that differ by about 1 between Gaussians that appearance different.
-/// Sizes are sorted, because programs that turn a Gaussian may number its axes anew.
+/// Returns colour (r, g, b), opacity and sizes as numbers that differ by about 1 between Gaussians that appearance
+/// different. Sizes are sorted, because programs that turn a Gaussian may number its axes anew.
 fn appearance(model: &Gaussians, row: usize) -> [f64; 7] {
     let [r, g, b] = model.sh0[row].map(value_of);
     let mut sizes = model.scales[row].map(f64::from);

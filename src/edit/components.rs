@@ -1,7 +1,7 @@
 //! Connected parts of a set of Gaussians.
 //!
-//! Two Gaussians are connected if their ellipsoids of `ELLIPSOID_DEVIATIONS` standard deviations, grown by half of a gap, intersect.
-//! The test uses the contact function of Perram and Wertheim (1985).
+//! Two Gaussians are connected if their ellipsoids of `ELLIPSOID_DEVIATIONS` standard deviations, grown by half of a
+//! gap, intersect. The test uses the contact function of Perram and Wertheim (1985).
 
 use crate::nearest::tree;
 use glam::{DMat3, DVec3};

@@ -2,8 +2,8 @@
 //!
 //! [`open`] reads a scene: a reader (COLMAP, transforms.json, LLFF, Metashape) lists photos and poses. A `photo_recipe`
 //! defines how a photo becomes a view ([`lens`], [`window`], size). Photos that do not fit into memory stay in files
-//! (`photo_store`). [`reconstruction`] makes a scene of photos without poses. [`capture`] finds problems of photos and poses,
-//! and [`initial_gaussians`] creates the first Gaussians.
+//! (`photo_store`). [`reconstruction`] makes a scene of photos without poses. [`capture`] finds problems of photos and
+//! poses, and [`initial_gaussians`] creates the first Gaussians.
 //!
 //! To add a reader, add a file beside `llff` that returns a `Listing`, and a case in `list`.
 

@@ -6,8 +6,8 @@ use glam::DVec3;
 
 /// Every third photo is taken from a street.
 const STREETS_EVERY: u32 = 3;
-/// Smallest distance of the other cameras from their targets, world units. The distance is larger if there are few photos,
-/// so that they overlap.
+/// Smallest distance of the other cameras from their targets, world units. The distance is larger if there are few
+/// photos, so that they overlap.
 const DISTANCE_MIN: f64 = 8.5;
 /// Largest distance of these cameras.
 const DISTANCE_MAX: f64 = 16.0;

@@ -112,8 +112,9 @@ fn write_truth(folder: &Path, index: usize, world: &World, camera: &Camera, made
     image::write_exr_y(folder.join("depth").join(format!("{index:03}.exr")), width, height, &made.depth)
 }
 
-/// Writes the photo of the view in the world without each object: `without/ID/OBJECT_NAME.png`, and `shadowed/ID/OBJECT_NAME.png`
-/// with its shadow. Only views that are held out by default have these, because removals are scored there.
+/// Writes the photo of the view in the world without each object: `without/ID/OBJECT_NAME.png`, and
+/// `shadowed/ID/OBJECT_NAME.png` with its shadow. Only views that are held out by default have these, because removals
+/// are scored there.
 fn write_without(folder: &Path, index: usize, world: &World, camera: &Camera, photo: &[[u8; 3]]) -> Result<()> {
     let involved = involved(world, camera, index as u32);
     world.objects.par_iter().zip(&involved).try_for_each(|(object, pixels)| {

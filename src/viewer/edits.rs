@@ -196,8 +196,8 @@ impl<'a> Work<'a> {
         numbers.max().map_or(1, |last| last.saturating_add(1))
     }
 
-    /// Writes the model as it is now, and the list of changes, in case it could not be written before. Returns a sentence
-    /// for the page.
+    /// Writes the model as it is now, and the list of changes, in case it could not be written before. Returns a
+    /// sentence for the page.
     pub(super) fn write(&mut self) -> Result<String> {
         let none = || Error::usage("save", "there are no unsaved edits");
         let (path, _) = self.output.clone().filter(|_| self.is_changed()).ok_or_else(none)?;

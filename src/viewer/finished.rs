@@ -48,8 +48,8 @@ pub struct FinishedModel<'a> {
     pub first_view: Option<FirstView>,
 }
 
-/// Serves a finished model until `goes_on` says no. Changes that are in no file yet are saved then; returns their file. As
-/// long as that fails, it says why and goes on, so that they can be saved from the page.
+/// Serves a finished model until `goes_on` says no. Changes that are in no file yet are saved then; returns their file.
+/// As long as that fails, it says why and goes on, so that they can be saved from the page.
 ///
 /// # Errors
 ///

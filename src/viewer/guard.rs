@@ -60,8 +60,8 @@ impl Guard {
         host.is_some_and(|host| self.hosts.iter().any(|own| own.eq_ignore_ascii_case(host)))
     }
 
-    /// Returns true if a request to `host` comes from the page of that host. Browsers leave `Origin` out when a user opens
-    /// a page; `is_needed` says that it may not be missing.
+    /// Returns true if a request to `host` comes from the page of that host. Browsers leave `Origin` out when a user
+    /// opens a page; `is_needed` says that it may not be missing.
     pub(super) fn is_same_origin(origin: Option<&str>, host: Option<&str>, is_needed: bool) -> bool {
         match (origin, host) {
             (Some(origin), Some(host)) => {

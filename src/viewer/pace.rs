@@ -13,8 +13,8 @@ const SHRINK_ABOVE: f64 = 1.25;
 /// An image becomes larger if the larger one is predicted to take less than this share of the target.
 const GROW_BELOW: f64 = 0.95;
 
-/// A model of the time of a frame, a + b · pixels, and the size that follows from it. Splats are projected and sorted at
-/// any size, so time per pixel alone would shrink the image further and further.
+/// A model of the time of a frame, a + b · pixels, and the size that follows from it. Splats are projected and sorted
+/// at any size, so time per pixel alone would shrink the image further and further.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pace {
     /// Weighted sums of 1, x, y, x², xy, with x in megapixels and y in seconds.

@@ -156,7 +156,8 @@ fn open_model(stream: &mut TcpStream, head: &Head, hub: &Hub) {
     }
 }
 
-/// Answers with a file of the page, or a photo or an exported model by its number. No path of the request reaches the disk.
+/// Answers with a file of the page, or a photo or an exported model by its number. No path of the request reaches the
+/// disk.
 fn files(stream: &mut TcpStream, path: &str, hub: &Hub) {
     if let Some((kind, bytes)) = page::file(path) {
         return answer(stream, "200 OK", kind, "", bytes);

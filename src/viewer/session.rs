@@ -169,7 +169,8 @@ impl Session<'_> {
         self.after(done)
     }
 
-    /// Draws the model after a change. One that failed leaves what is chosen, but may have left another model on the device.
+    /// Draws the model after a change. One that failed leaves what is chosen, but may have left another model on the
+    /// device.
     fn after(&mut self, done: Result<()>) -> Result<()> {
         if done.is_ok() { self.changed() } else { self.redraw().and(done) }
     }

@@ -1,7 +1,7 @@
 //! Shared by pages in a browser: the frame of a single-file page, and the camera with mouse and keyboard control.
 //!
-//! A page in one file opens from disk: style and script are inside, and nothing is asked from the network. All text goes
-//! through `maud`, which escapes it.
+//! A page in one file opens from disk: style and script are inside, and nothing is asked from the network. All text
+//! goes through `maud`, which escapes it.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -42,8 +42,8 @@ fn a_turntable_is_found_before_a_training_and_by_it() {
     assert!(stderr(&refused).contains("--masks"), "{}", stderr(&refused));
 }
 
-/// The object is there, labelled, with no fog around it: before and after a resume, which keeps the setting, and in the scores,
-/// which follow the run.
+/// The object is there, labelled, with no fog around it: before and after a resume, which keeps the setting, and in the
+/// scores, which follow the run.
 #[test]
 fn an_object_is_trained_alone() {
     let Some(_turn) = device() else { return };

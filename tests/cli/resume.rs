@@ -80,8 +80,8 @@ fn kills_at_any_moment_cost_no_bit() {
     assert!(killed == kills && began > 0 && ended > 0);
 }
 
-/// A kill while a checkpoint is being written costs the steps since the one before, and no bit; also where the state waits in
-/// the device's memory.
+/// A kill while a checkpoint is being written costs the steps since the one before, and no bit; also where the state
+/// waits in the device's memory.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn a_kill_while_a_checkpoint_is_written_costs_no_bit() {

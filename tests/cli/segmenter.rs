@@ -99,7 +99,8 @@ fn photos_become_objects_by_a_network_alone() {
     one_click_is_one_object(folder);
 }
 
-/// Trains, makes masks and labels in one command, once killed when it makes masks; leaves the model without labels in `plain`.
+/// Trains, makes masks and labels in one command, once killed when it makes masks; leaves the model without labels in
+/// `plain`.
 fn from_photos_to_labels(folder: &Path) {
     // Flat colours are learned slowly.
     let train = "train scene --network net --iterations 300 -o";

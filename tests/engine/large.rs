@@ -1,5 +1,5 @@
-//! Models that are larger than the memory of the device are drawn as they are on a device with the memory; ids of models
-//! beyond those of masks.
+//! Models that are larger than the memory of the device are drawn as they are on a device with the memory; ids of
+//! models beyond those of masks.
 
 use crate::support::compare::{Tolerance, check, close, exact};
 use crate::support::device;
@@ -20,7 +20,8 @@ use std::path::Path;
 
 const IMAGE_SIZE: (u32, u32) = (61, 45);
 
-/// Gaussians all around the cameras: small ones, large ones and needles, at the borders of views and around near planes.
+/// Gaussians all around the cameras: small ones, large ones and needles, at the borders of views and around near
+/// planes.
 fn crowd(count: usize) -> Gaussians {
     let mut random = generator(5);
     let shape = Shape { gaussians: count, sh_degree: 1, objects: 9, scales: (0.005, 0.3), ..Shape::default() };
@@ -62,8 +63,8 @@ fn floats(drawn: &Render) -> Vec<f64> {
     all.map(|&value| f64::from(value)).collect()
 }
 
-/// No Gaussian is lost at a border of a view: with memory for the whole picture the bits are those of the whole model, and in
-/// bands the picture is that of the whole one but for rounding.
+/// No Gaussian is lost at a border of a view: with memory for the whole picture the bits are those of the whole model,
+/// and in bands the picture is that of the whole one but for rounding.
 #[test]
 fn views_of_a_large_model_are_those_of_the_whole() {
     let Some(turn) = device() else { return };

@@ -1,6 +1,6 @@
 //! Mesa's compiler for AMD cards, without a card: every kernel compiles for each family without spilled registers, and
-//! what it compiles to is known. And the report of a device that the authors do not have. Where the driver is missing, tests say so and return; `LABELGS_REQUIRE_VULKAN=1`
-//! requires it.
+//! what it compiles to is known. And the report of a device that the authors do not have. Where the driver is missing,
+//! tests say so and return; `LABELGS_REQUIRE_VULKAN=1` requires it.
 
 use assert_cmd::Command;
 use std::fmt::Write;

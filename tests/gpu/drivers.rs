@@ -29,8 +29,8 @@ fn swiftshader() -> Option<Driver> {
     }
 }
 
-/// Lavapipe with vectors of 128 bits, if this is lavapipe. Mesa 25 does not tell vector widths apart in its cache on disk, so
-/// these have one of their own.
+/// Lavapipe with vectors of 128 bits, if this is lavapipe. Mesa 25 does not tell vector widths apart in its cache on
+/// disk, so these have one of their own.
 fn narrow_lavapipe() -> Option<Driver> {
     let cache = concat!(env!("CARGO_TARGET_TMPDIR"), "/narrow-lavapipe");
     let narrow = || vec![("LP_NATIVE_VECTOR_WIDTH", "128".into()), ("MESA_SHADER_CACHE_DIR", cache.into())];
@@ -57,8 +57,8 @@ fn the_selftest_passes_on_other_drivers() {
     }
 }
 
-/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either, with keys of 16
-/// bits or without; and walks of workgroups give the same bits again.
+/// Sorts that look back, as on cards, give the bits of those that do not, on a driver that is not Mesa's either, with
+/// keys of 16 bits or without; and walks of workgroups give the same bits again.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn sorts_that_look_back_change_no_bit() {
@@ -75,7 +75,8 @@ fn sorts_that_look_back_change_no_bit() {
     }
 }
 
-/// Keys of 16 bits take half the words, unless there are too many tiles, or the device cannot store 16 bits, which is no error.
+/// Keys of 16 bits take half the words, unless there are too many tiles, or the device cannot store 16 bits, which is
+/// no error.
 #[test]
 #[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
 fn keys_are_wide_where_16_bits_do_not_do() {
@@ -147,8 +148,8 @@ fn trainings_survive_kills_on_other_drivers_and_models_look_the_same() {
     }
 }
 
-/// Pictures that two systems drew of one model: `LABELGS_PICTURES` names their folders, as `here:there`. tools/try-debian
-/// draws them on this machine's Mesa and on a newer one.
+/// Pictures that two systems drew of one model: `LABELGS_PICTURES` names their folders, as `here:there`.
+/// tools/try-debian draws them on this machine's Mesa and on a newer one.
 #[test]
 fn pictures_of_two_systems_agree() {
     let Ok(folders) = std::env::var("LABELGS_PICTURES") else {
@@ -159,9 +160,9 @@ fn pictures_of_two_systems_agree() {
     pictures_agree(Path::new(here), Path::new(there));
 }
 
-/// Compares the pictures of two drivers. Each is within 1e-6 of float64 (src/verify/selftest), so they differ by at most
-/// 2e-6, except at pixels where a pair lies so close to the least opacity of 1/255 or to the last transmittance that
-/// one driver takes it and the other does not: at most one pixel in a thousand, by at most that opacity. There two
+/// Compares the pictures of two drivers. Each is within 1e-6 of float64 (src/verify/selftest), so they differ by at
+/// most 2e-6, except at pixels where a pair lies so close to the least opacity of 1/255 or to the last transmittance
+/// that one driver takes it and the other does not: at most one pixel in a thousand, by at most that opacity. There two
 /// weights may also tie for the label.
 fn pictures_agree(here: &Path, there: &Path) {
     let (mut pixels, mut flipped, mut labels_differ) = (0, 0, 0);
@@ -192,8 +193,8 @@ fn samples(path: &Path) -> Vec<f32> {
     image.layer_data.channel_data.list.iter().flat_map(|channel| channel.sample_data.values_as_f32()).collect()
 }
 
-/// Subgroups of each size on this device, through shared memory: no shuffle or scan of 32 or 64 lanes meets them first on
-/// a card. The pass list has the tiles and digits of a card of that size. Other drivers have 4; the soak tries all.
+/// Subgroups of each size on this device, through shared memory: no shuffle or scan of 32 or 64 lanes meets them first
+/// on a card. The pass list has the tiles and digits of a card of that size. Other drivers have 4; the soak tries all.
 #[test]
 fn every_subgroup_size_agrees_with_the_mirrors() {
     let all = std::env::var("LABELGS_TEST_SUBGROUPS").is_ok_and(|value| value == "all");

@@ -8,8 +8,8 @@ use crate::support::memory::peak_of;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::LazyLock;
 
-/// Most places of a seed that are changed; longer seeds are changed at evenly spaced places. `LABELGS_TEST_PLACES` has another
-/// number.
+/// Most places of a seed that are changed; longer seeds are changed at evenly spaced places. `LABELGS_TEST_PLACES` has
+/// another number.
 static FOLDER_COUNT: LazyLock<usize> =
     LazyLock::new(|| std::env::var("LABELGS_TEST_PLACES").ok().and_then(|places| places.parse().ok()).unwrap_or(12));
 

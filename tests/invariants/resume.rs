@@ -216,7 +216,8 @@ fn a_state_that_does_not_fit_together_is_refused() {
     refusal(&|state| state.planes[labels].data[0] = 4000, "4000");
 }
 
-/// A state that waits on the device is that of its step, whatever the steps after it do, and the training goes on as it would.
+/// A state that waits on the device is that of its step, whatever the steps after it do, and the training goes on as it
+/// would.
 #[test]
 fn a_state_that_is_read_later_is_of_its_step() {
     let Some(turn) = device() else { return };

@@ -164,7 +164,8 @@ fn a_training_by_the_papers_rule_is_the_same_to_the_last_bit() {
     stays_the_same(LabelRule::Main);
 }
 
-/// The reference run twice; overflows on the way, also with more steps in flight; one barrier before each pass; no shared scratch, and poison in it.
+/// The reference run twice; overflows on the way, also with more steps in flight; one barrier before each pass; no
+/// shared scratch, and poison in it.
 fn stays_the_same(rule: LabelRule) {
     let Some(turn) = device() else { return };
     let plan = PlanOptions::default();

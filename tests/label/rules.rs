@@ -256,8 +256,8 @@ fn occluded_and_invalid_pixels_are_ignored() {
     let slot = ObjectPixel { label: 1, occluders: vec![2], weight: 1.0 };
     let rules = Rules { label_alpha: 0.5, ..Rules::default() };
     let loss = label_loss(&rules, (&[[0.8; 3]; 4], &[0.8; 4]), &photo, &[1, 2, 0, 1], &slot);
-    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 off, within
-    // the slack, and 0.8.
+    // Mask: 0.3 off; occluder: left out; elsewhere 0.8 off; invalid: left out of the count, too. Opacity: 0.2 off,
+    // within the slack, and 0.8.
     assert!((loss.value - (0.3 + 0.8 + 0.5 * (0.8 - 0.5)) / 3.0).abs() < 1e-12);
     assert_eq!(loss.v_alpha, [0.0, 0.0, 0.5 / 3.0, 0.0]);
     let v = 1.0 / 9.0;

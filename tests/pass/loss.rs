@@ -21,8 +21,8 @@ const VALUE: Tolerance = Tolerance { absolute: 1e-6, relative: 0.0 };
 /// Pixels nearer than this to the kink of L1 are left out.
 const KINK: f64 = 1e-6;
 
-/// Sizes below and above a workgroup, none a multiple of a strip; with a dispatch for each filter, and with tiles in shared
-/// memory.
+/// Sizes below and above a workgroup, none a multiple of a strip; with a dispatch for each filter, and with tiles in
+/// shared memory.
 #[test]
 fn photo_loss_equals_its_mirror() {
     for (seed, width, height, loss_tile) in [(91, 61, 45, 0), (92, 70, 133, 0), (91, 61, 45, 16), (92, 70, 133, 8)] {

@@ -169,7 +169,8 @@ fn a_sort_is_exact_and_stable() {
     });
 }
 
-/// Keys of 16 bits, in buffers that end with the last one: all of them, odd numbers, few different ones, the largest alone.
+/// Keys of 16 bits, in buffers that end with the last one: all of them, odd numbers, few different ones, the largest
+/// alone.
 #[test]
 fn a_sort_of_narrow_keys_is_exact_and_stable() {
     if !device().is_some_and(|turn| turn.capabilities().has_narrow_storage()) {
@@ -241,8 +242,8 @@ fn get_keys(engine: &mut Engine, buffer: Buf, count: usize, narrow: bool) -> Vec
     halves.into_iter().take(count).map(u32::from).collect()
 }
 
-/// Sorts keys and compares. Cases are (number of keys, number of distinct keys); the first one is sorted in ascending order too.
-/// Narrow keys are the largest ones.
+/// Sorts keys and compares. Cases are (number of keys, number of distinct keys); the first one is sorted in ascending
+/// order too. Narrow keys are the largest ones.
 fn sort_exactly(engine: &mut Engine, held: Option<u32>, narrow: bool, cases: &[(usize, u32)]) {
     let depths = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],

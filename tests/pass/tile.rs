@@ -13,7 +13,8 @@ use labelgs::pass::KernelShape;
 use labelgs::scheduler::plan::Buf;
 use labelgs::verify::selftest::order::DepthOrder;
 
-/// Log2 units that the device may err on the side of one tile too many: 0.01, 2e-6 of the exponent's terms, and 0.001 px.
+/// Log2 units that the device may err on the side of one tile too many: 0.01, 2e-6 of the exponent's terms, and 0.001
+/// px.
 const SLACK: f64 = 0.02;
 
 #[test]
@@ -134,8 +135,8 @@ fn lists(fixture: &mut Fixture, sorted_keys: &[u32], slots: &[u32], splat_from_i
     check("layer_tiles", exact(&fixture.get::<u32>(Buf::LAYER_TILES, listed.len()), &listed));
 }
 
-/// Round splats, needles in all directions, huge ones, and centres far outside: in every tile where a pixel counts, in no tile
-/// beyond the rounding, and in each row in neighbours.
+/// Round splats, needles in all directions, huge ones, and centres far outside: in every tile where a pixel counts, in
+/// no tile beyond the rounding, and in each row in neighbours.
 #[test]
 fn tiles_of_needles_and_giants_equal_their_mirror() {
     let Some(turn) = device() else { return };
@@ -155,7 +156,8 @@ fn tiles_of_needles_and_giants_equal_their_mirror() {
     keys.iter().zip(&owners).for_each(|(&key, &owner)| found[owner as usize].push(key as usize));
     let (mut listed, mut beyond) = (0, 0);
     for (splat, tiles) in splats.iter().zip(&found) {
-        // Roundings of the terms of the exponent are larger than the cut for such a needle; 0.001 px at a steep border besides.
+        // Roundings of the terms of the exponent are larger than the cut for such a needle; 0.001 px at a steep border
+        // besides.
         let (width, height) = grid.size;
         let far = [(splat.mean2d[0], width as f64), (splat.mean2d[1], height as f64)]
             .map(|(m, size)| m.abs().max((size - m).abs()));

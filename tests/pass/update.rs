@@ -58,8 +58,8 @@ fn steps(update: Update, (labels, antialiased, texel): (bool, bool, bool), count
     Some(all)
 }
 
-/// Largest differences of parameters, relative to the largest step so far, and of moments, relative to the largest of their
-/// Gaussian.
+/// Largest differences of parameters, relative to the largest step so far, and of moments, relative to the largest of
+/// their Gaussian.
 fn differences(a: &After, b: &After) -> [f64; 3] {
     let most = |k: usize, scale: &dyn Fn(&Row) -> f64| {
         let of = |(a, b): (&Row, &Row)| {
@@ -137,8 +137,8 @@ fn late_gaussians_catch_up_to_those_of_every_step() {
     assert!(last[0] < 2e-6 && last[1] < 1e-5 && last[2] < 1e-5, "{last:?}");
 }
 
-/// A splat with more records than a workgroup has invocations is summed by all of them, in the order of `gather`: the same bits of
-/// the statistic.
+/// A splat with more records than a workgroup has invocations is summed by all of them, in the order of `gather`: the
+/// same bits of the statistic.
 #[test]
 fn large_splats_are_summed_by_a_workgroup() {
     let run = |update| {

@@ -1,5 +1,5 @@
-//! Tiles and records of splats that a workgroup shares out, as on a card: the lists of one invocation a splat, and sums of all
-//! records.
+//! Tiles and records of splats that a workgroup shares out, as on a card: the lists of one invocation a splat, and sums
+//! of all records.
 
 use super::fixture::Fixture;
 use crate::support::compare::{Tolerance, check, close, exact};

@@ -190,8 +190,8 @@ fn a_camera_far_away_does_not_hide_a_stray_point() {
     );
 }
 
-/// A laser scan has many points, and nothing says which photo shows which: a sample of them tells how bright photos are, and
-/// every point is counted.
+/// A laser scan has many points, and nothing says which photo shows which: a sample of them tells how bright photos
+/// are, and every point is counted.
 #[test]
 fn dense_points_tell_the_exposure_by_a_sample() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -222,7 +222,8 @@ fn dense_points_tell_the_exposure_by_a_sample() {
     assert!((view.gain.expect("a gain") - 0.7).abs() < 0.05, "{view:?}");
 }
 
-/// A pose that is off moves its points; a photo without observations shares nothing. The command names both, with cures.
+/// A pose that is off moves its points; a photo without observations shares nothing. The command names both, with
+/// cures.
 #[test]
 fn wrong_poses_and_lonely_photos_are_reported() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -121,8 +121,8 @@ fn a_snapshot_may_outlive_its_scheduler() {
     assert_eq!(reader.join().unwrap()[0].len(), 100, "a snapshot outlives its scheduler");
 }
 
-/// Growth frees the planes whose copies are being read, and the reader gets what was there before. The copies are larger than
-/// the staging memory, so that the reader is at work while the planes go.
+/// Growth frees the planes whose copies are being read, and the reader gets what was there before. The copies are
+/// larger than the staging memory, so that the reader is at work while the planes go.
 #[test]
 fn growth_leaves_a_snapshot_alone() {
     let Some(gpu) = device() else { return };

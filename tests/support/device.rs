@@ -1,9 +1,9 @@
 //! The devices of the test process.
 //!
-//! A test has a turn with a device that no other test uses meanwhile: `device()` waits until one is free and keeps it until its
-//! result is dropped. There is a device for each of the first cores, because small work on a software device does not fill
-//! several, and each message of the validation layer belongs to one test. The end of the turn fails the test if the layer
-//! reported anything, leaks included.
+//! A test has a turn with a device that no other test uses meanwhile: `device()` waits until one is free and keeps it
+//! until its result is dropped. There is a device for each of the first cores, because small work on a software device
+//! does not fill several, and each message of the validation layer belongs to one test. The end of the turn fails the
+//! test if the layer reported anything, leaks included.
 //!
 //! Without a device, tests that call `device()` return early with a message on stderr; with `LABELGS_REQUIRE_VULKAN=1`
 //! they fail instead. `LABELGS_DEVICE` chooses a device, `LABELGS_VALIDATION` (`off`, `on`, `sync`, `gpu`; default
@@ -95,7 +95,8 @@ impl Drop for Turn {
     }
 }
 
-/// Returns this test's turn with a device, or `None` and a message if there is no device. The device is opened for the turn.
+/// Returns this test's turn with a device, or `None` and a message if there is no device. The device is opened for the
+/// turn.
 pub fn device() -> Option<Turn> {
     let place = Place::wait();
     Some(Turn::at(place, open()?))

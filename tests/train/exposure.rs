@@ -68,8 +68,8 @@ fn halves(trainer: &mut Trainer, of: fn(&ColourMatrix) -> f32) -> (Vec<f32>, Vec
     (found.iter().step_by(2).copied().collect(), found.iter().skip(1).step_by(2).copied().collect())
 }
 
-/// Light of another colour does not only change gains. Compared with a training on the photos as they were, because what each
-/// of these five photos shows makes shares as well.
+/// Light of another colour does not only change gains. Compared with a training on the photos as they were, because
+/// what each of these five photos shows makes shares as well.
 #[test]
 fn a_channel_that_takes_of_another_one_is_found() {
     let Some(turn) = device() else { return };

@@ -26,8 +26,9 @@ fn a_training_starts_with_a_part_of_its_budget() {
     assert_eq!(of(StrategyKind::Budget, 300).len(), 300);
 }
 
-/// A laser scan has more points than the photos have pixels. They are thinned over all of their place, and the Gaussians get the
-/// sizes of what is left, with room for growth below a limit; one that allows all of them keeps them all.
+/// A laser scan has more points than the photos have pixels. They are thinned over all of their place, and the
+/// Gaussians get the sizes of what is left, with room for growth below a limit; one that allows all of them keeps them
+/// all.
 #[test]
 fn points_far_beyond_the_budget_are_thinned_evenly() {
     let mut scene = dataset(ring(6), |_, _| [90, 60, 30]);

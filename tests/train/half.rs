@@ -57,7 +57,8 @@ fn a_training_with_packed_moments_goes_on_to_the_same_bits() {
     assert!(plane(&models[0], "means") != plane(&models[1], "means"), "the forms of the update round differently");
 }
 
-/// A state with late Gaussians goes on where none may be late: they catch up on the host, within a step of their moments.
+/// A state with late Gaussians goes on where none may be late: they catch up on the host, within a step of their
+/// moments.
 #[test]
 fn late_gaussians_with_packed_moments_catch_up_on_the_host() {
     let Some(turn) = device() else { return };
@@ -83,7 +84,8 @@ fn late_gaussians_with_packed_moments_catch_up_on_the_host() {
         let words = |planes: &[Plane]| plane(planes, &format!("m_{name}")).expect("a plane").data.clone();
         let (host, device) = (words(&on_host), words(&on_device));
         let steps = |(a, b): (&u32, &u32)| {
-            // One is the nearest, the other one of both around; the ratio follows a root that is one higher or lower, by 7e-4.
+            // One is the nearest, the other one of both around; the ratio follows a root that is one higher or lower,
+            // by 7e-4.
             let ratio = |word: u32| i32::from((word >> 16) as u16 as i16);
             ((a & 0xffff).abs_diff(b & 0xffff) > 1)
                 || ratio(*a).abs_diff(ratio(*b)) > 2 + ratio(*a).unsigned_abs() / 1400

@@ -1,4 +1,5 @@
-//! Gaussians that are late: they are where every step would have moved them, whoever looks and however a training is cut.
+//! Gaussians that are late: they are where every step would have moved them, whoever looks and however a training is
+//! cut.
 
 use crate::invariants::training::{budgeted, small, tiny};
 use crate::support::device;
@@ -109,8 +110,9 @@ fn resting(before: &[Plane], after: &[Plane], steps: u32) -> Vec<bool> {
     pairs.map(|(a, b)| a.iter().zip(b).all(fades)).collect()
 }
 
-/// From equal states on, for fewer and more steps than may be missed: late Gaussians without a gradient are where those of every
-/// step are, on the device, on the host, and in a training that goes on with a pass for each part of an update.
+/// From equal states on, for fewer and more steps than may be missed: late Gaussians without a gradient are where those
+/// of every step are, on the device, on the host, and in a training that goes on with a pass for each part of an
+/// update.
 #[test]
 fn late_gaussians_are_where_every_step_moves_them() {
     let Some(turn) = device() else { return };

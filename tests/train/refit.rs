@@ -70,7 +70,8 @@ fn haze_goes_from_a_copy_and_nothing_else_changes() {
     assert_eq!(Gaussians { opacities: object.opacities.clone(), ..found }, object);
 }
 
-/// Where something hides the object, the mask does not tell whether it is there; nor does the photo, which shows the scene.
+/// Where something hides the object, the mask does not tell whether it is there; nor does the photo, which shows the
+/// scene.
 #[test]
 fn haze_that_something_may_hide_stays() {
     let object = object();

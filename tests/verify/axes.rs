@@ -1,5 +1,5 @@
-//! Models in other axes: the record of an SPZ, the nodes of a GLB. Truth is what a Gaussian covers and what it shows along
-//! each direction.
+//! Models in other axes: the record of an SPZ, the nodes of a GLB. Truth is what a Gaussian covers and what it shows
+//! along each direction.
 
 use crate::scenes::fixtures::*;
 use glam::{DMat3, DQuat, DVec3};

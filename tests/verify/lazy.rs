@@ -49,7 +49,8 @@ fn late_updates_equal_those_of_every_step() {
                 late = adam(&rules, &rates(step), step, &late, &found.unwrap_or_default());
                 last = step;
                 let [parameters, moments] = distance(&late, &every);
-                // Epsilon is 1e-15, and the smallest roots of second moments are some 1e-9: it is 1e-6 of a step of 0.01.
+                // Epsilon is 1e-15, and the smallest roots of second moments are some 1e-9: it is 1e-6 of a step of
+                // 0.01.
                 assert!(parameters < 1e-6 && moments < 1e-10, "step {step}: {parameters:e} {moments:e}");
             }
         }

@@ -69,8 +69,9 @@ fn moments_are_right_in_the_mean_of_many_updates() {
     }
     let mean = sums.map(|sum| sum / f64::from(PARAMETERS));
     println!("off in the mean by {mean:?}, at most by {most:?}");
-    // A draw moves v by up to 1.36e-3, with a deviation of 5.5e-4; a thousand of them count: 0.0123 for one parameter, 8.7e-4 for
-    // the mean of all. Of the ratio about five count, each with 1e-4: 2.3e-4 and 1.6e-5, and m follows what v is off by.
+    // A draw moves v by up to 1.36e-3, with a deviation of 5.5e-4; a thousand of them count: 0.0123 for one parameter,
+    // 8.7e-4 for the mean of all. Of the ratio about five count, each with 1e-4: 2.3e-4 and 1.6e-5, and m follows
+    // what v is off by.
     assert!(mean[0].abs() < 3e-3 && mean[1].abs() < 1e-4, "{mean:?}");
     assert!(most[0] < 0.05 && most[1] < 2e-3, "{most:?}");
 }

@@ -12,8 +12,8 @@ const LARGEST_SIZE: (u32, u32) = (1500, 1000);
 /// Fewer seconds meet too little for a word on memory.
 const SECONDS_LEAST: u64 = 120;
 
-/// Some seconds of any events; `LABELGS_TEST_SECONDS` overrides how many. The memory of page and server, after a warm-up
-/// of half of the time, grows by 5 % at most.
+/// Some seconds of any events; `LABELGS_TEST_SECONDS` overrides how many. The memory of page and server, after a
+/// warm-up of half of the time, grows by 5 % at most.
 pub fn random_events(browser: &mut Browser, tab: &Tab, server: &Server) {
     let seconds = std::env::var("LABELGS_TEST_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(6);
     let mut dice = SmallRng::seed_from_u64(11);

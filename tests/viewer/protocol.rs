@@ -358,7 +358,8 @@ fn edits_are_told_saved_and_made_again_by_a_command() {
     }
 }
 
-/// What was not saved is in a file after Ctrl-C, which the program names; a second start has the same token if it is given.
+/// What was not saved is in a file after Ctrl-C, which the program names; a second start has the same token if it is
+/// given.
 #[test]
 fn an_interrupted_viewer_loses_no_change() {
     if device().is_none() {

@@ -23,8 +23,8 @@ pub struct PhotosArgs {
     /// Maximum number of frames to take from a video, at equal intervals.
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = clap::value_parser!(u32).range(PHOTOS_MIN as i64..))]
     pub frames: u32,
-    /// COLMAP camera model: OPENCV for phones and cameras, OPENCV_FISHEYE for action cameras, PINHOLE for images without
-    /// distortion. Photos of the same size share a lens.
+    /// COLMAP camera model: OPENCV for phones and cameras, OPENCV_FISHEYE for action cameras, PINHOLE for images
+    /// without distortion. Photos of the same size share a lens.
     #[arg(long, value_name = "MODEL", default_value = "OPENCV", hide_possible_values = true, value_parser = lens())]
     pub model: &'static CameraModel,
     /// Find and match features on the GPU. Needs a COLMAP built with CUDA.

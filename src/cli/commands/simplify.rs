@@ -131,8 +131,8 @@ fn exactly<'a>(
     Ok((simplifier, row))
 }
 
-/// Halves the interval between the sizes of the table of which one loses too much. Returns the smallest model found that
-/// does not.
+/// Halves the interval between the sizes of the table of which one loses too much. Returns the smallest model found
+/// that does not.
 fn fewest<'a>(
     args: &SimplifyArgs,
     rows: &[Row],

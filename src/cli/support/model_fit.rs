@@ -16,8 +16,8 @@ const OPACITY_MIN: f64 = 0.3;
 const SH_0: f32 = 0.282_094_8;
 /// Minimum number of such Gaussians for a verdict.
 const GAUSSIANS_MIN: usize = 200;
-/// Correlation of the colours of Gaussians and photos below which they do not belong together. Models of their scene have
-/// 0.7 to 0.9, others -0.1 to 0.1.
+/// Correlation of the colours of Gaussians and photos below which they do not belong together. Models of their scene
+/// have 0.7 to 0.9, others -0.1 to 0.1.
 const COLOUR_CORRELATION_MIN: f64 = 0.25;
 /// Share of the Gaussians in a photo below which they do not, if there is nothing to compare colours with.
 const SHARE_IN_PHOTO_MIN: f64 = 0.01;

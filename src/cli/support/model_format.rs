@@ -35,8 +35,8 @@ impl WriteArgs {
         Ok(WriteOptions { label_type: self.label_type, spz_version: self.spz_version, first_view })
     }
 
-    /// Returns the choices for a file with `part` of `model` alone. It is seen at first from the camera of the model's run that
-    /// shows it best.
+    /// Returns the choices for a file with `part` of `model` alone. It is seen at first from the camera of the model's
+    /// run that shows it best.
     pub(crate) fn options_of_part(self, model: &Path, output: &Path, part: &Gaussians) -> Result<WriteOptions> {
         let mut options = self.options(model, output)?;
         // `options` has reported damaged cameras.

@@ -55,8 +55,8 @@ impl MaskFolders {
     }
 }
 
-/// Gives views the masks of the objects that all of them together choose among nested masks; none to views without any. Objects
-/// in fewer than `min_views` views are left out.
+/// Gives views the masks of the objects that all of them together choose among nested masks; none to views without any.
+/// Objects in fewer than `min_views` views are left out.
 pub(crate) fn choose_objects(
     lists: &Path,
     (scene, reading): (&Path, &SceneArgs),

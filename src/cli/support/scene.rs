@@ -65,8 +65,8 @@ pub(crate) fn open_scene(
     scenes::open_logged(path, &reading.read.options(options))
 }
 
-/// Reads the photos of a scene for a network, which is asked for objects in a model; warns if they do not fit it. Returns the
-/// views too, in the sizes in which places are typed.
+/// Reads the photos of a scene for a network, which is asked for objects in a model; warns if they do not fit it.
+/// Returns the views too, in the sizes in which places are typed.
 pub(crate) fn open_photos(
     (path, model): (&Path, &Gaussians),
     (scene, reading): (&Path, &SceneArgs),

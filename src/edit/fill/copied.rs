@@ -1,8 +1,8 @@
 //! Gaussians of a plane copied into its hole, from places whole periods of the plane's pattern away.
 //!
-//! Patches are filled from the rim of the hole inwards, those first that continue an edge from much that is known (priority
-//! = confidence x data term, Criminisi, Perez and Toyama, TIP 2004). Sources are a number of periods away (dominant
-//! offsets, He and Sun, ECCV 2012): the one whose colours are most like those already in the patch.
+//! Patches are filled from the rim of the hole inwards, those first that continue an edge from much that is known
+//! (priority = confidence x data term, Criminisi, Perez and Toyama, TIP 2004). Sources are a number of periods away
+//! (dominant offsets, He and Sun, ECCV 2012): the one whose colours are most like those already in the patch.
 
 use super::evidence::on_surface;
 use super::pattern::Pattern;
@@ -14,7 +14,8 @@ use labelgs_scene::harmonics::{sh0_of, value_of};
 
 /// Half of the side of a patch, in cells.
 const PATCH_RADIUS_CELLS: isize = 4;
-/// What is added to the data term, as a share of a step from black to white between two cells: flat patches are filled too.
+/// What is added to the data term, as a share of a step from black to white between two cells: flat patches are filled
+/// too.
 const DATA_OFFSET: f64 = 0.01;
 /// Distance within which colours change too fast to be those of the new place, in cells.
 const DETAIL_CELLS: usize = 8;
@@ -92,7 +93,8 @@ impl Growth<'_> {
         self.trust(index) * (strongest + DATA_OFFSET)
     }
 
-    /// Returns the offset whose colours are most like what is known of a patch, of those that are seen in all the rest of it.
+    /// Returns the offset whose colours are most like what is known of a patch, of those that are seen in all the rest
+    /// of it.
     fn best(&self, index: usize) -> Option<usize> {
         let patch: Vec<usize> = self.patch(index).collect();
         let apart = |offset: DVec2| {
@@ -157,8 +159,8 @@ impl<'a> Sources<'a> {
         Self { sheet, offsets, chosen, used, pattern }
     }
 
-    /// Returns copies of those of the first `rows` Gaussians of `model` that lie on the plane and have their new place in the
-    /// hole. What changes slowly in their colours is that of the new place, light too.
+    /// Returns copies of those of the first `rows` Gaussians of `model` that lie on the plane and have their new place
+    /// in the hole. What changes slowly in their colours is that of the new place, light too.
     pub(super) fn copies(&self, model: &Gaussians, rows: usize, target: &Target) -> Gaussians {
         let (mut picked, mut moved) = (Vec::new(), Vec::new());
         let mut is_hole = vec![false; target.sheet.width * target.sheet.height];

@@ -78,7 +78,8 @@ impl Evidence {
         }
         let shown = f64::from(sight.depth[index]);
         let behind = if shown > 0.0 { depth - shown } else { f64::NEG_INFINITY };
-        // Distance from the plane of the surface that the view shows: flat views change depths much from pixel to pixel.
+        // Distance from the plane of the surface that the view shows: flat views change depths much from pixel to
+        // pixel.
         let off = if shown > 0.0 { plane.height(sight.at(index, shown)).abs() } else { f64::INFINITY };
         let slack = DEPTH_TOLERANCE * cell;
         let label = u32::from(sight.labels.ids[index]);
@@ -100,8 +101,8 @@ impl Evidence {
         Some((index, shown))
     }
 
-    /// Adds what a view shows at a point of space: the removed object there or before it, something else there, or something
-    /// behind it.
+    /// Adds what a view shows at a point of space: the removed object there or before it, something else there, or
+    /// something behind it.
     pub(super) fn add_point(&mut self, world: DVec3, cell: f64, removed: &[u32], sight: &Sight) {
         let camera = &sight.camera;
         let Some(pixel) = camera.sees(world) else { return };

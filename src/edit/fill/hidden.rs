@@ -1,5 +1,5 @@
-//! Gaussians that stay when an object is removed, though nothing but the object was ever seen where they are: no photo has
-//! shaped their colours.
+//! Gaussians that stay when an object is removed, though nothing but the object was ever seen where they are: no photo
+//! has shaped their colours.
 
 use super::evidence::{Evidence, State};
 use super::{Place, Sight};
@@ -8,11 +8,13 @@ use labelgs_scene::Gaussians;
 use labelgs_scene::gaussians::axes_of;
 use rayon::prelude::*;
 
-/// Distance from its centre, in standard deviations, at which a Gaussian must be hidden too: its rim is still seen there.
+/// Distance from its centre, in standard deviations, at which a Gaussian must be hidden too: its rim is still seen
+/// there.
 const RIM_DEVIATIONS: f64 = 1.5;
 
 impl Place {
-    /// Returns for each row of `model`, in which the objects `removed` are missing, whether the objects hide it in all views.
+    /// Returns for each row of `model`, in which the objects `removed` are missing, whether the objects hide it in all
+    /// views.
     pub(super) fn hidden(&self, model: &Gaussians, removed: &[u32], sights: &[Sight]) -> Vec<bool> {
         let is_hole = |world: DVec3| {
             let mut evidence = Evidence::default();

@@ -1,5 +1,5 @@
-//! The light of a scene, by the shadows of its objects: if it comes from a direction, colours change where the shadows that
-//! the objects would throw from there end.
+//! The light of a scene, by the shadows of its objects: if it comes from a direction, colours change where the shadows
+//! that the objects would throw from there end.
 
 use super::plane::planes;
 use super::shadow::{Disc, LIGHT_SINE_MIN, hard, soft};
@@ -47,8 +47,8 @@ pub struct Light {
 }
 
 impl Light {
-    /// Finds the light of a labelled model by `sights`, views of the whole model; `None` where no shadows tell it. Errors if an
-    /// object cannot be searched.
+    /// Finds the light of a labelled model by `sights`, views of the whole model; `None` where no shadows tell it.
+    /// Errors if an object cannot be searched.
     pub fn of(model: &Gaussians, sights: &[Sight]) -> Result<Option<Self>> {
         let stands = stands(model, sights)?;
         let best = |tried: Vec<DVec3>| {

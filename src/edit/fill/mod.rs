@@ -1,14 +1,14 @@
-//! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked. Gaussians
-//! that the object hid in all views go with it.
+//! Closes what a removed object leaves open: its neighbours' surfaces are continued where no view ever looked.
+//! Gaussians that the object hid in all views go with it.
 //!
 //! The views of the whole model say what was seen: a place on a surface is *seen* if a view shows it, *free* if a view
-//! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them may
-//! err, as they do at contours). Planes are fitted
+//! looks through it, and a *hole* if it lies at or behind the removed object in the views that tell (a tenth of them
+//! may err, as they do at contours). Planes are fitted
 //! to what the views show around the object. New flat Gaussians stand on these planes, only in holes between seen
 //! ones, so that they cover nothing that a view has seen. Their colours continue those around them, and a pattern that
 //! repeats there, such as tiles. Where there is a pattern, the plane's own Gaussians are copied into the hole too, from
-//! places whole periods away. Where the scene has one strong [`Light`], the shadow of the object on these planes goes with
-//! it.
+//! places whole periods away. Where the scene has one strong [`Light`], the shadow of the object on these planes goes
+//! with it.
 
 mod copied;
 mod evidence;
@@ -42,8 +42,8 @@ pub const SIGHT_SIDE: u32 = 640;
 const RING_DIAGONAL_SHARE: f64 = 0.25;
 /// Least width of that ring, in cells.
 const RING_CELLS_MIN: f64 = 8.0;
-/// Width of the ring in which a pattern is looked for, in the same measures, the length of the object that counts there, in
-/// its widths, and the root of the number of cells.
+/// Width of the ring in which a pattern is looked for, in the same measures, the length of the object that counts
+/// there, in its widths, and the root of the number of cells.
 const PATTERN_RING: (f64, f64) = (0.75, 96.0);
 const LENGTH_OF_WIDTH: f64 = 2.0;
 const PATTERN_CELLS: f64 = 192.0;
@@ -86,9 +86,9 @@ pub struct Filled {
     pub lit: u64,
 }
 
-/// Removes the Gaussians of `labels`, as [`remove`] does, and continues the surfaces around them where `sights`, views of
-/// the whole `model`, show nothing but the removed. With a `light`, these surfaces lose the shadow of the removed. Errors as
-/// in [`remove`], or without a sight.
+/// Removes the Gaussians of `labels`, as [`remove`] does, and continues the surfaces around them where `sights`, views
+/// of the whole `model`, show nothing but the removed. With a `light`, these surfaces lose the shadow of the removed.
+/// Errors as in [`remove`], or without a sight.
 pub fn fill(model: &Gaussians, labels: &[u32], sights: &[Sight], light: Option<&Light>) -> Result<Filled> {
     let rest = remove(model, labels)?;
     if sights.is_empty() {

@@ -1,8 +1,8 @@
-//! A pattern that repeats on a plane, such as tiles or stripes: found by the offsets at which what is seen of the plane is like
-//! itself (statistics of offsets, He and Sun, ECCV 2012), and continued where nothing is seen.
+//! A pattern that repeats on a plane, such as tiles or stripes: found by the offsets at which what is seen of the plane
+//! is like itself (statistics of offsets, He and Sun, ECCV 2012), and continued where nothing is seen.
 //!
-//! All places a period apart are asked, and what they agree on is the pattern: the joints of a floor repeat, its stains do
-//! not, and no single stain appears twice.
+//! All places a period apart are asked, and what they agree on is the pattern: the joints of a floor repeat, its stains
+//! do not, and no single stain appears twice.
 
 use super::sheet::Sheet;
 use glam::{DMat3, DVec2, DVec3};
@@ -155,8 +155,8 @@ impl<'a> Seen<'a> {
         near.into_par_iter().filter_map(|offset| self.compare(offset).map(|found| (offset, found))).collect()
     }
 
-    /// Returns how much more alike than half of `best` the plane is at all offsets of two periods together: more offsets are
-    /// better, as long as they are alike.
+    /// Returns how much more alike than half of `best` the plane is at all offsets of two periods together: more
+    /// offsets are better, as long as they are alike.
     fn score(&self, periods: [DVec2; 2], best: f64) -> f64 {
         self.matches(periods).iter().map(|(_, found)| found.likeness - 0.5 * best).sum()
     }
@@ -236,8 +236,8 @@ pub(super) struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    /// Finds the pattern of a plane by its colours in the light, `lit`, and their detail; `None` if it has none that foretells
-    /// what is seen.
+    /// Finds the pattern of a plane by its colours in the light, `lit`, and their detail; `None` if it has none that
+    /// foretells what is seen.
     pub(super) fn of(sheet: &'a Sheet, lit: &[Option<DVec3>], colours: &'a [Option<DVec3>]) -> Option<Self> {
         if Seen::new(sheet, lit, GUESS_CELLS_MAX).roughness() < DEVIATION_MIN * DEVIATION_MIN {
             return None;
@@ -295,8 +295,8 @@ impl<'a> Pattern<'a> {
         if all > 0.0 { 1.0 - left / all } else { 0.0 }
     }
 
-    /// Returns what the pattern adds to the mean colour at a world position: the mean of the middle half of the places a number
-    /// of periods away, as far as so many of them can be trusted.
+    /// Returns what the pattern adds to the mean colour at a world position: the mean of the middle half of the places
+    /// a number of periods away, as far as so many of them can be trusted.
     pub(super) fn at(&self, world: DVec3) -> DVec3 {
         // Cell (0, 0) has its middle half a cell from the corner.
         self.deviation(DVec2::from_array(self.seen.sheet.at(world)) - 0.5)

@@ -50,8 +50,8 @@ impl Plane {
         (point - self.origin).dot(self.normal)
     }
 
-    /// Returns the plane with the least squared distance to the points, none of which is far from it; `None` if they lie
-    /// on a line.
+    /// Returns the plane with the least squared distance to the points, none of which is far from it; `None` if they
+    /// lie on a line.
     fn refined(&self, points: &[DVec3]) -> Option<Self> {
         let middle = points.iter().sum::<DVec3>() / points.len() as f64;
         // Height above this plane as a linear function of the place in it.

@@ -14,8 +14,8 @@ use rayon::prelude::*;
 pub(super) const LIGHT_SINE_MIN: f64 = 0.25;
 /// Least radius of what throws a shadow, in cells: Gaussians of one surface leave no light between them.
 const DISC_RADIUS_MIN: f64 = 1.5;
-/// Spots of the light: one in the middle and a ring around it, and its radius as the tangent of the angle. A shadow has soft
-/// edges, those of a model more so than those of a photo.
+/// Spots of the light: one in the middle and a ring around it, and its radius as the tangent of the angle. A shadow has
+/// soft edges, those of a model more so than those of a photo.
 const LIGHT_SPOTS: usize = 6;
 const LIGHT_RADIUS: f64 = 0.06;
 /// Distance from the edge of a shadow at which it is sure on which side a place is, in cells.
@@ -130,7 +130,8 @@ pub(super) fn soft(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<f64> {
     (0..sheet.width * sheet.height).map(share).collect()
 }
 
-/// Returns the cells in the shadow of discs above the sheet, without those at its edge: discs are drawn too large for it.
+/// Returns the cells in the shadow of discs above the sheet, without those at its edge: discs are drawn too large for
+/// it.
 pub(super) fn hard(sheet: &Sheet, towards: DVec3, discs: &[Disc]) -> Vec<bool> {
     let wide = drawn(sheet, towards, discs);
     let is_wide = |at: usize| wide[at];

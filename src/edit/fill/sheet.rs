@@ -12,8 +12,8 @@ use rayon::prelude::*;
 const BOUNDED_MIN: usize = 6;
 /// Most cells along a side.
 const SIDE_MAX: usize = 1024;
-/// Least share of the views that tell of a cell in which a surface is shown, rather than the removed object, for its colour to go
-/// on elsewhere: at the foot of an object few views shape what is there, and it has some of its colour.
+/// Least share of the views that tell of a cell in which a surface is shown, rather than the removed object, for its
+/// colour to go on elsewhere: at the foot of an object few views shape what is there, and it has some of its colour.
 const OWN_SHARE_MIN: f64 = 0.65;
 /// Distance within which the mean of colours is what changes slowly, in cells.
 const SLOW_CELLS: usize = 32;
@@ -46,8 +46,8 @@ pub(super) const STEPS_BESIDE: [[isize; 2]; 4] = [[-1, 0], [1, 0], [0, -1], [0, 
 const STEPS_AROUND: [[isize; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
 
 impl Sheet {
-    /// Looks at the cells of a plane, the surface of a label, in every view: at those around the object, and those in its
-    /// shadow if light comes from a direction.
+    /// Looks at the cells of a plane, the surface of a label, in every view: at those around the object, and those in
+    /// its shadow if light comes from a direction.
     pub(super) fn new(
         (plane, label): (Plane, u32),
         place: &Place,
@@ -128,8 +128,8 @@ impl Sheet {
         (state, (colour, evidence.share() >= OWN_SHARE_MIN))
     }
 
-    /// Returns the cells of the holes that seen surface surrounds. What was closed bounds the next ones: a hole beside another
-    /// that nothing bounds is closed up to it.
+    /// Returns the cells of the holes that seen surface surrounds. What was closed bounds the next ones: a hole beside
+    /// another that nothing bounds is closed up to it.
     pub(super) fn holes(&self) -> Vec<usize> {
         let mut states = self.states.clone();
         let mut open: Vec<usize> = (0..states.len()).filter(|&index| states[index] == State::Hole).collect();
@@ -154,7 +154,8 @@ impl Sheet {
         self.states[index] == State::Seen
     }
 
-    /// Returns positions and colours of some cells. `shadows` on the sheet change the colours, and a pattern of it goes on.
+    /// Returns positions and colours of some cells. `shadows` on the sheet change the colours, and a pattern of it goes
+    /// on.
     pub(super) fn painted(
         &self,
         cells: &[usize],
@@ -186,8 +187,8 @@ impl Sheet {
         seen
     }
 
-    /// Returns the colours without any shadow, but for those at edges of shadows, and those that few views show, if there are
-    /// others.
+    /// Returns the colours without any shadow, but for those at edges of shadows, and those that few views show, if
+    /// there are others.
     pub(super) fn lit(&self, shadows: Option<&Shadows>) -> Vec<Option<DVec3>> {
         let cells = 0..self.colours.len();
         let before = |index: usize| shadows.map_or(DVec3::ONE, |shadows| shadows.before(index));
@@ -206,8 +207,8 @@ impl Sheet {
     }
 
     /// Returns a colour for each cell: where none is known, the smoothest continuation (each the mean of its four
-    /// neighbours, free cells left out) of what a pattern leaves, with the pattern; all without shadows. `None` without any
-    /// known colour.
+    /// neighbours, free cells left out) of what a pattern leaves, with the pattern; all without shadows. `None` without
+    /// any known colour.
     pub(super) fn continued(&self, shadows: Option<&Shadows>, pattern: Option<&Pattern>) -> Option<Vec<DVec3>> {
         let added = |index: usize| pattern.map_or(DVec3::ZERO, |pattern| pattern.at(self.place(index)));
         let added: Vec<DVec3> = (0..self.colours.len()).into_par_iter().map(added).collect();

@@ -53,8 +53,8 @@ impl Display for Setting {
 pub struct Verb(pub &'static str);
 
 impl Verb {
-    /// Formats the command with its arguments, in backticks: `labelgs photos PHOTOS -o SCENE`. In other programs it is the
-    /// command's name alone.
+    /// Formats the command with its arguments, in backticks: `labelgs photos PHOTOS -o SCENE`. In other programs it is
+    /// the command's name alone.
     pub fn with(self, arguments: impl Display) -> String {
         self.typed(SETTING_NAMES.get().is_some(), &arguments.to_string())
     }

@@ -144,8 +144,8 @@ fn relative_gains(samples: &[Vec<Sample>], points: usize, channel: usize) -> Vec
 mod tests {
     use super::relative_gains;
 
-    /// Photos in a row, each of which shares points with the next two: gains are relative to all photos, not to neighbours.
-    /// The pull to 1 does not count with as many points.
+    /// Photos in a row, each of which shares points with the next two: gains are relative to all photos, not to
+    /// neighbours. The pull to 1 does not count with as many points.
     #[test]
     fn gains_of_a_chain_are_those_that_made_it() {
         let gains = [0.7_f64, 0.75, 0.8, 1.0, 1.2, 1.3, 1.4];

@@ -54,7 +54,8 @@ const FEWER_COMMON_ATTEMPT: Attempt = Attempt {
 const PAIRED_MAX: usize = 200;
 /// Photos of a side of a block of pairs, COLMAP's default.
 const PAIR_BLOCK_PHOTOS: usize = 50;
-/// Fewest points of three photos for each placed photo with which the others are left out. A handful of photos has fewer.
+/// Fewest points of three photos for each placed photo with which the others are left out. A handful of photos has
+/// fewer.
 const SURE_POINTS_MIN: usize = 10;
 
 /// A model that COLMAP found.
@@ -176,8 +177,8 @@ fn set_gpu(workshop: &Workshop, options: &Options, command: &mut Command, groups
     options.set(command, groups, ("use_gpu", if workshop.request.gpu { "1" } else { "0" }));
 }
 
-/// Leaves out points that only two photos share: of faint features these are often wrong, beside the cameras, where they
-/// become floaters. Then the poses are found by the rest.
+/// Leaves out points that only two photos share: of faint features these are often wrong, beside the cameras, where
+/// they become floaters. Then the poses are found by the rest.
 fn with_sure_points(workshop: &mut Workshop, found: Found) -> Result<Found> {
     let (sure, adjusted) = (workshop.make_folder("sure")?, workshop.make_folder("adjusted")?);
     let mut command = workshop.command("point_filtering");

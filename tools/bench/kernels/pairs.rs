@@ -1,6 +1,6 @@
-//! Accuracy of the gradient of a (pixel, splat) pair with respect to its opacity: of the device, which carries the light
-//! from behind as a sum, and of two f32 methods on the host, one with sums and one with differences between the total
-//! and the front.
+//! Accuracy of the gradient of a (pixel, splat) pair with respect to its opacity: of the device, which carries the
+//! light from behind as a sum, and of two f32 methods on the host, one with sums and one with differences between the
+//! total and the front.
 
 use crate::measure::{quantile, table};
 use glam::DMat3;

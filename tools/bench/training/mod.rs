@@ -31,8 +31,8 @@ pub struct Options {
     /// Another labelgs program to compare with, such as an earlier revision.
     #[arg(long, value_name = "PROGRAM")]
     against: Option<PathBuf>,
-    /// Scenes: plain, hard (built in), or FOLDER@PX with the longest side of a photo; with +MASKS, the name of a folder
-    /// in the scene, the training has labels.
+    /// Scenes: plain, hard (built in), or FOLDER@PX with the longest side of a photo; with +MASKS, the name of a
+    /// folder in the scene, the training has labels.
     #[arg(long, value_name = "SCENE,SCENE", value_delimiter = ',', default_values_t = ["plain".to_owned()])]
     scenes: Vec<String>,
     /// Steps of the trainings of this program.

@@ -1,5 +1,6 @@
-//! Scores of real captures as papers report them: every eighth photo is held out, several seeds, PSNR, SSIM and LPIPS of
-//! the clamped renders. With masks, the scores of labels too. Scores of other trainers stand beside them where known.
+//! Scores of real captures as papers report them: every eighth photo is held out, several seeds, PSNR, SSIM and LPIPS
+//! of the clamped renders. With masks, the scores of labels too. Scores of other trainers stand beside them where
+//! known.
 
 use super::rows::{Plan, Rows};
 use super::table::{Group, groups};
@@ -17,8 +18,8 @@ const OTHERS_CSV: &str = include_str!("../others.csv");
 pub struct Options {
     #[command(flatten)]
     common: Common,
-    /// Captures: FOLDER@PX, with the longest side of a photo; with +MASKS, the name of a folder in the capture, the training
-    /// has labels.
+    /// Captures: FOLDER@PX, with the longest side of a photo; with +MASKS, the name of a folder in the capture, the
+    /// training has labels.
     #[arg(value_name = "CAPTURE", required = true)]
     captures: Vec<String>,
     /// Seeds, each a training.

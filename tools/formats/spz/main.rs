@@ -24,7 +24,8 @@ fn unpack(from: &str, to: &str) -> Result<(), Box<dyn Error>> {
     let count = g.num_points as usize;
     let rest = g.spherical_harmonics.len() / count / 3;
     let columns = COLUMNS_BEFORE_SH.map(str::to_owned).into_iter();
-    let columns = columns.chain((0..3 * rest).map(|k| format!("f_rest_{k}"))).chain(COLUMNS_AFTER_SH.map(str::to_owned));
+    let columns =
+        columns.chain((0..3 * rest).map(|k| format!("f_rest_{k}"))).chain(COLUMNS_AFTER_SH.map(str::to_owned));
     let properties: String = columns.map(|name| format!("property float {name}\n")).collect();
     let header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n");
     let mut bytes = header.into_bytes();

@@ -30,8 +30,8 @@ pub struct ClickArgs {
     /// Mark a pixel that does not belong to the object. Repeatable.
     #[arg(long, value_name = "VIEW:x,y", value_parser = view_pixel, requires = "places")]
     pub not: Vec<ViewPixel>,
-    /// Label the object that a network finds in a box of a view: x0 <= x < x1 and y0 <= y < y1. You can combine it with
-    /// clicks on the same object.
+    /// Label the object that a network finds in a box of a view: x0 <= x < x1 and y0 <= y < y1. You can combine it
+    /// with clicks on the same object.
     #[arg(id = "area", long = "box", value_name = "VIEW:x0,y0,x1,y1", value_parser = view_box)]
     pub area: Option<ViewBox>,
     /// Folder of the segmentation network, as for `masks make`.

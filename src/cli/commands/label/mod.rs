@@ -58,8 +58,8 @@ pub struct LabelArgs {
     /// merged. Each Gaussian gets the label at its position, else the label of the nearest Gaussian. Needs no device.
     #[arg(long, value_name = "LABELLED", conflicts_with_all = ["views", "ClickArgs", "FileArgs", "strokes"])]
     pub like: Option<PathBuf>,
-    /// Label objects from strokes over photos, on objects and on background, listed in this file. Labels and names come
-    /// from the file; other labels are kept.
+    /// Label objects from strokes over photos, on objects and on background, listed in this file. Labels and names
+    /// come from the file; other labels are kept.
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["masks", "places"], help_heading = "Strokes")]
     pub strokes: Option<PathBuf>,
     /// How to label a Gaussian: by votes of all views, or as in the paper, by the last view in which it dominates a

@@ -37,7 +37,8 @@ pub struct RepairArgs {
     /// Treat the ids of each view as independent. Use it for masks of a single-image segmenter.
     #[arg(long)]
     pub per_view: bool,
-    /// Minimum number of views with a mask of an object; other objects are dropped. Default: 2, or 3 with nested masks.
+    /// Minimum number of views with a mask of an object; other objects are dropped. Default: 2, or 3 with nested
+    /// masks.
     #[arg(long, value_name = "N")]
     pub min_views: Option<usize>,
     /// Also make masks for photos without one, except held-out photos.
@@ -46,7 +47,8 @@ pub struct RepairArgs {
     /// Near plane, world units; closer Gaussians are ignored. Default: the value of the model's run, else 0.2.
     #[arg(long, value_name = "Z", value_parser = near, help_heading = "Rendering")]
     pub near: Option<f32>,
-    /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their outlines.
+    /// How the scene is read. Masks of test views decide nothing; they get the ids of the objects and keep their
+    /// outlines.
     #[command(flatten)]
     pub reading: SceneArgs,
 }

@@ -183,8 +183,8 @@ fn measure(trainer: &mut Trainer, window: Window, context: &Context) -> Result<M
     Ok(Measurement { clocks, reports, times, counted, gaussians })
 }
 
-/// Runs further steps as in a training: without timestamps, and with as many in flight as there are frames. The clock ends
-/// after the last of them.
+/// Runs further steps as in a training: without timestamps, and with as many in flight as there are frames. The clock
+/// ends after the last of them.
 fn in_the_pipeline(
     trainer: &mut Trainer,
     window: Window,

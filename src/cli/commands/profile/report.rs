@@ -144,8 +144,8 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// Makes a profile of steps on `views` views. The times of a recording's first run, in which drivers compile, are left
-    /// out.
+    /// Makes a profile of steps on `views` views. The times of a recording's first run, in which drivers compile, are
+    /// left out.
     pub(crate) fn new(gpu: &Gpu, workers: Option<Workers>, window: Window, views: usize, found: Measurement) -> Self {
         let Measurement { clocks, reports, mut times, counted, gaussians } = found;
         let (device, shape) = (gpu.capabilities(), KernelShape::for_device(gpu.capabilities()));

@@ -49,8 +49,8 @@ fn filled_plane(plane: fn(DVec3) -> [f64; 3]) -> (Gaussians, usize) {
     (fill(&whole, &[1], &sights, None).expect("filled").model, rest)
 }
 
-/// Fills the place of the dome on a plane, and returns the root of the mean squared error of the new colours, and that of
-/// their mean.
+/// Fills the place of the dome on a plane, and returns the root of the mean squared error of the new colours, and that
+/// of their mean.
 fn errors(plane: fn(DVec3) -> [f64; 3]) -> [f64; 2] {
     let (filled, rest) = filled_plane(plane);
     let new: Vec<usize> = (rest..filled.len()).collect();
