@@ -173,7 +173,12 @@ fn measure(plan: &Plan, build: u32, judge: &Path) -> Result<Row> {
     let lpips = plan.lpips.map(text);
     args.extend(lpips.iter().flat_map(|weights| ["--lpips", weights.as_str()]));
     let record = folder.path().join("run").join("run.json");
-    let record = parse(&fs::read_to_string(&record).map_err(Error::read(&record))?)?;
+    // Programs of earlier revisions write none.
+    let record = if record.is_file() {
+        parse(&fs::read_to_string(&record).map_err(Error::read(&record))?)?
+    } else {
+        Value::Null
+    };
     let scores = parse(&program(judge, &args)?)?;
     let mean = |key: &str| scores["mean"][key].as_f64();
     let needed = |found: Option<f64>, key: &str| found.ok_or_else(|| Error::Check(format!("eval gives no {key}")));
