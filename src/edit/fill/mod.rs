@@ -42,11 +42,14 @@ pub const SIGHT_SIDE: u32 = 640;
 const RING_DIAGONAL_SHARE: f64 = 0.25;
 /// Least width of that ring, in cells.
 const RING_CELLS_MIN: f64 = 8.0;
-/// Width of the ring in which a pattern is looked for, in the same measures, the length of the object that counts
-/// there, in its widths, and the root of the number of cells.
-const PATTERN_RING: (f64, f64) = (0.75, 96.0);
-const LENGTH_OF_WIDTH: f64 = 2.0;
-const PATTERN_CELLS: f64 = 192.0;
+/// Width of the ring in which a pattern is looked for, as a share of the object's diagonal.
+const PATTERN_RING_DIAGONAL_SHARE: f64 = 0.75;
+/// Least width of that ring, in cells.
+const PATTERN_RING_CELLS_MIN: f64 = 96.0;
+/// Longest diagonal that counts for that ring, in widths of the object.
+const PATTERN_DIAGONAL_WIDTHS_MAX: f64 = 2.0;
+/// Most cells along a side of a square of the area of the object with that ring.
+const PATTERN_SIDE_CELLS_MAX: f64 = 192.0;
 /// Fewest cells of a hole in which a pattern goes on: the search takes time, and in fewer it cannot be told.
 const PATTERN_HOLE_MIN: usize = 81;
 /// Radius of the largest Gaussian that throws a shadow, as a share of the object's diagonal.
@@ -133,6 +136,16 @@ impl<'a> Blockers<'a> {
     }
 }
 
+/// What a pattern is looked for in.
+struct Surroundings {
+    sheet: Sheet,
+    shadows: Option<Shadows>,
+    /// Colours without shadows.
+    lit: Vec<Option<DVec3>>,
+    /// The same without what changes slowly.
+    detail: Vec<Option<DVec3>>,
+}
+
 /// What all views show, and whose shadows.
 struct Seen<'a> {
     removed: &'a [u32],
@@ -151,6 +164,15 @@ impl Seen<'_> {
         (sheet, shadows)
     }
 
+    /// Looks at the surroundings of a place in which a pattern may be.
+    fn surroundings(&self, place: &Place, surface: (Plane, u32)) -> Surroundings {
+        let (wide, cell) = place.wide();
+        let (sheet, shadows) = self.look(&wide, surface, cell);
+        let lit = sheet.lit(shadows.as_ref());
+        let detail = sheet.detail(&lit);
+        Surroundings { sheet, shadows, lit, detail }
+    }
+
     /// Continues a surface where a removed object was.
     fn close(&self, place: &Place, surface: (Plane, u32), filled: &mut Filled, is_lit: &mut [bool]) {
         let (sheet, shadows) = self.look(place, surface, place.cell);
@@ -161,20 +183,17 @@ impl Seen<'_> {
         if holes.is_empty() {
             return;
         }
-        let (wide, cell) = place.wide();
-        let found = (holes.len() >= PATTERN_HOLE_MIN).then(|| self.look(&wide, surface, cell));
-        let lit = found.as_ref().map_or_else(Vec::new, |(around, shadows)| around.lit(shadows.as_ref()));
-        let detail = found.as_ref().map_or_else(Vec::new, |(around, _)| around.detail(&lit));
-        let pattern = found.as_ref().and_then(|(around, _)| Pattern::of(around, &lit, &detail));
+        let around = (holes.len() >= PATTERN_HOLE_MIN).then(|| self.surroundings(place, surface));
+        let pattern = around.as_ref().and_then(|around| Pattern::of(&around.sheet, &around.lit, &around.detail));
         let painted = sheet.painted(&holes, shadows.as_ref(), pattern.as_ref());
         if painted.is_empty() {
             return;
         }
         // Flat ones close the gaps between copies.
         let mut new = flat(&filled.model, (&sheet.plane, place.cell), &painted, sheet.label);
-        if let (Some(pattern), Some((around, shadows))) = (&pattern, &found) {
-            let target = Target { sheet: &sheet, holes: &holes, shadows: shadows.as_ref() };
-            new.append(Sources::of(around, pattern).copies(&filled.model, is_lit.len(), &target));
+        if let (Some(pattern), Some(around)) = (&pattern, &around) {
+            let target = Target { sheet: &sheet, holes: &holes, shadows: around.shadows.as_ref() };
+            new.append(Sources::of(&around.sheet, pattern).copies(&filled.model, is_lit.len(), &target));
         }
         *filled.added.entry(sheet.label).or_default() += new.len() as u64;
         filled.model.append(new);
@@ -244,10 +263,10 @@ impl Place {
         let mut sides = (self.high - self.low).to_array();
         sides.sort_unstable_by(f64::total_cmp);
         // Along a long thin object, as much as across it is enough.
-        let size = self.size().min(LENGTH_OF_WIDTH * sides[1]);
-        let ring = (PATTERN_RING.0 * size).max(PATTERN_RING.1 * self.cell);
+        let size = self.size().min(PATTERN_DIAGONAL_WIDTHS_MAX * sides[1]);
+        let ring = (PATTERN_RING_DIAGONAL_SHARE * size).max(PATTERN_RING_CELLS_MIN * self.cell);
         let area = (sides[1] + 2.0 * ring) * (sides[2] + 2.0 * ring);
-        let cell = self.cell.max(area.sqrt() / PATTERN_CELLS);
+        let cell = self.cell.max(area.sqrt() / PATTERN_SIDE_CELLS_MAX);
         (Self { ring, tree: Arc::clone(&self.tree), discs: Vec::new(), ..*self }, cell)
     }
 
