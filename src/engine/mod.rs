@@ -62,7 +62,7 @@ pub struct Engine {
     passes: u32,
     /// Walks per tile with which label maps start; grows to the number needed so far.
     label_rounds: u32,
-    /// Stamp of the last submit, never 0.
+    /// Stamp of the last submit; 0 before the first.
     stamp: u32,
     last_frame: usize,
     /// Frames with an unread report.

@@ -8,6 +8,8 @@ use crate::support::device;
 use crate::support::mutants::{Family, mutants};
 use crate::support::scenes::{Shape, scene};
 use labelgs::pass::GroupBlend;
+use labelgs::scheduler::plan::Buf;
+use labelgs::shaders::structs::StepUniforms;
 use labelgs::verify::selftest::judge;
 
 /// Errors of all passes add up; 0.89 of (1e-6, 5e-5) seen by element, 0.15 of (1e-5, 1e-10) as a whole.
@@ -33,6 +35,9 @@ fn case_of(form: Option<GroupBlend>, name: &str, (seed, shape, labels): (u64, &S
     let mut fixture = Fixture::blending(turn, scene(seed, shape), labels, form);
     let report = fixture.train();
     let actual = fixture.gradient_rows();
+    // Records carry the stamp as a float, and a device may replace subnormal floats by 0.
+    let [uniforms] = fixture.get::<StepUniforms>(Buf::STEP, 1)[..] else { panic!("no uniforms") };
+    assert!(f32::from_bits(uniforms.stamp).is_normal(), "stamp {:#x}", uniforms.stamp);
     let (model, camera, mut target) = (fixture.model(), fixture.scene.camera.clone(), fixture.scene.target.clone());
     if !labels {
         target.slots.clear();
