@@ -137,6 +137,8 @@ pub(super) struct Features {
     pub(super) full_subgroups: bool,
     pub(super) statistics: bool,
     pub(super) narrow_storage: bool,
+    /// Subgroups reconverge in flow that is uniform for them (`uniform_flow`).
+    pub(super) uniform_flow: bool,
 }
 
 /// Properties and features of a device.

@@ -7,13 +7,14 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const HIDEABLE_FEATURES: [&str; 9] = [
+const HIDEABLE_FEATURES: [&str; 10] = [
     "memory_model",
     "timeline",
     "robust",
     "size_control",
     "full_subgroups",
     "narrow_storage",
+    "uniform_flow",
     "shuffle",
     "timestamps",
     "transfer",
@@ -47,6 +48,7 @@ impl HiddenFeatures {
         features.size_control &= !self.has("size_control");
         features.full_subgroups &= !self.has("full_subgroups");
         features.narrow_storage &= !self.has("narrow_storage");
+        features.uniform_flow &= !self.has("uniform_flow");
     }
 
     pub(super) fn subgroup(&self, subgroup: &mut Subgroup) {

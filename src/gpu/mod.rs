@@ -25,6 +25,7 @@ mod query;
 mod select;
 mod statistics;
 mod timeline;
+mod uniform_flow;
 
 pub use cache::PipelineStore;
 pub use capabilities::{Capabilities, DeviceKind, Requirement, Subgroup};

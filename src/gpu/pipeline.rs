@@ -1,7 +1,7 @@
 //! Compute pipelines.
 
 use super::call::vk_call;
-use super::{Gpu, lock, packed};
+use super::{Gpu, lock, packed, uniform_flow};
 use crate::error::{Error, Result};
 use crate::shaders::{BindingKind, PUSHED_WORDS, ShaderDesc};
 use ash::vk;
@@ -154,6 +154,9 @@ impl Pipeline {
         if !windows.is_empty() {
             let shared = packed::repack(&words, shader.bindings, windows);
             words = shared.map_err(|what| Error::Bug(format!("{} cannot share bindings: {what}", shader.name)))?;
+        }
+        if shader.uses_subgroups && gpu.capabilities.features.uniform_flow {
+            uniform_flow::declare(&mut words);
         }
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the SPIR-V comes from the shader compiler of the build.

@@ -29,7 +29,8 @@ impl Capabilities {
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
         let hidden = HiddenFeatures::from_env()?;
         let statistics = has(ash::khr::pipeline_executable_properties::NAME);
-        let mut features = features(instance, physical, has_size_control, statistics);
+        let has_flow = has(ash::khr::shader_subgroup_uniform_control_flow::NAME);
+        let mut features = features(instance, physical, (has_size_control, has_flow), statistics);
         hidden.features(&mut features);
         let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
         let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
@@ -88,10 +89,16 @@ fn version_parts(version: u32) -> (u32, u32, u32) {
 }
 
 /// Queries the known features of the device.
-fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control: bool, statistics: bool) -> Features {
+fn features(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    (size_control, uniform_flow): (bool, bool),
+    statistics: bool,
+) -> Features {
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
     let mut storage = vk::PhysicalDevice16BitStorageFeatures::default();
+    let mut flow = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default();
     // SAFETY: the handle belongs to this instance.
     let version = unsafe { instance.get_physical_device_properties(physical) }.api_version;
     let mut all = vk::PhysicalDeviceFeatures2::default();
@@ -100,6 +107,9 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
     }
     if size_control {
         all = all.push_next(&mut control);
+    }
+    if uniform_flow {
+        all = all.push_next(&mut flow);
     }
     // SAFETY: the device's version and extensions support the chained structs.
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
@@ -113,6 +123,7 @@ fn features(instance: &ash::Instance, physical: vk::PhysicalDevice, size_control
         full_subgroups: on(control.compute_full_subgroups),
         statistics,
         narrow_storage: on(storage.storage_buffer16_bit_access),
+        uniform_flow: on(flow.shader_subgroup_uniform_control_flow),
     }
 }
 

@@ -144,6 +144,11 @@ pub(super) fn open(
     if capabilities.size_control_is_extension {
         extensions.push(ash::ext::subgroup_size_control::NAME.as_ptr());
     }
+    let mut flow = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR::default()
+        .shader_subgroup_uniform_control_flow(true);
+    if features.uniform_flow {
+        extensions.push(ash::khr::shader_subgroup_uniform_control_flow::NAME.as_ptr());
+    }
     let mut executables =
         vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
     if options.statistics {
@@ -162,6 +167,9 @@ pub(super) fn open(
     }
     if features.narrow_storage {
         info = info.push_next(&mut storage);
+    }
+    if features.uniform_flow {
+        info = info.push_next(&mut flow);
     }
     if options.statistics {
         info = info.push_next(&mut executables);
