@@ -98,6 +98,13 @@ impl Subgroup {
         self.is_certain && self.has_size() && self.has_operations()
     }
 
+    /// Returns the size to use where a driver offers `min` to `max` and reports `default`. A device that compiles a
+    /// kernel for 8 lanes or for 32 has fewer registers per lane in the wider form: 32 spill, 16 fit.
+    pub fn preferred_size(default: u32, min: u32, max: u32) -> u32 {
+        let is_flexible = min <= OWN_SUBGROUP_MIN && max >= 32;
+        if is_flexible { 16 } else { default.clamp(min, max) }
+    }
+
     /// Emulates subgroups. A CPU keeps its vector width.
     pub(super) fn emulate(&mut self, is_cpu: bool) {
         (self.is_emulated, self.min, self.max) = (true, SUBGROUP_MIN, SUBGROUP_MAX);

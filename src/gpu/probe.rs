@@ -221,7 +221,7 @@ fn subgroup(
         false => (size, size),
     };
     Subgroup {
-        size: size.clamp(min, max),
+        size: Subgroup::preferred_size(size, min, max),
         min,
         max,
         max_per_group: if is_pinned { control.max_compute_workgroup_subgroups } else { u32::MAX },

@@ -2,14 +2,14 @@
 //! report.
 
 use crate::support::device::device;
-use labelgs::gpu::{Capabilities, DeviceKind};
+use labelgs::gpu::{Capabilities, DeviceKind, Subgroup};
 use labelgs::pass::{KernelShape, Update};
 
 /// Limits of a family.
 struct Family {
     name: &'static str,
-    /// Invocations of its subgroups; `false` if no pipeline can pin them.
-    subgroup: (u32, bool),
+    /// Invocations of its subgroups: the default, the least and the most; `false` if no pipeline can pin them.
+    subgroup: ([u32; 3], bool),
     /// Bytes of shared memory, and invocations of a workgroup.
     shared: u32,
     invocations: u32,
@@ -18,19 +18,19 @@ struct Family {
 
 /// The AMD rows are Mesa's own, which compiles here; others are what drivers have reported in public.
 const FAMILIES: [Family; 8] = [
-    family("NVIDIA", (32, true), 48 << 10, 1024, 1 << 20),
-    family("AMD, RDNA (Mesa)", (32, true), 64 << 10, 1024, 8_388_606),
-    family("AMD, GCN (Mesa)", (64, true), 64 << 10, 1024, 8_388_606),
-    family("Intel (Mesa)", (32, true), 64 << 10, 1024, 64),
-    family("Apple (MoltenVK)", (32, true), 32 << 10, 1024, 31),
-    family("Qualcomm Adreno", (64, false), 32 << 10, 1024, 24),
-    family("Arm Mali", (16, true), 32 << 10, 512, 35),
-    family("least that Vulkan has", (4, false), 16 << 10, 128, 4),
+    family("NVIDIA", ([32, 32, 32], true), 48 << 10, 1024, 1 << 20),
+    family("AMD, RDNA (Mesa)", ([64, 32, 64], true), 64 << 10, 1024, 8_388_606),
+    family("AMD, GCN (Mesa)", ([64, 64, 64], true), 64 << 10, 1024, 8_388_606),
+    family("Intel (Mesa)", ([32, 8, 32], true), 64 << 10, 1024, 64),
+    family("Apple (MoltenVK)", ([32, 32, 32], true), 32 << 10, 1024, 31),
+    family("Qualcomm Adreno", ([64, 64, 128], false), 32 << 10, 1024, 24),
+    family("Arm Mali", ([16, 16, 16], true), 32 << 10, 512, 35),
+    family("least that Vulkan has", ([4, 4, 4], false), 16 << 10, 128, 4),
 ];
 
 const fn family(
     name: &'static str,
-    subgroup: (u32, bool),
+    subgroup: ([u32; 3], bool),
     shared: u32,
     invocations: u32,
     storage_buffers: u32,
@@ -42,15 +42,14 @@ impl Family {
     fn capabilities(&self, of: &Capabilities) -> Capabilities {
         let mut own = of.clone();
         own.kind = DeviceKind::Discrete;
-        let (limits, (size, is_pinned)) = (&mut own.limits, self.subgroup);
+        let (limits, ([default, min, max], is_pinned)) = (&mut own.limits, self.subgroup);
         limits.max_shared = self.shared;
         limits.max_invocations = self.invocations;
         limits.max_group_size = [self.invocations, self.invocations, 64];
         limits.plan.max_storage_buffers = self.storage_buffers;
         limits.plan = limits.plan.packed();
         let is_emulated = !is_pinned;
-        let size = if is_emulated { 32 } else { size };
-        own.subgroup.size = size;
+        own.subgroup.size = if is_emulated { 32 } else { Subgroup::preferred_size(default, min, max) };
         (own.subgroup.is_emulated, own.subgroup.max_per_group) = (is_emulated, u32::MAX);
         own
     }
