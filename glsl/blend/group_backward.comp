@@ -194,12 +194,14 @@ void main() {
                 precise float e = ax + dy * (bx + r1.x * dy);
                 float raw = exp2(max(e, -20.0));
                 float alpha = min(ALPHA_MAX, raw);
-                alpha = e < LOG2_ALPHA_MIN || position > final_[k] ? 0.0 : alpha;
+                // Named, because a conditional operand that computes becomes a branch on some compilers.
+                bool is_faint = e < LOG2_ALPHA_MIN, is_behind = position > final_[k], is_opaque = raw >= ALPHA_MAX;
+                alpha = is_faint || is_behind ? 0.0 : alpha;
                 float light = r1.z * g0[k] + r1.w * g1[k] + blue * g2[k];
                 T[k] = T[k] / (1.0 - alpha);
                 float w = alpha * T[k];
-                float difference = light - behind[k];
-                float p = raw >= ALPHA_MAX ? 0.0 : w * difference;
+                float difference = light - behind[k], moved = w * difference;
+                float p = is_opaque ? 0.0 : moved;
                 behind[k] += alpha * difference;
                 float y = float(k) - middle;
                 m0 += p;
@@ -209,8 +211,8 @@ void main() {
                 vg += w * g1[k];
                 vb += w * g2[k];
 #ifdef CHANNEL
-                float more = differs(has[k], staged_channel[j], weight[k]) - wrong[k];
-                ml += raw >= ALPHA_MAX ? 0.0 : w * more;
+                float more = differs(has[k], staged_channel[j], weight[k]) - wrong[k], of_channel = w * more;
+                ml += is_opaque ? 0.0 : of_channel;
                 wrong[k] += alpha * more;
 #endif
             }

@@ -7,11 +7,14 @@
 // Work:    one workgroup per tile, jobs as in blend_forward; a lane has TILE_PIXELS / GROUP_LANES pixels. The scene's
 //          lists of more than LONG_LIST splats get one workgroup per chunk, which come first; the last to finish
 //          completes the tile. Object layers, pictures (main) and steps that record main splats (LIFT) have no such
-//          lists.
+//          lists. Variant products (group_products) runs before: it finds the transmittance of each chunk of a long
+//          list but the last, with which the chunks can be processed at once.
 // Reads:   as blend_forward; variant disagreement: target [P]; view_labels [P]; labels [N]; gaussian_from_splat [V];
 //          variant depth: depths [P]; except in variant main: long_chunks [counters.long_chunk_count], first_lists
-//          [counters.first_list_count]; chunk_states, w, what a chunk of a long list lets through (group_products)
-// Writes:  as blend_forward; except in variant main: chunk_jobs [slots], the job of each chunk with work for
+//          [counters.first_list_count]; chunk_states, w, what a chunk of a long list lets through (products)
+// Writes:  variant products: chunk_states, w: the transmittance of a chunk, 0 if it is below TRANSMITTANCE_MIN; in the
+//          tiles of long lists, last and the w of image: 0; chunk_jobs: 0 in their first slots;
+//          others: as blend_forward; except in variant main: chunk_jobs [slots], the job of each chunk with work for
 //          group_backward; chunk_states [states, pixels of a tile] at the end of each chunk but the last: the light
 //          from behind and the transmittance; variants disagreement, depth: chunk_channel [slots, pixels of a tile],
 //          the channel from behind; variant disagreement: disagreement [T]
@@ -32,7 +35,11 @@ FETCHU(4, instance_from_sorted);
 FETCH4(5, splats);
 FETCHU(19, splat_from_instance);
 layout(constant_id = 15) const uint GROUP_LANES = 128;
-layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs
+#ifdef PRODUCTS
+const uint COUNTS = 0;
+#else
+layout(constant_id = 17) const uint COUNTS = 0; // 1: count contributing pairs, and tests and hits of subgroups
+#endif
 #ifdef MAIN
 WRITE(6, vec4, image);
 WRITE(7, uint, last);
@@ -46,7 +53,9 @@ INOUT_SHARED(7, uint, last);
 INOUT(20, uint, chunk_jobs);
 INOUT_SHARED(21, vec4, chunk_states);
 READ(23, uvec2, long_chunks);
+#ifndef PRODUCTS
 READ(24, uint, first_lists);
+#endif
 #endif
 #ifdef LABELS
 FETCHU(8, layer_tiles);
@@ -98,6 +107,14 @@ void main() {
         return;
     }
     TileJob t = work.t;
+#ifdef PRODUCTS
+    if (work.chunk == 0u) {
+        clear_list(work, u);
+    }
+    if (work.to == work.end) {
+        return; // nothing is behind the last chunk
+    }
+#endif
     float p[ROWS], T[ROWS];         // product within the chunk, negative where the pixel takes no more; T at its start
     vec3 light[ROWS], before[ROWS]; // of the chunk, over that T; and of those before it
     uint final_[ROWS];
@@ -120,7 +137,9 @@ void main() {
 #endif
         p[k] = inside ? 1.0 : -1.0;
         T[k] = 1.0;
+#ifndef PRODUCTS
         start_part(work, k, p[k], T[k]);
+#endif
         light[k] = before[k] = vec3(0.0);
         final_[k] = 0u;
 #ifdef ONE_IS_MAIN
@@ -137,7 +156,7 @@ void main() {
     barrier();
 
     bool is_live = true;
-    uint walked = 0u, contributing = 0u, kept = 0u;
+    uint walked = 0u, contributing = 0u, kept = 0u, tested = 0u, hit = 0u;
     for (uint base = work.from; base < work.to; base += BATCH) {
         if (!some_live(subgroup_max(most_of(p)) > 0.0, is_live)) {
             break;
@@ -156,6 +175,10 @@ void main() {
         for (uint c = 0u; c < count; c += SUBGROUP_SIZE) {
             uint own = min(c + subgroup_lane(), count - 1u);
             uvec2 hits = hits_of(is_live && touches(own), min(count - c, SUBGROUP_SIZE));
+            if (COUNTS != 0u) {
+                tested += is_live ? min(count - c, SUBGROUP_SIZE) : 0u;
+                hit += bitCount(hits.x) + bitCount(hits.y);
+            }
             while (some(hits)) {
                 uint j = c + take_first(hits), position = base - work.start + j + 1u;
                 vec4 r0 = staged_0[j], r1 = staged_1[j], r2 = staged_2[j];
@@ -170,9 +193,11 @@ void main() {
                     precise float q = p[k] * (1.0 - alpha);
                     precise float next = T[k] * q;
                     bool takes = next >= TRANSMITTANCE_MIN;
-                    float w = takes ? alpha * p[k] : 0.0;
+                    // Named, because a conditional operand that computes becomes a branch on some compilers.
+                    float taken = alpha * p[k], stopped = -abs(p[k]);
+                    float w = takes ? taken : 0.0;
                     light[k] += vec3(r1.zw, r2.x) * w;
-                    p[k] = takes ? q : -abs(p[k]);
+                    p[k] = takes ? q : stopped;
                     final_[k] = w > 0.0 ? position : final_[k];
                     contributing += COUNTS != 0u && w > 0.0 ? 1u : 0u;
 #ifdef ONE_IS_MAIN
@@ -190,6 +215,7 @@ void main() {
                 }
             }
         }
+#ifndef PRODUCTS
         uint behind = base + BATCH;
         if (behind < work.to && (behind - work.start) % CHUNK_LENGTH == 0u) {
             [[unroll]] for (uint k = 0u; k < ROWS; k++) {
@@ -199,12 +225,22 @@ void main() {
             }
             kept++;
         }
+#endif
     }
+#ifdef PRODUCTS
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        chunk_states[state_of(work, work.chunk, k)].w = max(p[k], 0.0);
+    }
+#else
     if (lane == 0u && walked > 0u) {
         atomicAdd(counters.walked_first, walked);
     }
     if (COUNTS != 0u) {
         atomicAdd(counters.contributing_pairs, contributing);
+        if (subgroup_lane() == 0u) {
+            atomicAdd(counters.tested_splats, tested);
+            atomicAdd(counters.hit_splats, hit);
+        }
     }
 
     if (!finish_walk(work, kept, p, T, light, before, final_, u, channel)) {
@@ -244,4 +280,5 @@ void main() {
 #endif
         }
     }
+#endif
 }

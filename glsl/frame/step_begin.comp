@@ -49,7 +49,7 @@ void main() {
         return;
     }
 #endif
-    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
+    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
     uint n = step.gaussian_count;
     put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
     put(ARGS_SH1, folded_groups((n * 2u + 63u) / 64u));

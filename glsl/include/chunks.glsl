@@ -2,7 +2,8 @@
 // workgroup of a list in parts. Nothing in variant main.
 
 #ifndef MAIN
-shared uint parts_here, deepest;
+#include "arrival.glsl"
+shared uint deepest;
 #endif
 
 #ifdef CHANNEL
@@ -85,6 +86,23 @@ void look_behind(Work work, uint kept, uint k, vec3 light, float transmittance, 
 #endif
 }
 
+#ifdef PRODUCTS
+// Prepares what the parts of a list add to.
+void clear_list(Work work, StepUniforms u) {
+    TileJob t = work.t;
+    [[unroll]] for (uint k = 0u; k < ROWS; k++) {
+        if (t.x < u.width && t.y0 + k < u.height) {
+            uint pixel = (t.y0 + k) * u.width + t.x;
+            last[pixel] = 0u;
+            image[pixel].w = 0.0;
+        }
+    }
+    if (gl_LocalInvocationID.x == 0u) {
+        chunk_jobs[work.start / CHUNK_LENGTH + work.job] = 0u;
+    }
+}
+#endif
+
 #ifndef MAIN
 // Stores pixel k of a part. Values without a state slot are stored in the picture: the light of the last chunk, and the
 // final transmittance from the chunk in which the pixel stops or the list ends. Components are written separately,
@@ -111,18 +129,6 @@ void put_part(Work work, uint k, vec3 light, float transmittance, bool stops, ui
 #ifdef CHANNEL
     chunk_channel[channel_state_of(work, work.chunk, k)] = channel.sum[k];
 #endif
-}
-
-// True in the last workgroup of a list that calls this, which then sees all writes.
-bool all_are_here(uint first_slot, uint chunks) {
-    memoryBarrierBuffer();
-    barrier();
-    if (gl_LocalInvocationID.x == 0u) {
-        parts_here = atomicAdd(chunk_jobs[first_slot], 1u) + 1u;
-    }
-    barrier();
-    memoryBarrierBuffer();
-    return parts_here == chunks;
 }
 
 // Loads what the parts stored for pixel k, as if this workgroup had processed them all: the states between them, the
@@ -152,7 +158,7 @@ void take_parts(Work work, uint kept, uint k, inout vec3 before, inout vec3 ligh
 #endif
 
 // Sets pixel k's transmittance at the start of a part: the product of the transmittances of all earlier chunks
-// (group_products.comp). It decreases from chunk to chunk, so if it is too low, the pixel has stopped before.
+// (variant products). It decreases from chunk to chunk, so if it is too low, the pixel has stopped before.
 void start_part(Work work, uint k, inout float p, inout float transmittance) {
 #ifndef MAIN
     for (uint e = 0u; e < work.chunk; e++) {
@@ -179,7 +185,8 @@ bool finish_walk(Work work, inout uint kept, inout float p[ROWS], inout float T[
 #ifndef MAIN
     if (work.is_part) {
         kept = (work.end - work.start - 1u) / CHUNK_LENGTH;
-        if (!all_are_here(work.start / CHUNK_LENGTH + work.job, kept + 1u)) {
+        arrive(chunk_jobs[work.start / CHUNK_LENGTH + work.job]);
+        if (arrived_before < kept) {
             return false;
         }
         [[unroll]] for (uint k = 0u; k < ROWS; k++) {

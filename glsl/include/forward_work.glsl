@@ -1,5 +1,5 @@
 // The work of a forward workgroup on GPUs: a list, or a chunk of a long list. Chunks of long lists come first, then
-// the next longest lists (long_lists.glsl), then the other lists in order.
+// the next longest lists (long_lists.glsl), then the other lists in order. Variant products has chunks only.
 
 #ifdef MAIN
 const bool HAS_PARTS = false;
@@ -19,9 +19,12 @@ struct Work {
 
 // False for a workgroup without work.
 bool find_work(StepUniforms u, out Work work) {
-    uint parts = HAS_PARTS ? counters.long_chunk_count : 0u;
-    uint before_others = HAS_PARTS ? parts + counters.first_list_count : 0u;
-    uint groups = before_others + job_count(u), group = linear_group_id();
+    uint parts = HAS_PARTS ? counters.long_chunk_count : 0u, firsts = 0u, others = 0u, group = linear_group_id();
+#ifndef PRODUCTS
+    firsts = HAS_PARTS ? counters.first_list_count : 0u;
+    others = job_count(u);
+#endif
+    uint before_others = parts + firsts, groups = before_others + others;
     if (group >= groups) {
         return false;
     }
@@ -34,9 +37,12 @@ bool find_work(StepUniforms u, out Work work) {
         uvec2 part = long_chunks[group];
         work.job = part.x;
         work.chunk = part.y;
-    } else if (group < before_others) {
+    }
+#ifndef PRODUCTS
+    if (!work.is_part && group < before_others) {
         work.job = first_lists[group - parts];
     }
+#endif
 #endif
     uint virtual_tile;
     work.t = locate_job(work.job, u, virtual_tile);

@@ -10,7 +10,7 @@
 //
 // The forward pass processes a list chunk by chunk. The transmittance is the product of all earlier chunks'
 // transmittances, times the transmittance within the chunk, so long lists can be processed by one workgroup per chunk
-// (group_products.comp) with the same bits.
+// (variant products of group_forward.comp) with the same bits.
 
 #include "subgroup.glsl"
 layout(constant_id = 1) const uint TILE_WIDTH = 16;

@@ -12,6 +12,7 @@
 
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_memory_scope_semantics : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_shuffle : require
@@ -23,7 +24,7 @@
 #define WRITE(number, T, name) STORAGE(number, writeonly) name##_block { T name[]; }
 #define INOUT(number, T, name) STORAGE(number, ) name##_block { T name[]; }
 
-// Also sees writes of other workgroups of the dispatch, after a memoryBarrierBuffer() of both.
+// Also sees writes of other workgroups of the dispatch that have arrived before (arrival.glsl).
 #define INOUT_SHARED(number, T, name) STORAGE(number, coherent) name##_block { T name[]; }
 
 #define READ1(number, T, name) STORAGE(number, readonly) name##_block { T name; }

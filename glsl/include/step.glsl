@@ -36,7 +36,7 @@ struct StepUniforms {
     float label_threshold;  // the lift needs at least this main weight
     uint gpf;               // 1: projection filter on
     uint occluder_words;    // words of occluder bits per layer
-    uint stamp;             // differs from step to step, never 0
+    uint stamp;             // differs from step to step; the bits of a normal float
     float adam_correction1, adam_correction2; // 1 / (1 - beta^t)
     float rate_scales, rate_quats, rate_sh0, rate_sh_rest;
     float densify_threshold, densify_scale, prune_scale, prune_opacity; // scales in world units
@@ -69,7 +69,8 @@ struct Counters {
     uint densified_count;   // Gaussians after densification
     uint walked_first, walked_second; // splats walked by tiles in blend_forward, in the first and second half
                             // of its workgroups; times the pixels per tile: pairs
-    uint contributing_pairs; // (pixel, splat) pairs with a weight; counted only on request
+    uint contributing_pairs; // (pixel, splat) pairs with a weight; counted only on request, as are
+    uint tested_splats, hit_splats; // splats that subgroups of the forward pass on GPUs tested, and did not skip
     uint ranges_groups, loss_groups; // workgroups of tile_ranges and of loss_tile that are done
     uint undecided_tiles;   // tiles whose label map needs another walk
     uint cloned_count, split_count, pruned_count;

@@ -7,7 +7,7 @@
 // Work:    LOSS_TILE x LOSS_TILE pixels per workgroup, one per invocation; a filter makes RUN values per invocation.
 //          The last workgroup sums the losses of all.
 // Reads:   step; image [P]; target [P] RGBA8 (pixels with alpha 0 are ignored; both pictures count as 0 there);
-//          variant labels: layer_loss [counters.layer_tile_count];
+//          variant labels: layer_loss [counters.layer_tile_count]; variant disagreement: disagreement [T];
 //          variant exposure: step_rows [ROW], the first row of the photo; shared_parameters [S]
 // Writes:  v_image [P] (rgb, 0); loss_partials [workgroups] (sum |x - y|, sum ssim); counters.loss_l1, loss_ssim,
 //          loss_label; variant exposure: exposure_partials [workgroups, EXPOSURE_ROWS] (r, g, b, 0)
@@ -30,6 +30,9 @@ INOUT(5, uint, loss_partials); // two floats of each workgroup
 #ifdef LABELS
 READ(6, float, layer_loss);
 #endif
+#ifdef DISAGREEMENT
+READ(6, float, disagreement);
+#endif
 #ifdef EXPOSURE
 READ(7, uint, step_rows);
 READ(8, vec4, shared_parameters);
@@ -37,6 +40,7 @@ WRITE(9, vec4, exposure_partials);
 #include "exposure.glsl"
 #endif
 #include "ssim.glsl"
+#include "arrival.glsl"
 
 const uint REACH = 5u; // px of a window on each side
 const uint TAPS = 2u * REACH + 1u;
@@ -50,7 +54,6 @@ const uint OUTER_CELLS = OUTER * OUTER_PITCH, MIDDLE_CELLS = MIDDLE * MIDDLE_PIT
 
 shared float cells[2u * OUTER_CELLS];    // a channel of both pictures; then three derivatives of SSIM
 shared vec4 rows[OUTER * MIDDLE_PITCH];  // moments, filtered along x; then derivatives, filtered along x
-shared uint finished;
 
 bool is_inside(ivec2 at) {
     return all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, ivec2(step.width, step.height)));
@@ -154,12 +157,9 @@ void finish(vec2 losses) {
     if (lane == 0u) {
         atomicExchange(loss_partials[2u * group], floatBitsToUint(losses.x));
         atomicExchange(loss_partials[2u * group + 1u], floatBitsToUint(losses.y));
-        memoryBarrierBuffer();
-        finished = atomicAdd(counters.loss_groups, 1u) + 1u;
-        memoryBarrierBuffer();
     }
-    barrier();
-    if (finished < groups) {
+    arrive(counters.loss_groups);
+    if (arrived_before + 1u < groups) {
         return;
     }
     vec3 sum = vec3(0.0);
@@ -172,6 +172,11 @@ void finish(vec2 losses) {
     uint count = min(counters.layer_tile_count, step.layer_tile_capacity);
     for (uint i = lane; i < count; i += LOSS_LANES) {
         sum.z += layer_loss[i];
+    }
+#endif
+#ifdef DISAGREEMENT
+    for (uint i = lane; i < step.tile_count; i += LOSS_LANES) {
+        sum.z += disagreement[i];
     }
 #endif
     sum = sum_of(sum);

@@ -27,6 +27,7 @@ WRITE(5, uint, tile_ends);
 WRITE(6, uint, layer_occupied);
 #else
 INOUT(7, uint, dispatch_args);
+#include "arrival.glsl"
 #include "count_args.glsl"
 #endif
 #ifdef PARTS
@@ -84,14 +85,9 @@ void main() {
     }
 #endif
 #ifndef LABELS
-    memoryBarrierBuffer();
-    barrier();
-    if (gl_LocalInvocationID.x == 0u) {
-        uint done = atomicAdd(counters.ranges_groups, 1u) + 1u;
-        memoryBarrierBuffer();
-        if (done == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
-            put_blend(0u, atomicMax(counters.longest_list, 0u));
-        }
+    arrive(counters.ranges_groups);
+    if (gl_LocalInvocationIndex == 0u && arrived_before + 1u == gl_NumWorkGroups.x * gl_NumWorkGroups.y) {
+        put_blend(0u, atomicMax(counters.longest_list, 0u));
     }
 #endif
 }

@@ -25,37 +25,39 @@ pub(super) fn long_list(b: &Builder) -> Option<u32> {
     Some(if has_some { length } else { u32::MAX })
 }
 
+/// A workgroup per list, or per chunk of a long list. With `products`, it finds what each such chunk lets through.
+fn group_forward(b: &mut Builder, pairs: Buf, main: bool, products: bool) {
+    let (walks, supervision) = (!products, b.supervision);
+    let (labels, (disagreement, depth)) = (walks && supervision.has_layers(), channels(supervision));
+    let group_lanes = b.shape.group_blend.map_or(0, |blend| b.shape.tile_pixels() / blend.forward_rows);
+    pass!(b, group_forward(labels: labels, main: main, disagreement: walks && disagreement, depth: walks && depth,
+        products: products) {
+        step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
+        instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
+        image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
+        main_gaussian: Buf::MAIN_GAUSSIAN,
+        main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
+        view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
+        label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
+        label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
+        labels: Buf::LABELS, disagreement: Buf::DISAGREEMENT, depths: Buf::DEPTHS,
+        chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES, chunk_channel: Buf::CHUNK_CHANNEL,
+        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
+    } [lift: supervision.lifts().into(), counts: b.counts.into(), group_lanes: group_lanes,
+        long_list: b.long_list.unwrap_or(u32::MAX)],
+        args(if products { constants::ARGS_PRODUCTS } else { constants::ARGS_WALK }));
+}
+
 fn forward(b: &mut Builder, pairs: Buf, main: bool) {
+    b.list.stage = Stage::BLEND_FORWARD;
+    if b.shape.group_blend.is_some() {
+        if b.long_list.is_some_and(|length| length < u32::MAX) {
+            group_forward(b, pairs, false, true);
+        }
+        return group_forward(b, pairs, main, false);
+    }
     let (segments, counts) = (b.segments(), b.counts);
     let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
-    b.list.stage = Stage::BLEND_FORWARD;
-    if let Some(blend) = b.shape.group_blend {
-        let (disagreement, depth) = channels(b.supervision);
-        let group_lanes = b.shape.tile_pixels() / blend.forward_rows;
-        if b.long_list.is_some_and(|length| length < u32::MAX) {
-            pass!(b, group_products {
-                step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-                instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-                long_chunks: Buf::LONG_CHUNKS, last: Buf::LAST, chunk_jobs: Buf::CHUNK_JOBS,
-                chunk_states: Buf::CHUNK_STATES,
-            } [group_lanes: group_lanes], args(constants::ARGS_PRODUCTS));
-        }
-        pass!(b, group_forward(labels: labels, main: main, disagreement: disagreement, depth: depth) {
-            step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            main_gaussian: Buf::MAIN_GAUSSIAN,
-            main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
-            view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
-            label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
-            label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
-            labels: Buf::LABELS, disagreement: Buf::DISAGREEMENT, depths: Buf::DEPTHS,
-            chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES, chunk_channel: Buf::CHUNK_CHANNEL,
-            long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
-        } [lift: lift.into(), counts: counts.into(), group_lanes: group_lanes,
-            long_list: b.long_list.unwrap_or(u32::MAX)], args(constants::ARGS_WALK));
-        return;
-    }
     for segment in 0..segments {
         pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
             step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,

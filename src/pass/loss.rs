@@ -37,11 +37,11 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 
 fn tiled_loss(b: &mut Builder, width: u32, height: u32) {
     let side = b.shape.loss_tile;
-    let macros = (b.supervision.has_layers(), b.exposure.is_some());
-    pass!(b, loss_tile(labels: macros.0, exposure: macros.1) {
+    let (labels, exposure) = (b.supervision.has_layers(), b.exposure.is_some());
+    pass!(b, loss_tile(labels: labels, disagreement: !labels && sums_all(b), exposure: exposure) {
         step: Buf::STEP, counters: Buf::COUNTERS, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
-        loss_partials: Buf::LOSS_PARTIALS, layer_loss: Buf::LAYER_LOSS, step_rows: Buf::STEP_ROWS,
-        shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
+        loss_partials: Buf::LOSS_PARTIALS, layer_loss: Buf::LAYER_LOSS, disagreement: Buf::DISAGREEMENT,
+        step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
     } [row: b.exposure.unwrap_or(0)], Grid::Groups(width.div_ceil(side), height.div_ceil(side), 1));
 }
 
@@ -82,8 +82,20 @@ fn over_pixels(b: &Builder, each: u64) -> Grid {
     Grid::Groups(groups.min(constants::FOLD), groups.div_ceil(constants::FOLD), 1)
 }
 
-/// Sums the loss. For label disagreement, it runs after the backward blend, which computes it.
-pub(super) fn reduce(b: &mut Builder) {
+/// True if the photo loss also sums the label disagreement, which the forward blend of GPUs computes.
+fn sums_all(b: &Builder) -> bool {
+    b.supervision == Supervision::Disagreement && b.shape.loss_tile > 0 && b.shape.group_blend.is_some()
+}
+
+/// Sums the loss with the label disagreement after the backward blend, which computes it, unless the photo loss does.
+pub(super) fn reduce_disagreement(b: &mut Builder) {
+    if b.supervision == Supervision::Disagreement && !sums_all(b) {
+        reduce(b);
+    }
+}
+
+/// Sums the loss.
+fn reduce(b: &mut Builder) {
     b.list.stage = Stage::LOSS;
     pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
         loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,

@@ -175,9 +175,7 @@ pub fn extended_step(
     loss::photo_loss(&mut b, variant.size.0, variant.size.1);
     extension.extend(passes, Hook::Loss, &mut b);
     blend::blend_backward(&mut b, pairs);
-    if variant.supervision == Supervision::Disagreement {
-        loss::reduce(&mut b);
-    }
+    loss::reduce_disagreement(&mut b);
     if b.late {
         update::update(&mut b, variant.update);
     } else {
