@@ -190,6 +190,11 @@ impl Capabilities {
         self.features.narrow_storage
     }
 
+    /// True if workgroups can hand plain data to others of their dispatch.
+    pub fn has_memory_model(&self) -> bool {
+        self.features.memory_model
+    }
+
     /// Sets the subgroup size from the options.
     pub(super) fn choose_subgroup(&mut self, options: &GpuOptions) -> Result<()> {
         if options.emulate_subgroups {

@@ -106,6 +106,28 @@ const GROUP_BLEND_SHARED: u32 = 8192;
 /// Minimum elements of texel buffers: 1 GiB of vec4. A smaller limit would restrict the model before memory does.
 const TEXELS_MIN: u64 = 1 << 26;
 
+/// A choice between two forms of kernels, the first for CPUs, the second for GPUs: the variable that makes it in a build
+/// with the feature `lab`, with its values; whether a GPU of this shape gets the second form otherwise; and the shape
+/// with the second form, or `None` if the device cannot run it.
+type Form =
+    (&'static str, [&'static str; 2], fn(&KernelShape) -> bool, fn(KernelShape, &Capabilities) -> Option<KernelShape>);
+
+/// All choices. Later ones see what earlier ones chose.
+const FORMS: [Form; 7] = [
+    ("LABELGS_LOSS", ["columns", "shared"], |_| true, KernelShape::with_loss_tiles),
+    ("LABELGS_PHOTOS", ["upload", "resident"], |_| true, |shape, _| Some(KernelShape { narrow_labels: true, ..shape })),
+    ("LABELGS_WALK", ["lane", "group"], |_| true, KernelShape::with_group_walks),
+    (
+        "LABELGS_KEYS",
+        ["wide", "narrow"],
+        |_| true,
+        |shape, device| device.has_narrow_storage().then_some(KernelShape { narrow_keys: true, ..shape }),
+    ),
+    ("LABELGS_BLEND", ["lane", "group"], |shape| !shape.emulated, KernelShape::with_group_blend),
+    ("LABELGS_UPDATE", ["split", "lazy"], |shape| shape.group_walks, KernelShape::with_lazy_updates),
+    ("LABELGS_SORT", ["lanes", "sweep"], |shape| !shape.emulated && shape.group_walks, KernelShape::with_sweeps),
+];
+
 impl KernelShape {
     /// Returns the shape for a device.
     pub fn for_device(device: &Capabilities) -> Self {
@@ -115,27 +137,10 @@ impl KernelShape {
         let has_texels = limits.max_texel_elements >= TEXELS_MIN && limits.max_texel_buffers >= most_texels;
         let texel = shape.texel && has_texels;
         let shape = Self { texel, emulated: device.subgroup.is_emulated, ..shape };
-        let is_card = !device.is_cpu();
-        let has_tiles = chosen("LABELGS_LOSS", ["columns", "shared"]).unwrap_or(is_card);
-        let shape = if has_tiles { shape.with_loss_tiles(device).unwrap_or(shape) } else { shape };
-        let narrow_labels = chosen("LABELGS_PHOTOS", ["upload", "resident"]).unwrap_or(is_card);
-        let group_walks = chosen("LABELGS_WALK", ["lane", "group"]).unwrap_or(is_card) && shape.can_look_back(device);
-        let narrow_keys = device.has_narrow_storage() && chosen("LABELGS_KEYS", ["wide", "narrow"]).unwrap_or(is_card);
-        let shape = Self { narrow_labels, group_walks, narrow_keys, ..shape };
-        let has_groups = chosen("LABELGS_BLEND", ["lane", "group"]).unwrap_or(is_card && !shape.emulated);
-        let shape = if has_groups { shape.with_group_blend(device).unwrap_or(shape) } else { shape };
-        let update = match lab::var("LABELGS_UPDATE").as_deref() {
-            Some("split") => Update::Split,
-            Some("fused") => Update::Fused,
-            Some("lazy") => Update::Lazy,
-            _ if is_card && group_walks => Update::Lazy,
-            _ => Update::Split,
-        };
-        let lazy = shape.with_lazy_updates(device).filter(|_| update != Update::Split);
-        let shape = lazy.map_or(shape, |shape| Self { update, ..shape });
-        let has_sweeps =
-            chosen("LABELGS_SORT", ["lanes", "sweep"]).unwrap_or(is_card && !shape.emulated && group_walks);
-        if has_sweeps { shape.with_sweeps(device).unwrap_or(shape) } else { shape }
+        FORMS.into_iter().fold(shape, |shape, (variable, names, suits, apply)| {
+            let has_it = chosen(variable, names).unwrap_or_else(|| !device.is_cpu() && suits(&shape));
+            if has_it { apply(shape, device).unwrap_or(shape) } else { shape }
+        })
     }
 
     /// Returns this shape with the largest loss tiles that fit in shared memory; `None` if the device can run none.
@@ -153,7 +158,10 @@ impl KernelShape {
     /// Returns this shape with workgroup blends; `None` if the device cannot run them.
     pub fn with_group_blend(self, device: &Capabilities) -> Option<Self> {
         let (limits, subgroup) = (&device.limits, &device.subgroup);
-        let shape = self.with_group_blend_of(GroupBlend::DEFAULT);
+        let blend = GroupBlend::DEFAULT;
+        // Parts of a list hand plain data to each other, which only the memory model with device scope promises to work.
+        let long_list = if device.has_memory_model() { blend.long_list } else { u32::MAX };
+        let shape = self.with_group_blend_of(GroupBlend { long_list, ..blend });
         let lanes = shape.tile_pixels() / GroupBlend::DEFAULT.forward_rows;
         let fits = lanes <= limits.max_invocations.min(limits.max_group_size[0])
             && lanes / self.subgroup <= subgroup.max_per_group
@@ -182,6 +190,11 @@ impl KernelShape {
     pub fn with_lazy_updates(self, device: &Capabilities) -> Option<Self> {
         let fits = self.binds([&update::VARIANTS, &project_visible::VARIANTS, &emit_ordered::VARIANTS], true, device);
         fits.then_some(Self { update: Update::Lazy, group_walks: true, ..self })
+    }
+
+    /// Returns this shape with look-back passes that list splats; `None` if the device cannot run them.
+    fn with_group_walks(self, device: &Capabilities) -> Option<Self> {
+        self.can_look_back(device).then_some(Self { group_walks: true, ..self })
     }
 
     /// Returns true if the device can run the look-back passes that list splats.

@@ -101,6 +101,19 @@ fn keys_are_wide_where_16_bits_do_not_do() {
     }
 }
 
+/// Without the promise that plain data reach other workgroups, no list is processed in parts.
+#[test]
+#[cfg_attr(not(feature = "lab"), ignore = "needs the feature `lab`")]
+fn parts_of_lists_need_the_memory_model() {
+    let has_parts = |hidden: &str| {
+        let place =
+            Place::on([("LABELGS_BLEND", "group"), ("LABELGS_HIDE", hidden)].map(|(k, v)| (k, v.into())).into());
+        let plan = succeeded_output(&place.labelgs(&["plan", "--gaussians", "2000", "--size", "64x48"]));
+        String::from_utf8_lossy(&plan).contains("group_products")
+    };
+    assert!(device().is_none() || has_parts("timestamps") && !has_parts("memory_model"));
+}
+
 fn succeeded_output(output: &std::process::Output) -> Vec<u8> {
     succeeded(output);
     output.stdout.clone()

@@ -5,6 +5,7 @@ use crate::cli::commands::profile::timed::TimedWork;
 use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Stage};
 use crate::scheduler::{Profiler, Traffic};
+use crate::shaders::structs::Counters;
 use crate::train::{LabelWork, StepReport, StepTimes};
 use crate::words::counted;
 use clap::Args;
@@ -138,6 +139,8 @@ pub(crate) struct Profile {
     counters: BTreeMap<&'static str, Spread>,
     pairs_walked: f64,
     contributing_share: f64,
+    /// Splats that subgroups of workgroup blends do not skip, over those that they test.
+    hit_share: Option<f64>,
     balance_of_halves: f64,
     ns_per_pair: PerPair,
     steps: Vec<Value>,
@@ -162,7 +165,9 @@ impl Profile {
             let items = times.iter().flat_map(|times| &times.items).filter(|item| item.0 == stage);
             items.map(|item| item.2 as f64).sum::<f64>() * threads / pairs_walked
         };
-        let weighted: f64 = counted.iter().map(|step| f64::from(step.report.counters.contributing_pairs)).sum();
+        let sum =
+            |of: fn(&Counters) -> u32| counted.iter().map(|step| f64::from(of(&step.report.counters))).sum::<f64>();
+        let (weighted, tested) = (sum(|counters| counters.contributing_pairs), sum(|counters| counters.tested_splats));
         let counter = |value: fn(&StepReport, f64) -> f64| spread(reports.iter().map(|step| value(step, pixels)));
         let each = clocks.steps.len().max(1) as f64;
         let mean = clocks.wall.as_secs_f64() * 1e3 / each;
@@ -196,6 +201,7 @@ impl Profile {
             counters: STEP_COUNTERS.iter().map(|&(name, _, value)| (name, counter(value))).collect(),
             pairs_walked,
             contributing_share: weighted / (counted.iter().map(walked_splats).sum::<f64>() * pixels),
+            hit_share: (tested > 0.0).then(|| sum(|counters| counters.hit_splats) / tested),
             balance_of_halves: spread(reports.iter().map(balance)).mean,
             ns_per_pair: PerPair {
                 blend_forward: per_pair(Stage::BLEND_FORWARD),
@@ -258,7 +264,9 @@ impl Profile {
             self.counters["pairs_walked"].mean / self.timed.pixels,
             self.contributing_share * 100.0,
             self.balance_of_halves
-        )
+        ) + &self.hit_share.map_or_else(String::new, |share| {
+            format!("subgroups process {:.1} % of the splats that they test\n", share * 100.0)
+        })
     }
 }
 
