@@ -1,7 +1,7 @@
 //! Builds pass lists; all pass families use it.
 
 use super::{KernelShape, Supervision};
-use crate::pass::buffers::Capacity;
+use crate::pass::buffers::{Capacity, TABLE};
 use crate::scheduler::plan::{Buf, Grid, PassDecl, PassList, Stage};
 use crate::shaders::{ShaderDesc, constants};
 
@@ -99,21 +99,23 @@ impl<'a> Builder<'a> {
     }
 
     /// Appends a pass; [`pass!`](crate::pass) expands to this call. Skips buffers and constants that the variant lacks.
+    /// A binding without a buffer gets the buffer of its name.
     ///
     /// # Panics
     ///
-    /// If the kernel has no variant with these macros.
+    /// If the kernel has no variant with these macros, or a binding neither a buffer nor a buffer's name.
     pub fn pass(
         &mut self,
         kernel: &'static [ShaderDesc],
         macros: &[(&'static str, u32)],
-        buffers: &[(&str, Buf)],
+        buffers: &[(&str, Option<Buf>)],
         constants: &[(&str, u32)],
         grid: Grid,
     ) {
         let macros = macros.iter().filter(|(_, on)| *on != 0).map(|(name, _)| *name).collect();
         let shader = variant(kernel, macros, self.shape);
-        let buffers = shader.bindings.iter().filter_map(|binding| value(buffers, binding.name)).collect();
+        let bound = |name| value(buffers, name).flatten().unwrap_or_else(|| own_buffer(shader, name));
+        let buffers = shader.bindings.iter().map(|binding| bound(binding.name)).collect();
         let words = shader.spec.iter().filter_map(|constant| value(constants, constant.name)).collect();
         self.list.pass(PassDecl::new(shader, buffers, grid).spec(words));
     }
@@ -132,6 +134,12 @@ fn variant(kernel: &'static [ShaderDesc], mut macros: Vec<&str>, shape: &KernelS
 
 fn value<T: Copy>(named: &[(&str, T)], wanted: &str) -> Option<T> {
     named.iter().find(|(name, _)| *name == wanted).map(|(_, value)| *value)
+}
+
+/// The buffer of the engine with a binding's name.
+fn own_buffer(shader: &ShaderDesc, name: &str) -> Buf {
+    let row = TABLE.iter().position(|buffer| buffer.name == name);
+    Buf(row.unwrap_or_else(|| panic!("{} binds {name}, and no buffer has this name", shader.name)) as u16)
 }
 
 /// An indirect grid, read from one of the `ARGS_` words of `dispatch_args`.
@@ -154,8 +162,8 @@ pub(crate) const ONE_GROUP: Grid = Grid::Groups(1, 1, 1);
 
 /// `pass!(builder, file(macro: bool, ..) { binding: BUF, .. } [constant: value, ..], grid)`: declares a kernel's pass.
 ///
-/// Name every binding that any variant of the file uses. Constants without a value come from the shape or from the
-/// defaults in GLSL; unnamed macros are off.
+/// Unnamed bindings get the buffers of their names. Constants without a value come from the shape or from the defaults
+/// in GLSL; unnamed macros are off.
 macro_rules! pass {
     ($b:expr, $file:ident $(($($macro:ident: $on:expr),*))? { $($name:ident: $buf:expr),* $(,)? }
         [$($constant:ident: $value:expr),* $(,)?], $grid:expr) => {{
@@ -165,7 +173,8 @@ macro_rules! pass {
         let macros = kernel::Macros { $($($macro: $on,)*)? ..Default::default() };
         #[allow(clippy::needless_update)]
         let spec = kernel::Spec { $($constant: $value,)* ..kernel::Spec::with(|name| shape.constant(name)) };
-        let buffers = kernel::Bindings { $($name: $buf),* };
+        #[allow(clippy::needless_update)]
+        let buffers = kernel::Bindings { $($name: Some($buf),)* ..Default::default() };
         $b.pass(&kernel::VARIANTS, &macros.named(), &buffers.named(), &spec.named(), $grid)
     }};
 }

@@ -120,7 +120,7 @@ fn emit_file(out: &mut String, file: &str, siblings: &[&Shader]) -> usize {
 fn emit_named(out: &mut String, doc: &str, head: (&str, &str), fields: &[NamedField]) {
     let (name, generics) = head;
     let (ty, value) = if generics.is_empty() { (name.to_owned(), "u32") } else { (format!("{name}<B>"), "B") };
-    let derived = if name == "Macros" { ", Default" } else { "" };
+    let derived = if name == "Spec" { "" } else { ", Default" };
     put!(out, "    /// {doc}\n    #[derive(Clone, Copy, Debug, PartialEq{derived})]\n    pub struct {ty} {{");
     for NamedField { doc, field, rust, .. } in fields {
         put!(out, "        /// {doc}\n        pub {field}: {rust},");
