@@ -93,7 +93,7 @@ vec3 derivatives(uint at) {
 void filter_pictures(uint lane) {
     for (uint i = lane; i < OUTER * ((MIDDLE + RUN - 1u) / RUN); i += LOSS_LANES) {
         uint row = i % OUTER, x = i / OUTER * RUN;
-        FILTER(vec4, sum, r, moments(row * OUTER_PITCH + min(x + r, OUTER)))
+        FILTER(vec4, sum, r, moments(row * OUTER_PITCH + min(x + r, OUTER - 1u)))
         [[unroll]] for (uint k = 0u; k < RUN; k++) {
             if (x + k < MIDDLE) {
                 rows[row * MIDDLE_PITCH + x + k] = sum[k];
@@ -136,7 +136,7 @@ void filter_derivatives(uint lane) {
     }
 }
 
-// Sums over the workgroup; the first invocation has the result.
+// Sums over the workgroup; the first invocation has the result, others have 0.
 vec3 sum_of(vec3 v) {
     uint lane = gl_LocalInvocationIndex;
     barrier();
@@ -147,7 +147,7 @@ vec3 sum_of(vec3 v) {
             rows[lane].xyz += rows[lane + half_].xyz;
         }
     }
-    return rows[0].xyz;
+    return lane == 0u ? rows[0].xyz : vec3(0.0);
 }
 
 // Sums the losses of all workgroups, in the last one to finish.

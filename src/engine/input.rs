@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::ops::RangeInclusive;
 
 /// Bits of normal floats: a stamp is a part of a vector of floats, and a device may replace subnormal floats by 0.
-const STAMPS: RangeInclusive<u32> = 0x0080_0000..=0x7f7f_ffff;
+const NORMAL_STAMPS: RangeInclusive<u32> = 0x0080_0000..=0x7f7f_ffff;
 
 /// The input of a list besides the model.
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +112,7 @@ impl Engine {
         let uniforms = input.uniforms();
         self.size.check_image(uniforms.width, uniforms.height)?;
         // The record of a (splat, tile) pair is valid only if it carries the stamp of the current submit.
-        self.stamp = if STAMPS.contains(&(self.stamp + 1)) { self.stamp + 1 } else { *STAMPS.start() };
+        self.stamp = if NORMAL_STAMPS.contains(&(self.stamp + 1)) { self.stamp + 1 } else { *NORMAL_STAMPS.start() };
         if let Input::Train(train) = input {
             self.write_shared(frame, &train.shared)?;
         }

@@ -2,7 +2,7 @@
 //! (VK_KHR_shader_subgroup_uniform_control_flow). Without the declaration, Vulkan promises that for whole workgroups
 //! only. Modules ship without it, because devices without the extension refuse it.
 
-const EXTENSION: &[u8; 40] = b"SPV_KHR_subgroup_uniform_control_flow\0\0\0";
+const FLOW_EXTENSION: &[u8; 40] = b"SPV_KHR_subgroup_uniform_control_flow\0\0\0";
 const HEADER_WORDS: usize = 5;
 const OP_EXTENSION: u32 = 10;
 const OP_ENTRY_POINT: u32 = 15;
@@ -24,7 +24,7 @@ pub(super) fn declare(words: &mut Vec<u32>) {
     }
     let Some((after, id)) = entry else { return };
     words.splice(after..after, [3 << 16 | OP_EXECUTION_MODE, id, SUBGROUP_UNIFORM_CONTROL_FLOW]);
-    let (name, _) = EXTENSION.as_chunks::<4>();
+    let (name, _) = FLOW_EXTENSION.as_chunks::<4>();
     let extension = [11 << 16 | OP_EXTENSION].into_iter().chain(name.iter().map(|four| u32::from_le_bytes(*four)));
     words.splice(capabilities..capabilities, extension);
 }

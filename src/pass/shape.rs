@@ -113,7 +113,7 @@ type Form =
     (&'static str, [&'static str; 2], fn(&KernelShape) -> bool, fn(KernelShape, &Capabilities) -> Option<KernelShape>);
 
 /// All choices. Later ones see what earlier ones chose.
-const FORMS: [Form; 7] = [
+const KERNEL_FORMS: [Form; 7] = [
     ("LABELGS_LOSS", ["columns", "shared"], |_| true, KernelShape::with_loss_tiles),
     ("LABELGS_PHOTOS", ["upload", "resident"], |_| true, |shape, _| Some(KernelShape { narrow_labels: true, ..shape })),
     ("LABELGS_WALK", ["lane", "group"], |_| true, KernelShape::with_group_walks),
@@ -137,7 +137,7 @@ impl KernelShape {
         let has_texels = limits.max_texel_elements >= TEXELS_MIN && limits.max_texel_buffers >= most_texels;
         let texel = shape.texel && has_texels;
         let shape = Self { texel, emulated: device.subgroup.is_emulated, ..shape };
-        FORMS.into_iter().fold(shape, |shape, (variable, names, suits, apply)| {
+        KERNEL_FORMS.into_iter().fold(shape, |shape, (variable, names, suits, apply)| {
             let has_it = chosen(variable, names).unwrap_or_else(|| !device.is_cpu() && suits(&shape));
             if has_it { apply(shape, device).unwrap_or(shape) } else { shape }
         })

@@ -84,7 +84,8 @@ fn lists() -> Vec<(Capacity, PassList)> {
             add(pass::extended_step(&shape, &capacity, variant, (&*extension, all_passes)));
             let place = RowOffsets::default();
             for shared in [Exposure::default().extension(place), Poses::default().extension(place)] {
-                for supervision in [Supervision::Photo, Supervision::Layers { lift: false }] {
+                for supervision in [Supervision::Photo, Supervision::Disagreement, Supervision::Layers { lift: false }]
+                {
                     add(pass::extended_step(&shape, &capacity, Variant { supervision, ..variant }, (&*shared, 1)));
                 }
             }
