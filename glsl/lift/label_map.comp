@@ -80,12 +80,12 @@ void main() {
     uint end = min(begin + SEGMENT_LENGTH, list_end);
     uint kept = tile * (TILE_WIDTH * TILE_HEIGHT) + lane;
     if (SEGMENT > 0u) {
-        table = label_tables[tile * LABEL_ROUNDS + WALK];
         [[unroll]] for (uint k = 0u; k < ROWS; k++) {
             sum[k] = segment_colours[kept + k * SUBGROUP_SIZE];
             uvec4 more = segment_rest[kept + k * SUBGROUP_SIZE];
             T[k] = uintBitsToFloat(more.x);
             rest[k] = uintBitsToFloat(more.y);
+            table = k == 0u ? uvec4(more.zw, table.zw) : k == 1u ? uvec4(table.xy, more.zw) : table;
         }
     }
 #else
@@ -156,7 +156,9 @@ void main() {
     if (SEGMENT + 1u < SEGMENTS) {
         [[unroll]] for (uint k = 0u; k < ROWS; k++) {
             segment_colours[kept + k * SUBGROUP_SIZE] = sum[k];
-            segment_rest[kept + k * SUBGROUP_SIZE] = uvec4(floatBitsToUint(T[k]), floatBitsToUint(rest[k]), 0u, 0u);
+            // Every lane keeps the table too, in its first two rows.
+            segment_rest[kept + k * SUBGROUP_SIZE] =
+                uvec4(floatBitsToUint(T[k]), floatBitsToUint(rest[k]), k == 0u ? table.xy : table.zw);
         }
         return;
     }

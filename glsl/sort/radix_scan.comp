@@ -15,7 +15,7 @@ INOUT(0, uint, totals);
 const uint ROUND = 8u;
 
 uint word(uint i, uint end) {
-    uint v = totals[min(i, CELLS - 1u)];
+    uint v = totals[min(i, end - 1u)];
     return i < end ? v : 0u;
 }
 
