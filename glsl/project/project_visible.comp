@@ -89,6 +89,7 @@ uint key_of(StepUniforms u, uint i, out bool broken) {
 // Sets is_visible and visible_before by a bit of each lane and item.
 uint count_visible(uint flags, uint items) {
     uint lane = gl_LocalInvocationIndex;
+    barrier(); // all have read what an earlier call returned
     for (uint w = lane; w < WORDS; w += VISIBLE_LANES) {
         is_visible[w] = 0u;
     }
@@ -116,9 +117,7 @@ uint look_recount(uint part) {
         bool broken;
         flags |= i < step.gaussian_count && key_of(step, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
     }
-    uint own = count_visible(flags, items);
-    barrier();
-    return own;
+    return count_visible(flags, items);
 }
 
 // Index in the partition of its n-th visible Gaussian.
