@@ -4,12 +4,10 @@
 #include "step.glsl"
 #include "dispatch.glsl"
 #include "partitions.glsl"
-#include "look_back.glsl"
 // step_begin — clear the counters and size the dispatches over all Gaussians or all layers.
 // Work:    one invocation; variant look: many workgroups, to clear.
 // Reads:   step
-// Writes:  counters, except the failure; dispatch_args (all entries; 0 for later stages); variants look, sweep:
-//          look_back, sweep = 0
+// Writes:  counters, except the failure; dispatch_args (all entries; 0 for later stages); variant look: look_back = 0
 // Mirror:  none (bookkeeping; every later pass fails without it)
 
 #ifdef LOOK
@@ -24,9 +22,6 @@ WRITE(2, uint, dispatch_args);
 #ifdef LOOK
 WRITE(3, uint, look_back);
 #endif
-#ifdef SWEEP
-WRITE(4, uint, sweep);
-#endif
 
 void put(uint at, uvec3 groups) {
     dispatch_args[at] = groups.x;
@@ -37,31 +32,26 @@ void put(uint at, uvec3 groups) {
 void main() {
 #ifdef LOOK
     uint group = gl_WorkGroupID.x, lanes = gl_NumWorkGroups.x * BEGIN_LANES, lane = group * BEGIN_LANES + gl_LocalInvocationID.x;
-    for (uint w = lane; w < look_words(step.gaussian_count); w += lanes) {
+    for (uint w = lane; w < CELLS; w += lanes) {
         look_back[w] = 0u;
     }
-#ifdef SWEEP
-    for (uint w = lane; w < CELLS; w += lanes) {
-        sweep[w] = 0u;
-    }
-#endif
     if (lane > 0u) {
         return;
     }
 #endif
-    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
+    counters = Counters(0u, 0u, 0u, 0u, 0u, 0u, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, NO_SPLAT, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, counters.failure, 0.0, 0.0, 0.0);
     uint n = step.gaussian_count;
     put(ARGS_GAUSSIANS, folded_groups((n + 63u) / 64u));
     put(ARGS_SH1, folded_groups((n * 2u + 63u) / 64u));
     put(ARGS_SH2, folded_groups((n * 4u + 63u) / 64u));
     put(ARGS_SH3, folded_groups((n * 5u + 63u) / 64u));
     put(ARGS_TILES, folded_groups((step.tile_count * (step.layer_count + 1u) + 63u) / 64u));
+#ifdef LOOK
     put(ARGS_VISIBLE, folded_groups(visible_partitions(n)));
+#endif
     put(ARGS_SPLATS, uvec3(0u, 1u, 1u));
-    put(ARGS_SWEEP_GAUSSIANS, folded_groups(partitions(n)));
     put(ARGS_SWEEP_SPLATS, uvec3(0u, 1u, 1u));
     put(ARGS_SWEEP_INSTANCES, uvec3(0u, 1u, 1u));
-    put(ARGS_SWEEP_TILES, folded_groups(partitions(step.tile_count * (step.layer_count + 1u))));
     put(ARGS_BLEND, uvec3(0u, 1u, 1u));
     put(ARGS_CHUNKS, uvec3(0u, 1u, 1u));
     put(ARGS_WALK, uvec3(0u, 1u, 1u));

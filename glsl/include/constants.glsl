@@ -62,16 +62,14 @@ const uint VOTE_NONE = 0xffffffffu;         // column of a pixel without votes
 const float VOTE_ONE = 65536.0;              // scale of the fixed-point votes for labels
 const uint KEY_INVISIBLE = 0xffffffffu;
 
-// The buffer `sweep` (sweep.glsl): tickets, then histograms of the sorts, then the words of each partition.
+// The buffer `look_back`: tickets of the sorts, then their histograms, then the words of each partition (sweep.glsl);
+// then a ticket, and a word a partition, of each other pass (look_back.glsl).
 const uint SWEEP_LANES = 256u;               // invocations of a workgroup
 const uint SWEEP_DIGITS = 256u;              // most values of a digit
-const uint SWEEP_SORTS = 16u;                // most sort passes of a step, slots 0 and up; scans come after
-const uint SWEEP_SCANS = 8u;                 // most scans of a step
-const uint SWEEP_HISTOGRAMS = 32u;           // first word of the histograms, and of the partitions:
+const uint SWEEP_SORTS = 16u;                // most sort passes of a step
+const uint SWEEP_HISTOGRAMS = SWEEP_SORTS;   // first word of the histograms, and of the partitions:
 const uint SWEEP_WORDS = SWEEP_HISTOGRAMS + SWEEP_SORTS * SWEEP_DIGITS;
-const uint SWEEP_STRIDE = 2u * SWEEP_DIGITS + SWEEP_SCANS; // words per partition: two sort passes, scans
-
-// Passes with a word a partition (look_back.glsl).
+const uint SWEEP_STRIDE = 2u * SWEEP_DIGITS; // words per partition: of two sort passes
 const uint VISIBLE_LANES = 128u;             // invocations of a workgroup of project_visible,
 const uint VISIBLE_ITEMS_MIN = 2u;           // and the Gaussians of one
 const uint VISIBLE_ITEMS_MOST = 8u;
@@ -97,12 +95,10 @@ const uint ARGS_SH1 = 9u;
 const uint ARGS_SH2 = 12u;
 const uint ARGS_SH3 = 15u;
 const uint ARGS_TILES = 18u;
-const uint ARGS_SWEEP_GAUSSIANS = 21u;       // partitions of a sweep
-const uint ARGS_SWEEP_SPLATS = 24u;
-const uint ARGS_SWEEP_INSTANCES = 27u;
-const uint ARGS_SWEEP_TILES = 30u;
-const uint ARGS_CHUNKS = 33u;                // chunks of the backward blend (group_tile.glsl)
-const uint ARGS_VISIBLE = 36u;               // partitions of project_visible
-const uint ARGS_WALK = 39u;                  // lists, and chunks of long ones, of the forward blend
-const uint ARGS_PRODUCTS = 42u;              // these chunks alone
-const uint ARGS_WORDS = 45u;                 // of all entries
+const uint ARGS_SWEEP_SPLATS = 21u;          // partitions of a sort
+const uint ARGS_SWEEP_INSTANCES = 24u;
+const uint ARGS_CHUNKS = 27u;                // chunks of the backward blend (group_tile.glsl)
+const uint ARGS_VISIBLE = 30u;               // partitions of project_visible
+const uint ARGS_WALK = 33u;                  // lists, and chunks of long ones, of the forward blend
+const uint ARGS_PRODUCTS = 36u;              // these chunks alone
+const uint ARGS_WORDS = 39u;                 // of all entries

@@ -1,5 +1,5 @@
 // Histograms of the digits of the keys that a workgroup writes, for a look-back sort (sweep.glsl).
-// All invocations clear the bins, then count their keys, then add to the buffer `sweep`, with a barrier between.
+// All invocations clear the bins, then count their keys, then add to the buffer `look_back`, with a barrier between.
 
 layout(constant_id = 9) const uint DIGIT_BITS = 8;
 layout(constant_id = 22) const uint KEY_BITS = 32;
@@ -18,12 +18,11 @@ void count_digits(uint key) {
     }
 }
 
-// SORT_SLOT is the first pass of that sort.
 void add_bins(uint lane, uint lanes) {
     for (uint b = lane; b < BINS; b += lanes) {
         if (bins[b] > 0u) {
             uint digit = b & ((1u << DIGIT_BITS) - 1u);
-            atomicAdd(sweep[SWEEP_HISTOGRAMS + (SORT_SLOT + (b >> DIGIT_BITS)) * SWEEP_DIGITS + digit], bins[b]);
+            atomicAdd(look_back[SWEEP_HISTOGRAMS + (SORT_PASS + (b >> DIGIT_BITS)) * SWEEP_DIGITS + digit], bins[b]);
         }
     }
 }

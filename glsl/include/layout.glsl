@@ -43,9 +43,10 @@ layout(push_constant) uniform PassWords {
     uint SEGMENTS;     // and their number
     uint WALK;         // walk of a tile for its labels,
     uint WALKS;        // and their number
-    uint SWEEP_SLOT;   // the pass among those of a step that look back (sweep.glsl)
-    uint SWEEP_HELD;   // for tests: 1 + the partition that tells nothing
-    uint SORT_SLOT;    // first pass of the sort of the keys that are written
+    uint SORT_PASS;    // pass among those of the step's sorts; first pass of the sort of the keys that are written
+    uint LOOK_FIRST;   // ticket of a pass that looks back; the words of its partitions follow (look_back.glsl)
+    uint LOOK_HELD;    // for tests: 1 + the partition that tells nothing
+    uint VISIBLE_ITEMS; // Gaussians of an invocation of project_visible
     uint PARTIALS;     // sums of the loss, or of the exposure
     uint PLANE;        // of a state (find_nonfinite.comp),
     uint ROW_WORDS;    // the words of its rows,

@@ -1,27 +1,10 @@
 // Distributes the tile rows of a workgroup's splats among its invocations, so that none waits for the one with a large
 // splat. All invocations of the workgroup call share_rows and sums_before.
 
-#ifndef WALKERS
-#define WALKERS 64u // invocations of a workgroup
-#endif
+#include "sums_before.glsl"
+
 shared uvec4 ellipses[2u * WALKERS]; // of each splat, packed: tiles of an axis fit in 16 bits
 shared uint starts[2u * WALKERS]; // of a table's entries, ascending: first row of each splat; for the caller's use
-shared uvec2 sums[2u * WALKERS];
-uint sums_half = 0u; // halves take turns: one barrier a step is then enough
-
-// Sums over earlier invocations, and over all.
-uvec2 sums_before(uvec2 v, out uvec2 all) {
-    uint lane = gl_LocalInvocationID.x;
-    uvec2 sum = v;
-    [[unroll]] for (uint distance = 1u; distance <= WALKERS; distance *= 2u) {
-        sums_half = WALKERS - sums_half;
-        sums[sums_half + lane] = sum;
-        barrier();
-        sum += distance <= lane ? sums[sums_half + lane - distance] : uvec2(0u);
-    }
-    all = sums[sums_half + WALKERS - 1u];
-    return sum - v;
-}
 
 // The last entry of a table that starts at `at` or before.
 uint entry_at(uint table, uint at) {

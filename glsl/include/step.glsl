@@ -74,6 +74,7 @@ struct Counters {
     uint ranges_groups, loss_groups; // workgroups of tile_ranges and of loss_tile that are done
     uint undecided_tiles;   // tiles whose label map needs another walk
     uint cloned_count, split_count, pruned_count;
+    uint recount_count;     // late partitions that others counted (look_back.glsl); depends on timing
     uint failure;           // sticky bits (below), from step to step until the host clears them
     float loss_l1, loss_ssim, loss_label; // unnormalised sums; label loss minus the loss of empty layers
 };

@@ -1,16 +1,15 @@
-// Single-dispatch passes over partitions of the items: a workgroup takes the next partition by a ticket, counts it, and
+// Single-dispatch passes of a sort over partitions of the keys: a workgroup takes the next one by a ticket, counts it, and
 // looks back at the counts of the partitions before it (Merrill and Garland, "Single-pass parallel prefix scan with
 // decoupled look-back", 2016). No workgroup depends on the progress of another one: if a count is late, it counts that
 // partition itself. Counts are exact integers, so results do not depend on timing.
 //
-// The buffer `sweep` is 0 before the step. Per partition, it has the words of two sort passes, one per digit, which
-// alternate and clear each other's words, and one word per scan.
+// The buffer `look_back` is 0 before the step. Per partition, it has the words of two sort passes, one per digit, which
+// alternate and clear each other's words.
 
 #include "partitions.glsl"
 const uint SWEEP_SUBGROUPS = SWEEP_LANES / SUBGROUP_SIZE;
 
 #include "partition_words.glsl"
-const uint SWEEP_SPINS = 64u;        // looks at a word that is not there yet
 
 shared uint sweep_ticket;
 shared uint sweep_late;
@@ -27,7 +26,7 @@ uint sweep_lane() {
 // The partition of this workgroup.
 uint sweep_partition() {
     if (sweep_lane() == 0u) {
-        sweep_ticket = atomicAdd(sweep[SWEEP_SLOT], 1u);
+        sweep_ticket = atomicAdd(look_back[SORT_PASS], 1u);
     }
     barrier();
     return sweep_ticket;
@@ -40,27 +39,26 @@ uint sweep_item(uint part, uint k) {
 
 // First word of a partition for this pass.
 uint sweep_words(uint part) {
-    uint place = SWEEP_SLOT < SWEEP_SORTS ? SWEEP_SLOT % 2u * SWEEP_DIGITS : 2u * SWEEP_DIGITS + SWEEP_SLOT - SWEEP_SORTS;
-    return SWEEP_WORDS + part * SWEEP_STRIDE + place;
+    return SWEEP_WORDS + part * SWEEP_STRIDE + SORT_PASS % 2u * SWEEP_DIGITS;
 }
 
 // Publishes the partition's count of this invocation's word, if it has one, and returns the sum over earlier
 // partitions. Called by all invocations of the workgroup.
 uint sweep_look_back(uint part, bool has_word, uint own) {
     uint lane = sweep_lane(), word = sweep_words(part) + lane;
-    bool tells = has_word && part + 1u != SWEEP_HELD;
+    bool tells = has_word && part + 1u != LOOK_HELD;
     if (tells) {
-        atomicExchange(sweep[word], (part == 0u ? SWEEP_PREFIX : SWEEP_OWN) | own);
+        atomicExchange(look_back[word], (part == 0u ? SWEEP_PREFIX : SWEEP_OWN) | own);
     }
     uint left = has_word ? part : 0u; // partitions that are not in the sum
     uint sum = 0u;
     while (true) {
-        for (uint spins = 0u; left > 0u && spins < SWEEP_SPINS;) {
-            uint found = atomicOr(sweep[sweep_words(left - 1u) + lane], 0u);
+        for (uint looks = 0u; left > 0u && looks <= LOOKS;) {
+            uint found = look_at(sweep_words(left - 1u) + lane);
             bool is_there = found > SWEEP_SUM;
             sum = is_there ? sweep_add(sum, found & SWEEP_SUM) : sum;
             left = (found & SWEEP_PREFIX) != 0u ? 0u : is_there ? left - 1u : left;
-            spins = is_there ? 0u : spins + 1u;
+            looks = is_there ? 0u : looks + 1u;
         }
         if (lane == 0u) {
             sweep_late = 0u;
@@ -74,6 +72,9 @@ uint sweep_look_back(uint part, bool has_word, uint own) {
         if (late == 0u) {
             break;
         }
+        if (lane == 0u) {
+            atomicAdd(counters.recount_count, 1u);
+        }
         sweep_recount(late - 1u);
         if (left == late) {
             sum = sweep_add(sum, sweep_found[lane]);
@@ -82,7 +83,7 @@ uint sweep_look_back(uint part, bool has_word, uint own) {
         barrier();
     }
     if (tells && part > 0u) {
-        atomicExchange(sweep[word], SWEEP_PREFIX | sweep_add(sum, own));
+        atomicExchange(look_back[word], SWEEP_PREFIX | sweep_add(sum, own));
     }
     return sum;
 }

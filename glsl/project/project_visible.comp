@@ -12,14 +12,14 @@
 #include "moments_store.glsl"
 // project_visible — cull, then project_forward, on GPUs: list, project and colour the visible Gaussians in model order,
 //                   and count the tiles of each.
-// Work:    a partition of VISIBLE_LANES times visible_items Gaussians per workgroup. The visible Gaussians, and then
+// Work:    a partition of VISIBLE_LANES times VISIBLE_ITEMS Gaussians per workgroup. The visible Gaussians, and then
 //          their tile rows, are redistributed among the invocations, so that none has to wait.
 // Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits
 //          of z; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
-//          (integer atomics) as cull and project_forward; look_back; variant sweep: sweep (histograms of the digits of
-//          the keys)
+//          (integer atomics) as cull and project_forward; look_back, in variant sweep also histograms of the digits
+//          of the keys
 // Math:    as cull and project_forward.
 // Order:   exact integers, equal in every run.
 // Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval
@@ -58,7 +58,6 @@ WRITE(32, uint, gaussian_from_splat);
 INOUT(33, uint, look_back);
 WRITE(34, uint, dispatch_args);
 #ifdef SWEEP
-INOUT(35, uint, sweep);
 #include "digit_counts.glsl"
 #endif
 #define plane4(name, e) fetch4(name, e)
@@ -70,7 +69,6 @@ EACH_PLANE(CAUGHT_UP)
 #include "count_args.glsl"
 #define WALKERS VISIBLE_LANES
 #include "rows.glsl"
-#define LOOK_LANES VISIBLE_LANES
 #include "look_back.glsl"
 
 const uint WORDS = VISIBLE_LANES * VISIBLE_ITEMS_MOST / 32u;
@@ -87,14 +85,14 @@ uint key_of(StepUniforms u, uint i, out bool broken) {
 }
 
 // Sets is_visible and visible_before by a bit of each lane and item.
-uint count_visible(uint flags, uint items) {
+uint count_visible(uint flags) {
     uint lane = gl_LocalInvocationIndex;
     barrier(); // all have read what an earlier call returned
     for (uint w = lane; w < WORDS; w += VISIBLE_LANES) {
         is_visible[w] = 0u;
     }
     barrier();
-    for (uint k = 0u; k < items; k++) {
+    for (uint k = 0u; k < VISIBLE_ITEMS; k++) {
         uint at = k * VISIBLE_LANES + lane;
         atomicOr(is_visible[at / 32u], (flags >> k & 1u) << (at & 31u));
     }
@@ -111,13 +109,13 @@ uint count_visible(uint flags, uint items) {
 }
 
 uint look_recount(uint part) {
-    uint items = visible_items(step.gaussian_count), flags = 0u;
-    for (uint k = 0u; k < items; k++) {
-        uint i = (part * items + k) * VISIBLE_LANES + gl_LocalInvocationIndex;
+    uint flags = 0u;
+    for (uint k = 0u; k < VISIBLE_ITEMS; k++) {
+        uint i = (part * VISIBLE_ITEMS + k) * VISIBLE_LANES + gl_LocalInvocationIndex;
         bool broken;
         flags |= i < step.gaussian_count && key_of(step, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
     }
-    return count_visible(flags, items);
+    return count_visible(flags);
 }
 
 // Index in the partition of its n-th visible Gaussian.
@@ -151,13 +149,13 @@ uint count_tiles(Ellipse e) {
 }
 
 void main() {
-    uint lane = gl_LocalInvocationIndex, n = step.gaussian_count, items = visible_items(n), flags = 0u;
+    uint lane = gl_LocalInvocationIndex, n = step.gaussian_count, flags = 0u;
     bool has_failed;
-    uint part = look_partition(0u, counters.failure, has_failed), base = part * items * VISIBLE_LANES;
+    uint part = look_partition(has_failed), base = part * VISIBLE_ITEMS * VISIBLE_LANES;
     if (base >= n || has_failed) {
         return;
     }
-    for (uint k = 0u; k < items; k++) {
+    for (uint k = 0u; k < VISIBLE_ITEMS; k++) {
         uint i = base + k * VISIBLE_LANES + lane;
         bool broken = false;
         uint key = i < n ? key_of(step, i, broken) : KEY_INVISIBLE;
@@ -171,12 +169,12 @@ void main() {
             splat_from_gaussian[i] = NO_SPLAT;
         }
     }
-    uint own = count_visible(flags, items), first = look_before(LOOK_VISIBLE, part, own);
+    uint own = count_visible(flags), first = look_before(part, own);
     if (part == visible_partitions(n) - 1u && lane == 0u) {
         put_visible(first + own);
     }
     // A partition that was counted instead of a late one has overwritten the bits.
-    count_visible(flags, items);
+    count_visible(flags);
 #ifdef SWEEP
     clear_bins(lane, VISIBLE_LANES);
     barrier();

@@ -7,9 +7,9 @@
 // radix_sweep — move keys and values to their sorted positions for one digit, in one dispatch; stable.
 // Work:    one partition of SWEEP_LANES x SWEEP_ITEMS pairs per workgroup. Subgroups rank their keys by ballots; the
 //          pairs of each digit are written together, through shared memory. Variant narrow: 16-bit keys.
-// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); sweep (histogram of the
-//          digit)
-// Writes:  keys_out [n], values_out [n]; sweep (words of this pass; zeros in the words of the next pass)
+// Reads:   step, counters; keys_in [n], values_in [n] (IDENTITY: the value is the index); look_back
+//          (histogram of the digit)
+// Writes:  keys_out [n], values_out [n]; look_back (words of this pass; zeros in the words of the next pass)
 // Order:   exact integers, equal in every run: the order of the radix_scatter passes.
 // Mirror:  src/reference/sort.rs::radix_sort
 
@@ -19,10 +19,10 @@ layout(constant_id = 9) const uint DIGIT_BITS = 8;
 layout(constant_id = 10) const uint IDENTITY = 0;
 layout(local_size_x = SWEEP_LANES) in;
 READ1(0, StepUniforms, step);
-READ1(1, Counters, counters);
+INOUT1(1, Counters, counters);
 READ(3, KEY, keys_in);
 READ(4, uint, values_in);
-INOUT(5, uint, sweep);
+INOUT(5, uint, look_back);
 WRITE(6, KEY, keys_out);
 WRITE(7, uint, values_out);
 #include "sweep.glsl"
@@ -115,13 +115,13 @@ void main() {
             own += count;
         }
     }
-    uint all = has_digit ? sweep[SWEEP_HISTOGRAMS + SWEEP_SLOT * SWEEP_DIGITS + lane] : 0u;
+    uint all = has_digit ? look_back[SWEEP_HISTOGRAMS + SORT_PASS * SWEEP_DIGITS + lane] : 0u;
     uvec2 before = sums_before(uvec2(own, all));
     uint earlier = sweep_look_back(part, has_digit, own);
     if (has_digit) {
         starts[lane] = before.x;
         moves[lane] = before.y + earlier - before.x;
-        sweep[(sweep_words(part) - SWEEP_SLOT % 2u * SWEEP_DIGITS) + (SWEEP_SLOT + 1u) % 2u * SWEEP_DIGITS + lane] = 0u;
+        look_back[(sweep_words(part) - SORT_PASS % 2u * SWEEP_DIGITS) + (SORT_PASS + 1u) % 2u * SWEEP_DIGITS + lane] = 0u;
     }
     barrier();
     [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {

@@ -14,8 +14,8 @@
 // Reads:   step; order [V] splats by depth; splats [V,3]; tiles_touched [V];
 //          variant labels: gaussian_from_splat [V], labels [N], layer_from_label
 // Writes:  instance_offsets [V]; tile_keys [I] (variant narrow: 16-bit); splat_from_instance [I];
-//          counters.instance_count, and what depends on it (count_args.glsl): dispatch_args; look_back; variant sweep:
-//          sweep (histograms of the digits of the keys)
+//          counters.instance_count, and what depends on it (count_args.glsl): dispatch_args; look_back, in variant
+//          sweep also histograms of the digits of the keys
 // Order:   exact integers, equal in every run. Pairs beyond the capacity are counted, not written.
 // Mirror:  src/reference/tile.rs::emit_instances, tile.rs::row_interval, scan.rs::exclusive_scan
 
@@ -32,17 +32,15 @@ FETCHU(8, gaussian_from_splat);
 FETCHU(9, labels);
 FETCHU(10, layer_from_label);
 #endif
+FETCHU(11, order);
+INOUT(12, uint, look_back);
+INOUT(13, uint, dispatch_args);
 #ifdef SWEEP
-INOUT(11, uint, sweep);
 #include "digit_counts.glsl"
 #endif
-FETCHU(12, order);
-INOUT(13, uint, look_back);
-INOUT(14, uint, dispatch_args);
 #include "count_args.glsl"
 #define WALKERS ORDERED_LANES
 #include "rows.glsl"
-#define LOOK_LANES ORDERED_LANES
 #include "look_back.glsl"
 
 #include "pairs.glsl"
@@ -87,15 +85,14 @@ void main() {
     StepUniforms u = step;
     uint lane = gl_LocalInvocationIndex, visible = counters.visible_count;
     bool has_failed;
-    uint part = look_partition(1u, counters.failure, has_failed), k = part * ORDERED_LANES + lane;
+    uint part = look_partition(has_failed), k = part * ORDERED_LANES + lane;
     if (part * ORDERED_LANES >= visible || has_failed) {
         return;
     }
     uvec2 all, before = sums_before(uvec2(touched(k), 0u), all);
-    uint own = min(all.x, SWEEP_SUM), first = look_before(look_ordered(u.gaussian_count), part, own);
+    uint own = min(all.x, SWEEP_SUM), first = look_before(part, own);
     if (part == (visible - 1u) / ORDERED_LANES && lane == 0u) {
-        uint total = sweep_add(first, own);
-        put_instances(total == SWEEP_SUM ? 0xffffffffu : total);
+        put_instances(total_of(first, own));
     }
 #ifdef SWEEP
     clear_bins(lane, ORDERED_LANES);

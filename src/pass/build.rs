@@ -27,19 +27,12 @@ pub struct Builder<'a> {
     pub long_list: Option<u32>,
     /// True if both moments of a parameter are packed into one word.
     pub half: bool,
-    /// Look-back sort passes and scans so far in this list.
-    pub sweeps: Sweeps,
+    /// Passes of look-back sorts so far in this list.
+    pub sort_passes: u32,
+    /// Words of `Buf::LOOK_BACK` that passes of this list have so far; those of sorts come first.
+    pub look_words: u64,
     /// The list so far.
     pub list: PassList,
-}
-
-/// Numbers of look-back passes; each has its own words in `Buf::SWEEP`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sweeps {
-    /// Passes of sorts.
-    pub sorts: u32,
-    /// Scans.
-    pub scans: u32,
 }
 
 /// The counter that gives the number of items of a scan or sort (glsl/include/count.glsl).
@@ -56,14 +49,9 @@ pub enum Count {
 }
 
 impl Count {
-    /// Grid over partitions of `items` items.
+    /// Grid over the partitions of a look-back sort of keys.
     pub(super) fn partitions(self) -> Grid {
-        args(match self {
-            Self::Gaussians => constants::ARGS_SWEEP_GAUSSIANS,
-            Self::Splats => constants::ARGS_SWEEP_SPLATS,
-            Self::Instances => constants::ARGS_SWEEP_INSTANCES,
-            Self::VirtualTiles => constants::ARGS_SWEEP_TILES,
-        })
+        args(if self == Self::Splats { constants::ARGS_SWEEP_SPLATS } else { constants::ARGS_SWEEP_INSTANCES })
     }
 }
 
@@ -82,7 +70,8 @@ impl<'a> Builder<'a> {
             late: false,
             long_list: None,
             half: capacity.packs_moments(),
-            sweeps: Sweeps::default(),
+            sort_passes: 0,
+            look_words: capacity.sweep_cells,
             list,
         }
     }
@@ -92,10 +81,12 @@ impl<'a> Builder<'a> {
         self.capacity.segments.max(1) as u32
     }
 
-    /// Returns the slot of the next look-back scan.
-    pub(super) fn next_scan(&mut self) -> u32 {
-        self.sweeps.scans += 1;
-        constants::SWEEP_SORTS + self.sweeps.scans - 1
+    /// Returns the first word of `Buf::LOOK_BACK` for the next pass: its ticket, before a word for each partition.
+    pub(super) fn next_look(&mut self, partitions: u64) -> u32 {
+        let first = self.look_words;
+        self.look_words += 1 + partitions;
+        assert!(self.look_words <= self.capacity.look_cells, "too many passes look back");
+        first as u32
     }
 
     /// Appends a pass; [`pass!`](crate::pass) expands to this call. Skips buffers and constants that the variant lacks.

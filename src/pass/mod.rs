@@ -131,13 +131,10 @@ impl Extension for () {
 fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degree: u32) -> Builder<'a> {
     let late = capacity.late_gaussians > 0;
     let mut b = Builder { sh_degree, late, ..Builder::new(name, shape, capacity) };
-    let (look, sweep) = (shape.group_walks, shape.sweeps());
-    let cleared = capacity.look_cells + capacity.sweep_cells;
-    let groups = Grid::Groups(cleared.div_ceil(4096).clamp(1, 4096) as u32, 1, 1);
-    pass!(b, step_begin(look: look, sweep: sweep) {
+    let (cells, visible_items) = (capacity.look_cells as u32, KernelShape::visible_items(capacity.gaussians));
+    pass!(b, step_begin(look: shape.group_walks) {
         step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, look_back: Buf::LOOK_BACK,
-        sweep: Buf::SWEEP,
-    } [cells: capacity.sweep_cells as u32], groups);
+    } [cells: cells, visible_items: visible_items], Grid::Groups(cells.div_ceil(4096).clamp(1, 4096), 1, 1));
     b
 }
 

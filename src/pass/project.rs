@@ -1,5 +1,6 @@
 //! Projects Gaussians to splats in depth order, and carries gradients back.
 
+use super::KernelShape;
 use super::build::{Builder, Count, ONE_GROUP, args, over_gaussians, over_splats};
 use super::scan::{self, Total};
 use super::sort::{self, SortBuffers};
@@ -56,7 +57,9 @@ fn project_forward(b: &mut Builder) {
 
 /// Does all of this in one pass, except the sort.
 fn project_visible(b: &mut Builder, keys: Buf) {
-    let (sh_degree, sort_slot) = (b.sh_degree, b.sweeps.sorts);
+    let (sh_degree, sort_pass, gaussians) = (b.sh_degree, b.sort_passes, b.capacity.gaussians);
+    let look_first = b.next_look(KernelShape::visible_partitions(gaussians));
+    let visible_items = KernelShape::visible_items(gaussians);
     let labels = b.supervision.has_layers();
     pass!(b, project_visible(labels: labels, lazy: b.late, half: b.late && b.half, sweep: b.shape.sweeps()) {
         step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales: Buf::SCALES,
@@ -67,8 +70,7 @@ fn project_visible(b: &mut Builder, keys: Buf) {
         u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
         u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, keys_out: keys,
         gaussian_from_splat: GAUSSIAN_FROM_SPLAT, look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
-        sweep: Buf::SWEEP,
-    } [sh_degree: sh_degree, sort_slot: sort_slot], args(constants::ARGS_VISIBLE));
+    } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items], args(constants::ARGS_VISIBLE));
 }
 
 /// Corrects the pose of the step's camera by rows `row` and `row + 1` of the step.

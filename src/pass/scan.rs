@@ -1,9 +1,9 @@
-//! Exclusive prefix sum of u32 values by reduce-then-scan. Workgroups never wait for each other, so it runs on any
-//! device.
+//! Exclusive prefix sum of u32 values: by reduce-then-scan, or in one dispatch that looks back.
 
-use super::build::{Builder, Count, ONE_GROUP};
+use super::build::{Builder, Count, ONE_GROUP, args, over_gaussians};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid};
+use crate::shaders::constants;
 
 /// The counter that receives the total.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,24 +21,28 @@ pub enum Total {
 /// Writes `offsets[i]` = sum of `values[..i]`, the total to the counter `total`, and the dispatch sizes that depend on
 /// it.
 pub fn scan(b: &mut Builder, values: Buf, offsets: Buf, count: Count, total: Total) {
-    if b.shape.sweeps() {
-        sweep(b, (values, offsets), count, total, false);
+    if b.shape.group_walks {
+        look_back(b, (values, offsets), count, total, false);
     } else {
         reduce_then_scan(b, (values, offsets), count, total, false);
     }
 }
 
 /// Writes the tiles with nonzero values, and their number to `layer_tile_count`, in one pass.
-pub fn list_by_sweep(b: &mut Builder, occupied: Buf, tiles: Buf) {
-    sweep(b, (occupied, tiles), Count::VirtualTiles, Total::LayerTiles, true);
+pub fn list(b: &mut Builder, occupied: Buf, tiles: Buf) {
+    look_back(b, (occupied, tiles), Count::VirtualTiles, Total::LayerTiles, true);
 }
 
-fn sweep(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: Total, list: bool) {
-    let slot = b.next_scan();
-    pass!(b, scan_sweep(list: list) {
-        step: Buf::STEP, counters: Buf::COUNTERS, values: values, sweep: Buf::SWEEP,
+fn look_back(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: Total, list: bool) {
+    let (items, grid) = match count {
+        Count::VirtualTiles => (b.capacity.virtual_tiles, args(constants::ARGS_TILES)),
+        _ => (b.capacity.gaussians, over_gaussians()),
+    };
+    let first = b.next_look(items.div_ceil(64));
+    pass!(b, scan_once(list: list) {
+        step: Buf::STEP, counters: Buf::COUNTERS, values: values, look_back: Buf::LOOK_BACK,
         offsets: out, layer_tiles: out, dispatch_args: Buf::DISPATCH_ARGS,
-    } [count_source: count as u32, total: total as u32, sweep_slot: slot], count.partitions());
+    } [count_source: count as u32, total: total as u32, look_first: first], grid);
 }
 
 /// Same as [`scan`], with each key other than `KEY_INVISIBLE` counting as 1.

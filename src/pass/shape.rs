@@ -4,7 +4,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
 use crate::shaders::constants::{
-    LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_LANES,
+    LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST,
+    VISIBLE_LANES,
 };
 use crate::shaders::{self, ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
 use std::borrow::Cow;
@@ -24,7 +25,7 @@ pub struct KernelShape {
     pub texel: bool,
     /// Bits per digit of the radix sort.
     pub digit_bits: u32,
-    /// Items per invocation in look-back sorts and scans (one dispatch per pass); 0 with several dispatches per pass.
+    /// Items per invocation in look-back sorts (one dispatch per pass); 0 with several dispatches per pass.
     pub sweep_items: u32,
     /// Look-back sorts use 16-bit tile keys if all tiles of all layers fit.
     pub narrow_keys: bool,
@@ -40,6 +41,8 @@ pub struct KernelShape {
     pub group_blend: Option<GroupBlend>,
     /// How a step updates the parameters.
     pub update: Update,
+    /// Looks at the count of an earlier workgroup before a workgroup counts for it.
+    pub looks: u32,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
     /// Splats per tile that one blend dispatch processes; a multiple of the subgroup size.
@@ -248,7 +251,7 @@ impl KernelShape {
         self.narrow_keys && self.sweeps() && virtual_tiles <= NARROW_TILES
     }
 
-    /// Returns the words of `Buf::SWEEP` for this many items.
+    /// Returns the words of `Buf::LOOK_BACK` for sorts of this many items.
     pub fn sweep_cells(&self, items: u64) -> u64 {
         if !self.sweeps() {
             return 0;
@@ -257,13 +260,21 @@ impl KernelShape {
         u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
     }
 
-    /// Returns the words of `Buf::LOOK_BACK` for this many Gaussians.
-    pub fn look_cells(&self, gaussians: u64) -> u64 {
-        if !self.group_walks {
-            return 0;
-        }
-        let partitions = gaussians.div_ceil(u64::from(VISIBLE_LANES * VISIBLE_ITEMS_MIN));
-        2 + partitions + gaussians.div_ceil(u64::from(ORDERED_LANES))
+    /// Returns the words of `Buf::LOOK_BACK` for the other passes of any list: project_visible, emit_ordered and a scan of
+    /// the tiles, or two scans of the Gaussians.
+    pub fn look_cells(&self, gaussians: u64, virtual_tiles: u64) -> u64 {
+        let scan = |items: u64| 1 + items.div_ceil(u64::from(ORDERED_LANES));
+        if self.group_walks { 2 * scan(gaussians) + scan(virtual_tiles) } else { 0 }
+    }
+
+    /// Returns the Gaussians per invocation of project_visible: few if there would not be enough workgroups.
+    pub fn visible_items(gaussians: u64) -> u32 {
+        ((gaussians >> 19) as u32).clamp(VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST)
+    }
+
+    /// Returns its partitions.
+    pub fn visible_partitions(gaussians: u64) -> u64 {
+        gaussians.div_ceil(u64::from(VISIBLE_LANES * Self::visible_items(gaussians)))
     }
 
     /// Returns the shape for a subgroup size; `cpu` is true if the device is a CPU.
@@ -291,6 +302,8 @@ impl KernelShape {
             group_walks: false,
             group_blend: None,
             update: Update::Split,
+            // 2^14 looks take some 15 ms on a GPU, where all workgroups of a pass may share the memory until then.
+            looks: if cpu { 16 } else { 1 << 14 },
             lane_groups: if cpu { 4 } else { 128 },
             segment_length: SEGMENT_LENGTH,
             loop_rounds: cpu.then_some(LOOP_ROUNDS),
@@ -355,6 +368,7 @@ impl KernelShape {
             "TILE_HEIGHT" => Some(self.tile_height),
             "DIGIT_BITS" => Some(self.digit_bits),
             "SWEEP_ITEMS" => Some(self.sweep_items.max(1)),
+            "LOOKS" => Some(self.looks),
             "LABELS_PER_WORD" => Some(if self.narrow_labels { 2 } else { 1 }),
             "LOSS_TILE" => (self.loss_tile > 0).then_some(self.loss_tile),
             "CHUNK_LENGTH" => self.group_blend.map(|blend| blend.chunk_length),

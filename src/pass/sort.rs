@@ -55,10 +55,10 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         if b.shape.sweeps() {
             pass!(b, radix_sweep(narrow: buffers.narrow) {
                 step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
-                values_in: values_in, sweep: Buf::SWEEP, keys_out: buffers.keys[to], values_out: buffers.values[to],
-            } [count_source: count as u32, shift: shift, sweep_slot: b.sweeps.sorts,
+                values_in: values_in, look_back: Buf::LOOK_BACK, keys_out: buffers.keys[to], values_out: buffers.values[to],
+            } [count_source: count as u32, shift: shift, sort_pass: b.sort_passes,
                 identity: u32::from(identity_now)], count.partitions());
-            b.sweeps.sorts += 1;
+            b.sort_passes += 1;
             continue;
         }
         // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.

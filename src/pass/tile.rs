@@ -41,14 +41,15 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     let TileSort { bits, buffers } = TileSort::new(b.shape, b.capacity, labels);
     let narrow = buffers.narrow;
     if b.shape.group_walks {
-        let (sweep, sort_slot) = (b.shape.sweeps(), b.sweeps.sorts);
+        let (sweep, sort_pass) = (b.shape.sweeps(), b.sort_passes);
+        let look_first = b.next_look(b.capacity.gaussians.div_ceil(u64::from(constants::ORDERED_LANES)));
         pass!(b, emit_ordered(labels: labels, sweep: sweep, narrow: narrow) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
             tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
             labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, order: Buf::DEPTH_ORDER,
-            look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS, sweep: Buf::SWEEP,
-        } [sort_slot: sort_slot, key_bits: bits.max(1)], over_splats());
+            look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
+        } [sort_pass: sort_pass, look_first: look_first, key_bits: bits.max(1)], over_splats());
     } else {
         pass!(b, emit_instances(labels: labels) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
@@ -72,8 +73,8 @@ fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
     if !b.supervision.has_layers() {
         return;
     }
-    if b.shape.sweeps() {
-        return scan::list_by_sweep(b, Buf::LAYER_OCCUPIED, Buf::LAYER_TILES);
+    if b.shape.group_walks {
+        return scan::list(b, Buf::LAYER_OCCUPIED, Buf::LAYER_TILES);
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
     pass!(b, layer_list {

@@ -18,8 +18,8 @@ use labelgs::pass::{Builder, GroupBlend, KernelShape, Supervision, Variant, rend
 use labelgs::scheduler::ListId;
 use labelgs::scheduler::plan::{Buf, PassList, Work};
 use labelgs::shaders::constants::{
-    ARGS_BLEND, ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_SWEEP_TILES, ARGS_WORDS,
-    SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES,
+    ARGS_BLEND, ARGS_GAUSSIANS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_SPLATS, ARGS_TILES, ARGS_WORDS, SWEEP_DIGITS,
+    SWEEP_HISTOGRAMS, SWEEP_LANES,
 };
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use rand::Rng;
@@ -67,7 +67,7 @@ fn list(engine: &mut Engine, held: Option<u32>, declare: impl FnOnce(&mut Builde
     let mut list: PassList = builder.list;
     for work in &mut list.work {
         let Work::Pass(pass) = work else { continue };
-        let place = pass.shader.spec.iter().position(|constant| constant.name == "SWEEP_HELD").expect("all are sweeps");
+        let place = pass.shader.spec.iter().position(|constant| constant.name == "LOOK_HELD").expect("all are sweeps");
         pass.spec[place] = held.map_or(0, |partition| partition + 1);
     }
     engine.raw_mut().prepare(&list).expect("the list is planned")
@@ -75,7 +75,7 @@ fn list(engine: &mut Engine, held: Option<u32>, declare: impl FnOnce(&mut Builde
 
 /// Sets numbers of items and partitions, and what the pass that wrote the keys has counted of them.
 fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
-    let cells = engine.capacity().sweep_cells as usize;
+    let cells = engine.capacity().look_cells as usize;
     let bits = engine.shape().digit_bits;
     let mut sweep = vec![0_u32; cells];
     for pass in 0..32 / bits {
@@ -84,12 +84,12 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
             sweep[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
         }
     }
-    let partitions = (count as u32).div_ceil(SWEEP_LANES * engine.shape().sweep_items);
-    let mut args = [0_u32; ARGS_WORDS as usize];
-    for at in [ARGS_SWEEP_GAUSSIANS, ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES, ARGS_SWEEP_TILES] {
-        args[at as usize..][..3].copy_from_slice(&[partitions, 1, 1]);
-    }
     let count = count as u32;
+    let (sorting, scanning) = (count.div_ceil(SWEEP_LANES * engine.shape().sweep_items), count.div_ceil(64));
+    let mut args = [0_u32; ARGS_WORDS as usize];
+    for (ats, groups) in [([ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES], sorting), ([ARGS_GAUSSIANS, ARGS_TILES], scanning)] {
+        ats.iter().for_each(|&at| args[at as usize..][..3].copy_from_slice(&[groups, 1, 1]));
+    }
     let (tile_count, most) = (count, u32::MAX);
     let uniforms = StepUniforms {
         gaussian_count: count,
@@ -100,7 +100,7 @@ fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
     };
     let counters = Counters { visible_count: count, instance_count: count, ..Counters::zeroed() };
     let sched = engine.raw_mut();
-    sched.upload(Buf::SWEEP, 0, 0, &sweep).expect("upload");
+    sched.upload(Buf::LOOK_BACK, 0, 0, &sweep).expect("upload");
     sched.upload(Buf::DISPATCH_ARGS, 0, 0, &args).expect("upload");
     sched.upload(Buf::STEP, 0, 0, &[uniforms]).expect("upload");
     sched.upload(Buf::COUNTERS, 0, 0, &[counters]).expect("upload");
@@ -116,7 +116,7 @@ fn a_scan_is_exact_and_saturates() {
     each_size(MOST, |engine| {
         for held in [None, Some(0), Some(3)] {
             let id = list(engine, held, |b| {
-                scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Densified);
+                scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Gaussians, Total::Densified);
             });
             let mut random = generator(71);
             for most in [900, u32::MAX / 1000] {
@@ -141,8 +141,9 @@ fn a_scan_is_exact_and_saturates() {
 #[test]
 fn occupied_tiles_are_listed_and_counted() {
     each_size(MOST, |engine| {
-        // There are fewer tiles than Gaussians, and the buffers of any words do.
-        let id = list(engine, Some(1), |b| scan::list_by_sweep(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS));
+        let room = Capacity { virtual_tiles: MOST as u64, ..*engine.capacity() };
+        engine.set_capacity(room).expect("room");
+        let id = list(engine, Some(1), |b| scan::list(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS));
         let mut random = generator(73);
         for count in COUNTS {
             let occupied: Vec<u32> = (0..count).map(|_| u32::from(random.random_bool(0.3))).collect();
@@ -294,8 +295,7 @@ fn ten_million_keys_are_sorted() {
     let mut engine =
         Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");
     let keys = KEYS as u64;
-    let room =
-        Capacity { instances: keys, key_words: keys, sweep_cells: shape.sweep_cells(keys), ..*engine.capacity() };
+    let room = Capacity { instances: keys, key_words: keys, look_cells: shape.sweep_cells(keys), ..*engine.capacity() };
     engine.set_capacity(room).expect("room");
     let buffers = SortBuffers { narrow: false, ..TILES };
     let mut found = None;

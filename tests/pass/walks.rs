@@ -131,7 +131,7 @@ fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32
     let mut list = render_view(&shape, fixture.engine.capacity(), 0, 0);
     for work in &mut list.work {
         let Work::Pass(pass) = work else { continue };
-        if let Some(place) = pass.shader.spec.iter().position(|constant| constant.name == "SWEEP_HELD") {
+        if let Some(place) = pass.shader.spec.iter().position(|constant| constant.name == "LOOK_HELD") {
             pass.spec[place] = held.map_or(0, |partition| partition + 1);
         }
     }

@@ -79,14 +79,14 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32,
         sort_lanes,
         sort_cells,
         sort_totals: sort_cells / u64::from(shape.subgroup),
-        sweep_cells: shape.sweep_cells(items),
+        look_cells: shape.sweep_cells(items),
         ..*engine.capacity()
     })?;
     let capacity = *engine.capacity();
     let mut builder = Builder::new("sort", &shape, &capacity);
     builder.list.copy(SOURCE_BUFFER, KEY_BUFFERS[0], 0);
     if shape.sweeps() {
-        builder.list.fill(Buf::SWEEP, 0).copy(DIGIT_BUFFER, Buf::SWEEP, u64::from(SWEEP_WORDS) * 4);
+        builder.list.fill(Buf::LOOK_BACK, 0).copy(DIGIT_BUFFER, Buf::LOOK_BACK, u64::from(SWEEP_WORDS) * 4);
     }
     let before = builder.list.work.len();
     let buffers = SortBuffers { keys: KEY_BUFFERS, values: VALUE_BUFFERS, narrow };

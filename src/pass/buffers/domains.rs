@@ -123,10 +123,8 @@ domains! {
         "Cells of the sort totals.";
     SCAN_LANES scan_lanes: "scan lanes", cures::pairs,
         "Lanes of the scan.";
-    SWEEP_CELLS sweep_cells: "sweep cells", cures::pairs,
-        "Words of look-back passes, or 0 if sort and scan do not look back.", optional;
-    LOOK_CELLS look_cells: "look cells", cures::model,
-        "Words of the passes that list splats, or 0 if they do not look back.", optional;
+    LOOK_CELLS look_cells: "look cells", cures::pairs,
+        "Words of passes that look back, or 0 without such passes.", optional;
     LOSS_PARTIALS loss_partials: "loss partials", cures::image,
         "Partial sums of the loss.";
     SEGMENT_PIXELS segment_pixels: "segment pixels", cures::image,
@@ -144,6 +142,7 @@ domains! {
     SHARED_ROWS shared_rows: "shared rows", cures::none,
         "Rows of four shared parameters, or 0 without shared parameters.", optional;
     .. sort_lanes: "Lanes of the sort.";
+    sweep_cells: "Words of sorts that look back, or 0 without such sorts; the first of `look_cells`.";
     segments: "Maximum number of dispatches for one walk of a tile's list.";
 }
 

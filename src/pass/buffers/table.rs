@@ -121,10 +121,8 @@ crate::buffers! { cures::whole;
         "Digit counts of the sort in earlier lanes of a workgroup, by digit and lane.";
     SORT_TOTALS "sort_totals": 4, Domain::SORT_TOTALS, Class::Step, WORD_TEXEL,
         "Digit counts of the sort, by digit and workgroup.";
-    SWEEP "sweep": 4, Domain::SWEEP_CELLS, Class::Step, None,
-        "Tickets and counts of look-back passes (glsl/include/sweep.glsl).";
     LOOK_BACK "look_back": 4, Domain::LOOK_CELLS, Class::Step, None,
-        "Tickets and counts of the passes that list splats (glsl/include/look_back.glsl).";
+        "Tickets and counts of passes that look back (glsl/include/sweep.glsl, look_back.glsl).";
     DEPTH_ORDER "depth_order": 4, Domain::GAUSSIANS, Class::Step, WORD_TEXEL,
         "Splats in depth order, `[V]`, if they are numbered in model order.";
     SPLATS "splats": 48, Domain::GAUSSIANS, Class::Step, VEC4_TEXEL,

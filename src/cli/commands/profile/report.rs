@@ -94,11 +94,12 @@ struct PerPair {
 }
 
 /// Numbers of a step: name in JSON, name in the table, value by the report and the pixels of a tile.
-const STEP_COUNTERS: [(&str, &str, fn(&StepReport, f64) -> f64); 6] = [
+const STEP_COUNTERS: [(&str, &str, fn(&StepReport, f64) -> f64); 7] = [
     ("visible", "visible splats", |step, _| f64::from(step.report.counters.visible_count)),
     ("instances", "(splat, tile) pairs", |step, _| f64::from(step.report.counters.instance_count)),
     ("layer_tiles", "tiles of object layers", |step, _| f64::from(step.report.counters.layer_tile_count)),
     ("longest_list", "splats of the fullest tile", |step, _| f64::from(step.report.counters.longest_list)),
+    ("recounts", "partitions counted for late workgroups", |step, _| f64::from(step.report.counters.recount_count)),
     ("pairs_listed", "(pixel, splat) pairs listed", |step, pixels| {
         f64::from(step.report.counters.instance_count) * pixels
     }),
