@@ -7,8 +7,8 @@
 // same for all Gaussians that missed the same number of updates; the host computes them in f64.
 //
 // missed: rows of MISSED_VECTORS. Row 0: the number of updates before this step, and the last one that no Gaussian
-// missed; the w of this step's update. Row 1 + age: after this many missed updates, the sums for means and opacities;
-// for scales, rotations, colours of degree 0 and of higher degrees; beta1^age, beta2^age, r^age.
+// missed. Row 1 + age: after this many missed updates, the sums for means and opacities; for scales, rotations, colours
+// of degree 0 and of higher degrees; beta1^age, beta2^age.
 
 #ifdef LAZY
 
@@ -40,20 +40,6 @@ void look_up(uint age) {
 // Looks up the updates that a Gaussian has missed before this step, if it is trained.
 void look_up_trained(StepUniforms u, uint i) {
     look_up(i < u.trained_count ? missed_updates(i) : 0u);
-}
-
-// The same after this step's update, which the Gaussian may also have missed.
-void look_up_after(uint i) {
-    uvec4 now = missed[0];
-    uint last = max(touched(i), now.y);
-    if (last <= now.x) {
-        uint age = min(now.x - last, MISSED_MOST);
-        look_up(age);
-        is_late = true;
-        float power = missed_row(2u, 2u).z * missed_row(1u + age, 2u).z;
-        late_means += power * missed_row(0u, 1u);
-        late_rest += power * missed_row(0u, 2u);
-    }
 }
 
 // What a sum is multiplied by. Where v is 0, so is m.

@@ -9,6 +9,7 @@
 #include "record.glsl"
 #include "ellipse.glsl"
 #include "cull.glsl"
+#include "near.glsl"
 #include "moments_store.glsl"
 // project_visible — cull, then project_forward, on GPUs: list, project and colour the visible Gaussians in model order,
 //                   and count the tiles of each.
@@ -20,9 +21,11 @@
 //          of z; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
 //          (integer atomics) as cull and project_forward; look_back, in variant sweep also histograms of the digits
 //          of the keys
+//          variant lazy: densify_stats [N], with MARKS_NEAR as mark_near
 // Math:    as cull and project_forward.
 // Order:   exact integers, equal in every run.
-// Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval
+// Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval,
+//          densify.rs::is_near
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = VISIBLE_LANES) in;
@@ -52,6 +55,8 @@ READ_MOMENTS(20, 27, sh2);
 READ_MOMENTS(21, 28, sh3);
 FETCHU(29, touched_at);
 READ(30, uvec4, missed);
+INOUT(35, vec2, densify_stats);
+layout(constant_id = 25) const uint MARKS_NEAR = 0;
 #endif
 WRITE(31, uint, keys_out);
 WRITE(32, uint, gaussian_from_splat);
@@ -76,11 +81,20 @@ shared uint is_visible[WORDS];     // a bit for each Gaussian of the partition
 shared uint visible_before[WORDS]; // visible ones in the words before
 shared uint tiles[WALKERS];
 
-uint key_of(StepUniforms u, uint i, out bool broken) {
+// As depth_key. Only the workgroup that owns the Gaussian takes note of it.
+uint key_of(StepUniforms u, uint i, bool is_own) {
     look_up_trained(u, i);
     vec4 mean = value4(means, i);
     vec3 s = value4(scales, i).xyz;
-    broken = is_broken(mean, s);
+    if (is_own && is_broken(mean, s)) {
+        atomicAdd(counters.broken_count, 1u);
+        atomicMin(counters.broken_first, i);
+    }
+#ifdef LAZY
+    if (is_own && MARKS_NEAR != 0u && i < u.trained_count && is_near(u, mean.xyz, s)) {
+        densify_stats[i] = vec2(0.0, STAT_NEAR);
+    }
+#endif
     return depth_key(u, mean, s);
 }
 
@@ -112,8 +126,7 @@ uint look_recount(uint part) {
     uint flags = 0u;
     for (uint k = 0u; k < VISIBLE_ITEMS; k++) {
         uint i = (part * VISIBLE_ITEMS + k) * VISIBLE_LANES + gl_LocalInvocationIndex;
-        bool broken;
-        flags |= i < step.gaussian_count && key_of(step, i, broken) != KEY_INVISIBLE ? 1u << k : 0u;
+        flags |= i < step.gaussian_count && key_of(step, i, false) != KEY_INVISIBLE ? 1u << k : 0u;
     }
     return count_visible(flags);
 }
@@ -157,13 +170,7 @@ void main() {
     }
     for (uint k = 0u; k < VISIBLE_ITEMS; k++) {
         uint i = base + k * VISIBLE_LANES + lane;
-        bool broken = false;
-        uint key = i < n ? key_of(step, i, broken) : KEY_INVISIBLE;
-        if (broken) {
-            atomicAdd(counters.broken_count, 1u);
-            atomicMin(counters.broken_first, i);
-        }
-        if (key != KEY_INVISIBLE) {
+        if (i < n && key_of(step, i, true) != KEY_INVISIBLE) {
             flags |= 1u << k;
         } else if (i < n) {
             splat_from_gaussian[i] = NO_SPLAT;

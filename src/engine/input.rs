@@ -131,7 +131,7 @@ impl Engine {
             ..*uniforms
         };
         self.sched.upload(Buf::STEP, frame, 0, &[counts])?;
-        self.write_missed(frame, input)?;
+        self.write_missed(frame)?;
         let (sched, shape) = (&mut self.sched, &self.shape);
         match input {
             Input::Uniforms(_) => Ok(()),

@@ -57,37 +57,32 @@ impl MissedUpdates {
     /// Returns the sums of the weights and the powers beta1^n and beta2^n for each number n of missed updates.
     pub(super) fn sums(&self) -> Vec<(Weights, [f32; 2])> {
         self.rows()
-            .map(|(sums, [first, second, _])| (sums.map(|sum| sum as f32), [first as f32, second as f32]))
+            .map(|(sums, powers)| (sums.map(|sum| sum as f32), powers.map(|power| power as f32)))
             .collect()
     }
 
-    /// Returns the same in f64, with the powers of beta1 / sqrt(beta2).
-    fn rows(&self) -> impl Iterator<Item = ([f64; 8], [f64; 3])> {
+    /// Returns the same in f64.
+    fn rows(&self) -> impl Iterator<Item = ([f64; 8], [f64; 2])> {
         let [beta1, beta2] = [ADAM_BETA1, ADAM_BETA2].map(f64::from);
         let ratio = beta1 / beta2.sqrt();
         // Before the first update, weights are 0.
         let newest = self.weights.iter().rev().copied().chain(std::iter::repeat(Weights::default()));
-        let start = ([0.0; 8], [1.0; 3]);
+        let start = ([0.0; 8], [1.0; 2]);
         let older = newest.scan(start, move |(sums, powers), weights| {
             sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum = ratio * (f64::from(weight) + *sum));
-            powers.iter_mut().zip([beta1, beta2, ratio]).for_each(|(power, factor)| *power *= factor);
+            powers.iter_mut().zip([beta1, beta2]).for_each(|(power, factor)| *power *= factor);
             Some((*sums, *powers))
         });
         std::iter::once(start).chain(older).take(MISSED_MOST as usize + 1)
     }
 
-    /// Returns the table for a step with update weights `next`. `after_failure` repeats a failed step.
-    fn table(&self, next: Weights, after_failure: bool) -> Vec<Row> {
-        let halves = |of: Weights| {
-            let word = |at: usize| of[at].to_bits();
-            [[0, 1, 2, 3].map(word), [4, 5, 6, 7].map(word)]
-        };
-        let [of_means, of_rest] = halves(next);
-        let head = [[self.mark.now, self.mark.whole, u32::from(after_failure), 0], of_means, of_rest];
+    /// Returns the table for a step. `after_failure` repeats a failed step.
+    fn table(&self, after_failure: bool) -> Vec<Row> {
+        let head = [[self.mark.now, self.mark.whole, u32::from(after_failure), 0], [0; 4], [0; 4]];
         let rows = self.rows().map(|(sums, powers)| {
-            let [of_means, of_rest] = halves(sums.map(|sum| sum as f32));
-            let [first, second, ratio] = powers.map(|power| (power as f32).to_bits());
-            [of_means, of_rest, [first, second, ratio, 0]]
+            let word = |at: usize| (sums[at] as f32).to_bits();
+            let [first, second] = powers.map(|power| (power as f32).to_bits());
+            [[0, 1, 2, 3].map(word), [4, 5, 6, 7].map(word), [first, second, 0, 0]]
         });
         std::iter::once(head).chain(rows).collect()
     }
@@ -191,12 +186,11 @@ impl Engine {
     }
 
     /// Uploads the table of missed updates before a list.
-    pub(super) fn write_missed(&mut self, frame: usize, input: Input) -> Result<()> {
+    pub(super) fn write_missed(&mut self, frame: usize) -> Result<()> {
         if !self.may_be_late() {
             return Ok(());
         }
-        let next = if let Input::Train(train) = input { weights(&train.uniforms) } else { Weights::default() };
-        self.sched.upload(Buf::MISSED, frame, 0, &self.missed.table(next, false))
+        self.sched.upload(Buf::MISSED, frame, 0, &self.missed.table(false))
     }
 
     /// Applies all missed updates on the device, before something else changes planes of the state. No list may be in
@@ -211,7 +205,7 @@ impl Engine {
         // The seed decides the rounding of packed moments.
         let seed = self.missed.mark.now;
         self.write(0, Input::Uniforms(&StepUniforms { seed, ..StepUniforms::zeroed() }))?;
-        self.sched.upload(Buf::MISSED, 0, 0, &self.missed.table([0.0; 8], true))?;
+        self.sched.upload(Buf::MISSED, 0, 0, &self.missed.table(true))?;
         self.sched.run(list, 0)?;
         self.missed.mark.whole = self.missed.mark.now;
         Ok(())
@@ -233,9 +227,9 @@ mod tests {
             missed.advance([update as f32; 8]);
         }
         missed.mark.whole = 145;
-        let table = missed.table([7.0; 8], false);
+        let table = missed.table(false);
         assert_eq!(table.len(), 257);
-        assert_eq!((table[0][0], number(table[0][2][3])), ([400, 145, 0, 0], 7.0));
+        assert_eq!(table[0][0], [400, 145, 0, 0]);
         let ratio = f64::from(0.9_f32) / f64::from(0.999_f32).sqrt();
         for age in [0, 1, 2, 30, 255] {
             let sum: f64 = (1..=age).map(|k| ratio.powi(k) * f64::from(400 - age + k)).sum();
@@ -243,7 +237,7 @@ mod tests {
             for word in means.into_iter().chain(rest) {
                 assert!((number(word) - sum).abs() <= 1e-7 * sum, "{age}: {} {sum}", number(word));
             }
-            let expected = [f64::from(0.9_f32).powi(age), f64::from(0.999_f32).powi(age), ratio.powi(age)];
+            let expected = [f64::from(0.9_f32).powi(age), f64::from(0.999_f32).powi(age)];
             for (word, power) in powers.into_iter().zip(expected) {
                 assert!((number(word) - power).abs() <= 1e-7 * power, "{age}: {} {power}", number(word));
             }
@@ -261,6 +255,6 @@ mod tests {
         missed.mark.whole = 302;
         missed.rewind(before);
         assert_eq!(missed.mark, UpdateMark { now: 300, whole: 0 });
-        assert_eq!(missed.table([0.0; 8], true), other.table([0.0; 8], true));
+        assert_eq!(missed.table(true), other.table(true));
     }
 }

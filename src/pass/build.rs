@@ -23,6 +23,9 @@ pub struct Builder<'a> {
     pub loss_partials: u32,
     /// True if Gaussians may have missed updates, which readers must apply.
     pub late: bool,
+    /// True if the projection also marks Gaussians that fog the camera (glsl/include/near.glsl); only where they may be
+    /// late.
+    pub marks_near: bool,
     /// Lists with more splats are processed forward with a workgroup per chunk; `None` if blends do not use chunks.
     pub long_list: Option<u32>,
     /// True if both moments of a parameter are packed into one word.
@@ -68,6 +71,7 @@ impl<'a> Builder<'a> {
             exposure: None,
             loss_partials: 0,
             late: false,
+            marks_near: false,
             long_list: None,
             half: capacity.packs_moments(),
             sort_passes: 0,

@@ -9,11 +9,9 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, mark_near(lazy: b.late, half: b.late && b.half) {
+    pass!(b, mark_near {
         step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
         counters: Buf::COUNTERS,
-        m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES, u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES,
-        touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED,
     } [], over_gaussians());
 }
 

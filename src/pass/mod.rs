@@ -164,6 +164,7 @@ pub fn extended_step(
         update::catch_up(&mut b);
     }
     extension.extend(passes, Hook::Camera, &mut b);
+    b.marks_near &= variant.update;
     project::visible_splats(&mut b);
     let pairs = tile::bin_splats(&mut b);
     blend::blend_forward(&mut b, pairs);

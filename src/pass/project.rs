@@ -70,7 +70,9 @@ fn project_visible(b: &mut Builder, keys: Buf) {
         u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
         u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, keys_out: keys,
         gaussian_from_splat: GAUSSIAN_FROM_SPLAT, look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
-    } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items], args(constants::ARGS_VISIBLE));
+        densify_stats: Buf::DENSIFY_STATS,
+    } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items,
+        marks_near: u32::from(b.marks_near)], args(constants::ARGS_VISIBLE));
 }
 
 /// Corrects the pose of the step's camera by rows `row` and `row + 1` of the step.

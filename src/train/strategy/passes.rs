@@ -29,7 +29,11 @@ impl Extension for StrategyPasses {
         if hook == Hook::Updated && has(SMOOTH_BIT) {
             optimize::smooth(b);
         }
-        if hook == Hook::Updated && has(FREE_SPACE_BIT) {
+        // The projection reads all Gaussians that may be late anyway.
+        if hook == Hook::Camera && has(FREE_SPACE_BIT) {
+            b.marks_near = b.late;
+        }
+        if hook == Hook::Updated && has(FREE_SPACE_BIT) && !b.late {
             densify::mark_near(b);
         }
     }

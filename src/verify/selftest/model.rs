@@ -7,6 +7,7 @@ use super::judge;
 use super::scenes::{Scene, Shape, scene};
 use crate::engine::ListKey;
 use crate::error::Result;
+use crate::pass::Update;
 use crate::reference::adam::{AdamState, Rates};
 use crate::reference::blend::blend_forward;
 use crate::reference::densify::{DensifiedPopulation, Origin, Population, densify, is_near, mark, opacity_reset};
@@ -236,9 +237,12 @@ pub fn fog(fixture: &mut Fixture) -> Result<Judge> {
     fixture.free_space = Some((other, OTHER_NEAR));
     fixture.input.update = true;
     fixture.engine.set_extension(BudgetStrategy.extension(), FREE_SPACE_BIT);
-    fixture.train_with(FREE_SPACE_BIT)?;
     let count = fixture.scene.gaussians.len();
-    let (stats, rows) = (fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?, fixture.rows(PARAMETER_PLANES, count)?);
+    let before = fixture.rows(PARAMETER_PLANES, count)?;
+    fixture.train_with(FREE_SPACE_BIT)?;
+    let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?;
+    let is_late = fixture.engine.shape().update != Update::Split;
+    let rows = if is_late { before } else { fixture.rows(PARAMETER_PLANES, count)? };
     Ok(Box::new(move |rules: &Rules| {
         let rules = Rules { near: f64::from(NEAR), ..rules.clone() };
         let decide = |row: &Row| is_near(&rules, &camera, Some((centre, f64::from(OTHER_NEAR))), row);
