@@ -23,7 +23,8 @@ READ1(4, Counters, counters);
 
 void main() {
     uint i = linear_group_id() * 64u + gl_LocalInvocationID.x;
-    if (i < step.trained_count && counters.failure == 0u && is_near(step, fetch4(means, i).xyz, fetch4(scales, i).xyz)) {
+    bool is_trained = i < step.trained_count && counters.failure == 0u;
+    if (is_trained && is_near(step, fetch4(means, i).xyz, fetch4(scales, i).xyz)) {
         densify_stats[i] = vec2(0.0, STAT_NEAR);
     }
 }

@@ -73,6 +73,7 @@ const uint SWEEP_STRIDE = 2u * SWEEP_DIGITS; // words per partition: of two sort
 const uint VISIBLE_LANES = 128u;             // invocations of a workgroup of project_visible,
 const uint VISIBLE_ITEMS_MIN = 2u;           // and the Gaussians of one
 const uint VISIBLE_ITEMS_MOST = 8u;
+const uint DEPTH_BITS = 28u;                 // of its depth keys, above the near plane: 32 octaves
 const uint ORDERED_LANES = 64u;              // splats of a workgroup of emit_ordered
 
 // Factors of the real spherical harmonics (sh.glsl).

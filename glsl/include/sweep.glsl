@@ -1,4 +1,4 @@
-// Single-dispatch passes of a sort over partitions of the keys: a workgroup takes the next one by a ticket, counts it, and
+// Single-dispatch passes of a sort over partitions of keys: a workgroup takes the next one by a ticket, counts it, and
 // looks back at the counts of the partitions before it (Merrill and Garland, "Single-pass parallel prefix scan with
 // decoupled look-back", 2016). No workgroup depends on the progress of another one: if a count is late, it counts that
 // partition itself. Counts are exact integers, so results do not depend on timing.

@@ -18,7 +18,7 @@
 // Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits
-//          of z; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
+//          of z above those of the near plane, which are in the same order; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
 //          (integer atomics) as cull and project_forward; look_back, in variant sweep also histograms of the digits
 //          of the keys
 //          variant lazy: densify_stats [N], with MARKS_NEAR as mark_near
@@ -194,10 +194,12 @@ void main() {
             i = base + nth_visible(r);
             float z;
             e = project_splat(step, s, i, z);
-            keys_out[s] = floatBitsToUint(z);
+            uint nearest = floatBitsToUint(step.near);
+            uint key = min(max(floatBitsToUint(z), nearest) - nearest, (1u << DEPTH_BITS) - 1u);
+            keys_out[s] = key;
             gaussian_from_splat[s] = i;
 #ifdef SWEEP
-            count_digits(floatBitsToUint(z));
+            count_digits(key);
 #endif
         }
         uint touched = count_tiles(e);

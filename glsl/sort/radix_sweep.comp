@@ -121,7 +121,8 @@ void main() {
     if (has_digit) {
         starts[lane] = before.x;
         moves[lane] = before.y + earlier - before.x;
-        look_back[(sweep_words(part) - SORT_PASS % 2u * SWEEP_DIGITS) + (SORT_PASS + 1u) % 2u * SWEEP_DIGITS + lane] = 0u;
+        uint other = SORT_PASS % 2u != 0u ? 0u - SWEEP_DIGITS : SWEEP_DIGITS;
+        look_back[sweep_words(part) + other + lane] = 0u;
     }
     barrier();
     [[unroll]] for (uint k = 0u; k < SWEEP_ITEMS; k++) {

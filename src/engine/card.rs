@@ -23,7 +23,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     let own = KernelShape::new(32, false);
     let shape = KernelShape { loss_tile: 16, narrow_labels: true, narrow_keys: true, ..own };
     let shape = KernelShape { group_walks: true, update: Update::Lazy, ..shape };
-    (shape.with_sweeps_of(16).with_group_blend_of(GroupBlend::DEFAULT), limits.for_gpu())
+    (shape.with_sweeps_of(KernelShape::SWEEP_ITEMS).with_group_blend_of(GroupBlend::DEFAULT), limits.for_gpu())
 }
 
 /// Predicts the memory of an engine of this size on a device with these kernels and limits.

@@ -56,9 +56,7 @@ impl MissedUpdates {
 
     /// Returns the sums of the weights and the powers beta1^n and beta2^n for each number n of missed updates.
     pub(super) fn sums(&self) -> Vec<(Weights, [f32; 2])> {
-        self.rows()
-            .map(|(sums, powers)| (sums.map(|sum| sum as f32), powers.map(|power| power as f32)))
-            .collect()
+        self.rows().map(|(sums, powers)| (sums.map(|sum| sum as f32), powers.map(|power| power as f32))).collect()
     }
 
     /// Returns the same in f64.

@@ -11,7 +11,7 @@ use crate::shaders::constants;
 /// Gaussian of each splat; the depth sort ends in this buffer.
 pub(super) const GAUSSIAN_FROM_SPLAT: Buf = Buf::DEPTH_VALUES_A;
 
-/// Bits of a depth key.
+/// Bits of a depth key of the CPU's form.
 const DEPTH_BITS: u32 = 32;
 
 /// Lists the visible Gaussians, projects them, and sorts them by depth. Afterwards splats are numbered by depth. With
@@ -21,9 +21,9 @@ pub(super) fn visible_splats(b: &mut Builder) {
     if b.shape.group_walks {
         let keys = [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B];
         let buffers = SortBuffers { keys, values: [Buf::DEPTH_ORDER, Buf::DEPTH_VALUES_B], narrow: false };
-        let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
+        let buffers = buffers.ending_in_first(b.shape, constants::DEPTH_BITS);
         project_visible(b, buffers.keys[0]);
-        sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", true);
+        sort::sort(b, buffers, constants::DEPTH_BITS, Count::Splats, "by depth", true);
         return;
     }
     pass!(b, cull {
@@ -72,7 +72,8 @@ fn project_visible(b: &mut Builder, keys: Buf) {
         gaussian_from_splat: GAUSSIAN_FROM_SPLAT, look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
         densify_stats: Buf::DENSIFY_STATS,
     } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items,
-        marks_near: u32::from(b.marks_near)], args(constants::ARGS_VISIBLE));
+        marks_near: u32::from(b.marks_near), key_bits: constants::DEPTH_BITS,
+        digit_bits: sort::digit_bits(b.shape, constants::DEPTH_BITS)], args(constants::ARGS_VISIBLE));
 }
 
 /// Corrects the pose of the step's camera by rows `row` and `row + 1` of the step.

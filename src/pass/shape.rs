@@ -132,6 +132,10 @@ const KERNEL_FORMS: [Form; 7] = [
 ];
 
 impl KernelShape {
+    /// Most items per invocation of a look-back sort. With 16, an invocation needs 103 registers instead of 64 (ptxas
+    /// for sm_89), and half a million items are too few workgroups.
+    pub const SWEEP_ITEMS: u32 = 8;
+
     /// Returns the shape for a device.
     pub fn for_device(device: &Capabilities) -> Self {
         let shape = Self::new(device.subgroup.size, device.is_cpu());
@@ -222,9 +226,9 @@ impl KernelShape {
             && SWEEP_LANES / self.subgroup <= subgroup.max_per_group
             && self.can_look_back(device)
             && (self.emulated || subgroup.has_ballots());
-        let shape = self.with_sweeps_of(16);
+        let shape = self.with_sweeps_of(Self::SWEEP_ITEMS);
         let most = limits.max_shared.checked_sub(shape.sweep_bytes(0))? / (4 * SWEEP_LANES);
-        let items = [16, 8, 4].into_iter().find(|&items| items <= most)?;
+        let items = [Self::SWEEP_ITEMS, 4].into_iter().find(|&items| items <= most)?;
         fits.then(|| self.with_sweeps_of(items))
     }
 
@@ -260,8 +264,8 @@ impl KernelShape {
         u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
     }
 
-    /// Returns the words of `Buf::LOOK_BACK` for the other passes of any list: project_visible, emit_ordered and a scan of
-    /// the tiles, or two scans of the Gaussians.
+    /// Returns the words of `Buf::LOOK_BACK` for the other passes of any list: project_visible, emit_ordered and a scan
+    /// of the tiles, or two scans of the Gaussians.
     pub fn look_cells(&self, gaussians: u64, virtual_tiles: u64) -> u64 {
         let scan = |items: u64| 1 + items.div_ceil(u64::from(ORDERED_LANES));
         if self.group_walks { 2 * scan(gaussians) + scan(virtual_tiles) } else { 0 }

@@ -36,6 +36,12 @@ fn passes(shape: &KernelShape, bits: u32) -> u32 {
     bits.div_ceil(shape.digit_bits).max(1)
 }
 
+/// Returns the digit bits of a look-back sort by `bits` bits: as few as its passes need, because fewer digits are
+/// counted sooner, and more pairs of a workgroup move together.
+pub fn digit_bits(shape: &KernelShape, bits: u32) -> u32 {
+    bits.div_ceil(passes(shape, bits)).max(1)
+}
+
 /// Sorts by the low `bits` bits. With `identity`, the values are the positions of the keys before the sort. `by` is
 /// appended to the pass titles. Returns the buffers with the sorted keys and values. In look-back sorts, the pass that
 /// writes the keys must count their digits (glsl/include/digit_counts.glsl).
@@ -44,8 +50,8 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
     let lanes = b.capacity.sort_lanes as u32;
     let workgroups = lanes / b.shape.subgroup;
     let groups = Grid::Groups(workgroups, 1, 1);
-    let digit_bits = b.shape.digit_bits;
     let passes = passes(b.shape, bits);
+    let digit_bits = if b.shape.sweeps() { digit_bits(b.shape, bits) } else { b.shape.digit_bits };
     for pass in 0..passes {
         let (from, to) = ((pass % 2) as usize, 1 - (pass % 2) as usize);
         let shift = pass * digit_bits;
@@ -54,9 +60,9 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         if b.shape.sweeps() {
             pass!(b, radix_sweep(narrow: buffers.narrow) {
-                step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
-                values_in: values_in, look_back: Buf::LOOK_BACK, keys_out: buffers.keys[to], values_out: buffers.values[to],
-            } [count_source: count as u32, shift: shift, sort_pass: b.sort_passes,
+                step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from], values_in: values_in,
+                look_back: Buf::LOOK_BACK, keys_out: buffers.keys[to], values_out: buffers.values[to],
+            } [count_source: count as u32, shift: shift, sort_pass: b.sort_passes, digit_bits: digit_bits,
                 identity: u32::from(identity_now)], count.partitions());
             b.sort_passes += 1;
             continue;

@@ -49,7 +49,8 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
             splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
             labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, order: Buf::DEPTH_ORDER,
             look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
-        } [sort_pass: sort_pass, look_first: look_first, key_bits: bits.max(1)], over_splats());
+        } [sort_pass: sort_pass, look_first: look_first, key_bits: bits.max(1),
+            digit_bits: sort::digit_bits(b.shape, bits)], over_splats());
     } else {
         pass!(b, emit_instances(labels: labels) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,

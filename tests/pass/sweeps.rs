@@ -74,20 +74,22 @@ fn list(engine: &mut Engine, held: Option<u32>, declare: impl FnOnce(&mut Builde
 }
 
 /// Sets numbers of items and partitions, and what the pass that wrote the keys has counted of them.
-fn announce(engine: &mut Engine, count: usize, keys: &[u32]) {
+fn announce(engine: &mut Engine, count: usize, (bits, keys): (u32, &[u32])) {
     let cells = engine.capacity().look_cells as usize;
-    let bits = engine.shape().digit_bits;
+    let digit_bits = sort::digit_bits(engine.shape(), bits);
     let mut sweep = vec![0_u32; cells];
-    for pass in 0..32 / bits {
+    for pass in 0..bits.div_ceil(digit_bits) {
         for key in keys {
-            let digit = key >> (pass * bits) & ((1 << bits) - 1);
+            let digit = key >> (pass * digit_bits) & ((1 << digit_bits) - 1);
             sweep[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
         }
     }
     let count = count as u32;
     let (sorting, scanning) = (count.div_ceil(SWEEP_LANES * engine.shape().sweep_items), count.div_ceil(64));
     let mut args = [0_u32; ARGS_WORDS as usize];
-    for (ats, groups) in [([ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES], sorting), ([ARGS_GAUSSIANS, ARGS_TILES], scanning)] {
+    for (ats, groups) in
+        [([ARGS_SWEEP_SPLATS, ARGS_SWEEP_INSTANCES], sorting), ([ARGS_GAUSSIANS, ARGS_TILES], scanning)]
+    {
         ats.iter().for_each(|&at| args[at as usize..][..3].copy_from_slice(&[groups, 1, 1]));
     }
     let (tile_count, most) = (count, u32::MAX);
@@ -122,7 +124,7 @@ fn a_scan_is_exact_and_saturates() {
             for most in [900, u32::MAX / 1000] {
                 for count in COUNTS {
                     let values: Vec<u32> = (0..count).map(|_| random.random_range(0..most)).collect();
-                    announce(engine, count, &[]);
+                    announce(engine, count, (0, &[]));
                     engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &values).expect("upload");
                     run(engine, id);
                     let (mut offsets, mut total) = exclusive_scan(&values);
@@ -147,7 +149,7 @@ fn occupied_tiles_are_listed_and_counted() {
         let mut random = generator(73);
         for count in COUNTS {
             let occupied: Vec<u32> = (0..count).map(|_| u32::from(random.random_bool(0.3))).collect();
-            announce(engine, count, &[]);
+            announce(engine, count, (0, &[]));
             engine.raw_mut().upload(Buf::TILES_TOUCHED, 0, 0, &occupied).expect("upload");
             run(engine, id);
             let expected: Vec<u32> = (0..count as u32).filter(|&i| occupied[i as usize] != 0).collect();
@@ -265,7 +267,7 @@ fn sort_exactly(engine: &mut Engine, held: Option<u32>, narrow: bool, cases: &[(
             keys.sort_unstable();
         }
         let values: Vec<u32> = (0..count as u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
-        announce(engine, count, &keys);
+        announce(engine, count, (bits, &keys));
         put_keys(engine, buffers.keys[0], &keys, narrow);
         engine.raw_mut().upload(buffers.values[0], 0, 0, &values).expect("upload");
         run(engine, id);
@@ -290,7 +292,7 @@ fn ten_million_keys_are_sorted() {
     const KEYS: usize = 10_000_000;
     let Ok(gpu) = Gpu::new(&options()) else { return };
     let turn = Turn::with(gpu);
-    let shape = KernelShape { texel: false, ..KernelShape::for_device(turn.capabilities()) }.with_sweeps_of(16);
+    let shape = KernelShape { texel: false, ..KernelShape::for_device(turn.capabilities()) }.with_sweeps_of(8);
     let size = EngineSize::new(1, (64, 64));
     let mut engine =
         Engine::with_shape(turn.gpu(), shape, size, super::fixture::readable()).expect("the engine starts");
@@ -303,7 +305,7 @@ fn ten_million_keys_are_sorted() {
     let (keys_out, values_out) = found.expect("the sort was declared");
     let mut random = generator(75);
     let keys: Vec<u32> = (0..KEYS).map(|_| random.random_range(0..1 << 13)).collect();
-    announce(&mut engine, KEYS, &keys);
+    announce(&mut engine, KEYS, (13, &keys));
     engine.raw_mut().upload(buffers.keys[0], 0, 0, &keys).expect("upload");
     run(&mut engine, id);
     let order = radix_sort(&keys);

@@ -7,11 +7,13 @@ use labelgs::engine::{Engine, EngineSize};
 use labelgs::gpu::Gpu;
 use labelgs::pass::buffers::Capacity;
 use labelgs::pass::build::Count;
-use labelgs::pass::sort::{SortBuffers, sort};
+use labelgs::pass::sort::{SortBuffers, digit_bits, sort};
 use labelgs::pass::{Builder, KernelShape};
 use labelgs::scheduler::SchedulerOptions;
 use labelgs::scheduler::plan::{Buf, PlanOptions};
-use labelgs::shaders::constants::{ARGS_SWEEP_INSTANCES, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES, SWEEP_WORDS};
+use labelgs::shaders::constants::{
+    ARGS_SWEEP_INSTANCES, DEPTH_BITS, SWEEP_DIGITS, SWEEP_HISTOGRAMS, SWEEP_LANES, SWEEP_WORDS,
+};
 use labelgs::shaders::structs::{Counters, StepUniforms};
 use labelgs::verify::selftest::scenes::generator;
 use labelgs::{Error, Result};
@@ -27,7 +29,7 @@ const SOURCE_BUFFER: Buf = Buf::SPLAT_FROM_INSTANCE;
 /// Stores the digits counted by the pass that writes keys.
 const DIGIT_BUFFER: Buf = Buf::INSTANCE_OFFSETS;
 /// Bits of depths, and of the tiles of a large image.
-const KEY_BITS: [u32; 2] = [32, 13];
+const KEY_BITS: [u32; 2] = [DEPTH_BITS, 13];
 
 /// Runs the benchmark.
 pub fn run(common: &Common) -> Result<()> {
@@ -95,7 +97,7 @@ fn timed(gpu: &Arc<Gpu>, shape: KernelShape, (count, bits, narrow): (usize, u32,
     let id = engine.raw_mut().prepare(&list)?;
     let mut random = generator(9);
     let mut keys: Vec<u32> = (0..count).map(|_| random.random::<u32>() >> (32 - bits)).collect();
-    announce(&mut engine, &keys, narrow)?;
+    announce(&mut engine, (bits, &keys), narrow)?;
     let mut times = Vec::new();
     for round in 0..=rounds {
         engine.raw_mut().run(id, 0)?;
@@ -128,12 +130,12 @@ fn packed(keys: &[u32], narrow: bool) -> Vec<u32> {
 }
 
 /// Uploads the keys, their number, and the counts of the pass that writes keys.
-fn announce(engine: &mut Engine, keys: &[u32], narrow: bool) -> Result<()> {
-    let (bits, items) = (engine.shape().digit_bits, engine.shape().sweep_items);
+fn announce(engine: &mut Engine, (bits, keys): (u32, &[u32]), narrow: bool) -> Result<()> {
+    let (digit_bits, items) = (digit_bits(engine.shape(), bits), engine.shape().sweep_items);
     let mut digits = vec![0_u32; SWEEP_WORDS as usize];
-    for pass in 0..32 / bits {
+    for pass in 0..bits.div_ceil(digit_bits) {
         for key in keys {
-            let digit = key >> (pass * bits) & ((1 << bits) - 1);
+            let digit = key >> (pass * digit_bits) & ((1 << digit_bits) - 1);
             digits[(SWEEP_HISTOGRAMS + pass * SWEEP_DIGITS + digit) as usize] += 1;
         }
     }

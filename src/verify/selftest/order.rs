@@ -29,7 +29,10 @@ impl DepthOrder {
         let gaussians: Option<Vec<u32>> = splats.iter().map(gaussian).collect();
         let gaussians =
             gaussians.ok_or_else(|| Error::Check(format!("the order of {visible} splats contains invalid indices")))?;
-        Ok(Self { splats, gaussians, keys: fixture.get(Buf::DEPTH_KEYS_A, visible)? })
+        // Look-back passes count from the near plane.
+        let first = if fixture.engine.shape().group_walks { fixture.uniforms().near.to_bits() } else { 0 };
+        let keys = fixture.get::<u32>(Buf::DEPTH_KEYS_A, visible)?.iter().map(|key| first + key).collect();
+        Ok(Self { splats, gaussians, keys })
     }
 
     /// Reorders per-splat values by depth.
