@@ -56,15 +56,14 @@ uint look_before(uint part, uint own) {
         barrier();
         sum = sweep_add(sum, joined(look_low, look_high));
         left = ends ? 0u : left - taken;
-        looks = taken > 0u ? 0u : looks + 1u;
+        looks += taken > 0u ? 0u : 1u;
         barrier();
-        if (looks > LOOKS) {
+        if (taken == 0u && looks > LOOKS) {
             if (lane == 0u) {
                 atomicAdd(counters.recount_count, 1u);
             }
             sum = sweep_add(sum, look_recount(left - 1u));
             left--;
-            looks = 0u;
         }
     }
     if (tells && part > 0u) {

@@ -1,6 +1,6 @@
 // The word that a partition publishes (sweep.glsl, look_back.glsl): two state bits, then a sum.
 
-layout(constant_id = 24) const uint LOOKS = 16; // at a word that is not there, before a recount
+layout(constant_id = 24) const uint LOOKS = 16; // of a workgroup at words that are not there; then it recounts
 
 const uint SWEEP_OWN = 1u << 30u;    // of the partition alone
 const uint SWEEP_PREFIX = 2u << 30u; // of all partitions up to this one

@@ -51,14 +51,14 @@ uint sweep_look_back(uint part, bool has_word, uint own) {
         atomicExchange(look_back[word], (part == 0u ? SWEEP_PREFIX : SWEEP_OWN) | own);
     }
     uint left = has_word ? part : 0u; // partitions that are not in the sum
-    uint sum = 0u;
+    uint sum = 0u, looks = 0u;
     while (true) {
-        for (uint looks = 0u; left > 0u && looks <= LOOKS;) {
+        for (bool is_there = true; left > 0u && (is_there || looks <= LOOKS);) {
             uint found = look_at(sweep_words(left - 1u) + lane);
-            bool is_there = found > SWEEP_SUM;
+            is_there = found > SWEEP_SUM;
             sum = is_there ? sweep_add(sum, found & SWEEP_SUM) : sum;
             left = (found & SWEEP_PREFIX) != 0u ? 0u : is_there ? left - 1u : left;
-            looks = is_there ? 0u : looks + 1u;
+            looks += is_there ? 0u : 1u;
         }
         if (lane == 0u) {
             sweep_late = 0u;

@@ -18,14 +18,13 @@
 // Reads:   step; means, scales, quats, sh0 [N]; sh1 [N,2], sh2 [N,4], sh3 [N,5];
 //          variant labels: labels [N], layer_from_label; variant lazy: moments [N], touched_at [N], missed
 // Writes:  splats [V,3] (record.glsl); tiles_touched [V] over all layers; gaussian_from_splat [V]; keys_out [V]: bits
-//          of z above those of the near plane, which are in the same order; splat_from_gaussian [N]; counters.visible_count and dispatch_args; counters.broken_* and unprojected_*
-//          (integer atomics) as cull and project_forward; look_back, in variant sweep also histograms of the digits
-//          of the keys
+//          of z above those of the near plane, which have the same order; splat_from_gaussian [N];
+//          counters.visible_count and dispatch_args; counters.broken_* and unprojected_* (integer atomics) as cull and
+//          project_forward; look_back, in variant sweep also histograms of the digits of the keys;
 //          variant lazy: densify_stats [N], with MARKS_NEAR as mark_near
 // Math:    as cull and project_forward.
 // Order:   exact integers, equal in every run.
-// Mirror:  src/reference/project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval,
-//          densify.rs::is_near
+// Mirror:  project.rs::cull, project.rs::project_forward, scan.rs::compact, tile.rs::row_interval, densify.rs::is_near
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(local_size_x = VISIBLE_LANES) in;
@@ -69,6 +68,7 @@ WRITE(34, uint, dispatch_args);
 #include "caught_up.glsl"
 #ifdef LAZY
 EACH_PLANE(CAUGHT_UP)
+#include "drift.glsl"
 #endif
 #include "splat.glsl"
 #include "count_args.glsl"
@@ -84,6 +84,11 @@ shared uint tiles[WALKERS];
 // As depth_key. Only the workgroup that owns the Gaussian takes note of it.
 uint key_of(StepUniforms u, uint i, bool is_own) {
     look_up_trained(u, i);
+#ifdef LAZY
+    if (is_late && !may_count(u, fetch4(means, i), fetch4(scales, i).xyz, is_own && MARKS_NEAR != 0u)) {
+        return KEY_INVISIBLE;
+    }
+#endif
     vec4 mean = value4(means, i);
     vec3 s = value4(scales, i).xyz;
     if (is_own && is_broken(mean, s)) {

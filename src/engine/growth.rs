@@ -105,13 +105,16 @@ fn derive(shape: &KernelShape, capacity: &mut Capacity, instances: u64, trained:
     let channels = trained(shape.chunks(instances, tiles) * u64::from(shape.tile_pixels()));
     capacity.chunk_channels = if capacity.labelled + capacity.known_depths > 0 { channels } else { 0 };
     capacity.sweep_cells = shape.sweep_cells(instances.max(capacity.gaussians));
-    capacity.look_cells = capacity.sweep_cells + shape.look_cells(capacity.gaussians, capacity.virtual_tiles);
     if !shape.sweeps() {
         capacity.sort_lanes = u64::from(shape.lanes(instances.max(capacity.gaussians)));
         capacity.sort_cells = capacity.sort_lanes << shape.digit_bits;
         capacity.sort_totals = capacity.sort_cells / u64::from(shape.subgroup);
     }
-    if !shape.group_walks {
+    if shape.group_walks {
+        // Splats, pairs, and tiles; or Gaussians twice.
+        let looks = [capacity.gaussians, capacity.gaussians, capacity.virtual_tiles].map(KernelShape::look_cells);
+        capacity.look_cells = capacity.sweep_cells + looks.iter().sum::<u64>();
+    } else {
         capacity.scan_lanes = 2 * u64::from(shape.lanes(capacity.gaussians.max(capacity.virtual_tiles)));
     }
 }

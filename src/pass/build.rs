@@ -85,10 +85,10 @@ impl<'a> Builder<'a> {
         self.capacity.segments.max(1) as u32
     }
 
-    /// Returns the first word of `Buf::LOOK_BACK` for the next pass: its ticket, before a word for each partition.
-    pub(super) fn next_look(&mut self, partitions: u64) -> u32 {
+    /// Returns the first word of `Buf::LOOK_BACK` for the next pass, over partitions of 64 items or more.
+    pub(super) fn next_look(&mut self, items: u64) -> u32 {
         let first = self.look_words;
-        self.look_words += 1 + partitions;
+        self.look_words += KernelShape::look_cells(items);
         assert!(self.look_words <= self.capacity.look_cells, "too many passes look back");
         first as u32
     }

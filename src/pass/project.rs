@@ -58,8 +58,7 @@ fn project_forward(b: &mut Builder) {
 /// Does all of this in one pass, except the sort.
 fn project_visible(b: &mut Builder, keys: Buf) {
     let (sh_degree, sort_pass, gaussians) = (b.sh_degree, b.sort_passes, b.capacity.gaussians);
-    let look_first = b.next_look(KernelShape::visible_partitions(gaussians));
-    let visible_items = KernelShape::visible_items(gaussians);
+    let (look_first, visible_items) = (b.next_look(gaussians), KernelShape::visible_items(gaussians));
     let labels = b.supervision.has_layers();
     pass!(b, project_visible(labels: labels, lazy: b.late, half: b.late && b.half, sweep: b.shape.sweeps()) {
         step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales: Buf::SCALES,

@@ -38,7 +38,7 @@ fn look_back(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: To
         Count::VirtualTiles => (b.capacity.virtual_tiles, args(constants::ARGS_TILES)),
         _ => (b.capacity.gaussians, over_gaussians()),
     };
-    let first = b.next_look(items.div_ceil(64));
+    let first = b.next_look(items);
     pass!(b, scan_once(list: list) {
         step: Buf::STEP, counters: Buf::COUNTERS, values: values, look_back: Buf::LOOK_BACK,
         offsets: out, layer_tiles: out, dispatch_args: Buf::DISPATCH_ARGS,

@@ -5,7 +5,6 @@ use crate::gpu::{Capabilities, SUBGROUP_MAX, SUBGROUP_MIN};
 use crate::lab;
 use crate::shaders::constants::{
     LABEL_BORDER, ORDERED_LANES, SWEEP_LANES, SWEEP_STRIDE, SWEEP_WORDS, VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST,
-    VISIBLE_LANES,
 };
 use crate::shaders::{self, ShaderDesc, emit_ordered, group_backward, group_forward, project_visible, update};
 use std::borrow::Cow;
@@ -41,7 +40,7 @@ pub struct KernelShape {
     pub group_blend: Option<GroupBlend>,
     /// How a step updates the parameters.
     pub update: Update,
-    /// Looks at the count of an earlier workgroup before a workgroup counts for it.
+    /// Looks of a workgroup at counts that are not there yet; then it counts for the workgroups that are late.
     pub looks: u32,
     /// Minimum number of workgroups of the sort and scan passes.
     pub lane_groups: u32,
@@ -264,21 +263,14 @@ impl KernelShape {
         u64::from(SWEEP_WORDS) + partitions * u64::from(SWEEP_STRIDE)
     }
 
-    /// Returns the words of `Buf::LOOK_BACK` for the other passes of any list: project_visible, emit_ordered and a scan
-    /// of the tiles, or two scans of the Gaussians.
-    pub fn look_cells(&self, gaussians: u64, virtual_tiles: u64) -> u64 {
-        let scan = |items: u64| 1 + items.div_ceil(u64::from(ORDERED_LANES));
-        if self.group_walks { 2 * scan(gaussians) + scan(virtual_tiles) } else { 0 }
+    /// Returns the words of `Buf::LOOK_BACK` for another pass: its ticket, and a word a partition.
+    pub fn look_cells(items: u64) -> u64 {
+        1 + items.div_ceil(u64::from(ORDERED_LANES))
     }
 
     /// Returns the Gaussians per invocation of project_visible: few if there would not be enough workgroups.
     pub fn visible_items(gaussians: u64) -> u32 {
         ((gaussians >> 19) as u32).clamp(VISIBLE_ITEMS_MIN, VISIBLE_ITEMS_MOST)
-    }
-
-    /// Returns its partitions.
-    pub fn visible_partitions(gaussians: u64) -> u64 {
-        gaussians.div_ceil(u64::from(VISIBLE_LANES * Self::visible_items(gaussians)))
     }
 
     /// Returns the shape for a subgroup size; `cpu` is true if the device is a CPU.

@@ -42,7 +42,7 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     let narrow = buffers.narrow;
     if b.shape.group_walks {
         let (sweep, sort_pass) = (b.shape.sweeps(), b.sort_passes);
-        let look_first = b.next_look(b.capacity.gaussians.div_ceil(u64::from(constants::ORDERED_LANES)));
+        let look_first = b.next_look(b.capacity.gaussians);
         pass!(b, emit_ordered(labels: labels, sweep: sweep, narrow: narrow) {
             step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
             tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],

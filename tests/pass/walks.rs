@@ -121,8 +121,10 @@ fn a_workgroup_walks_splats_as_invocations_do() {
     }
 }
 
-/// Lists of splats and pairs over many partitions, where partition `held` tells nothing.
-fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32>) -> Option<[Vec<u32>; 5]> {
+/// Lists of splats and pairs over many partitions, where partition `held` tells nothing and invocations of the projection
+/// have `items` Gaussians; by a processor without `looks`.
+fn listed(scene: Scene, options: &GpuOptions, looks: Option<(Option<u32>, u32)>) -> Option<[Vec<u32>; 5]> {
+    let looks_back = looks.is_some();
     let turn = Turn::with(Gpu::new(options).ok()?);
     let shape = KernelShape { sweep_items: 0, group_walks: looks_back, ..KernelShape::for_device(turn.capabilities()) };
     let shape = if looks_back { KernelShape { texel: false, ..shape }.with_sweeps_of(4) } else { shape };
@@ -131,14 +133,19 @@ fn listed(scene: Scene, options: &GpuOptions, looks_back: bool, held: Option<u32
     let mut list = render_view(&shape, fixture.engine.capacity(), 0, 0);
     for work in &mut list.work {
         let Work::Pass(pass) = work else { continue };
-        if let Some(place) = pass.shader.spec.iter().position(|constant| constant.name == "LOOK_HELD") {
-            pass.spec[place] = held.map_or(0, |partition| partition + 1);
+        for (constant, word) in pass.shader.spec.iter().zip(&mut pass.spec) {
+            match (constant.name, looks) {
+                ("LOOK_HELD", Some((held, _))) => *word = held.map_or(0, |partition| partition + 1),
+                ("VISIBLE_ITEMS", Some((_, items))) => *word = items,
+                _ => {}
+            }
         }
     }
     let id = fixture.engine.raw_mut().prepare(&list).expect("the list is planned");
     fixture.engine.raw_mut().run(id, 0).expect("run");
     fixture.engine.raw_mut().check_guards().expect("no pass writes outside of its buffers");
     let counters = fixture.get::<Counters>(Buf::COUNTERS, 1)[0];
+    assert!(counters.recount_count > 0 || looks.is_none_or(|(held, _)| held.is_none()), "nobody misses a partition");
     let order = DepthOrder::read(&mut fixture).expect("an order");
     let own = fixture.get::<u32>(Buf::DEPTH_VALUES_A, counters.visible_count as usize);
     let (keys, places) = fixture.sorted_pairs(counters.instance_count as usize);
@@ -152,11 +159,11 @@ fn splats_are_listed_and_numbered_wherever_a_partition_is_late() {
     let many = || scene(78, &Shape { gaussians: 3000, scales: (0.1, 1.5), sh_degree: 0, ..Shape::default() });
     let emulated = GpuOptions { subgroup_size: Some(32), emulate_subgroups: true, ..options() };
     for options in [options(), emulated] {
-        let Some(expected) = listed(many(), &options, false, None) else { return };
+        let Some(expected) = listed(many(), &options, None) else { return };
         let partitions = expected[0].len() / ORDERED_LANES as usize;
         assert!(partitions > 10 && expected[2].len() > 5000, "{partitions} partitions, {} pairs", expected[2].len());
-        for held in [None, Some(0), Some(3), Some(9)] {
-            let found = listed(many(), &options, true, held).expect("a device");
+        for looks in [(None, 2), (Some(0), 2), (Some(3), 2), (Some(9), 2), (None, 8), (Some(0), 8), (Some(1), 8)] {
+            let found = listed(many(), &options, Some(looks)).expect("a device");
             for (what, (found, expected)) in
                 ["Gaussians", "depths", "tiles", "places", "owners"].iter().zip(found.iter().zip(&expected))
             {

@@ -6,7 +6,13 @@ use super::scenes::{Scene, Shape, scene};
 use super::{Judge, judge};
 use crate::error::Result;
 use crate::reference::adam::{AdamState, Rates};
+use crate::reference::model::ROW_FLOATS;
 use crate::reference::{Row, Rules, adam, lazy};
+use crate::scheduler::plan::Buf;
+use crate::shaders::constants::{NO_SPLAT, STAT_NEAR};
+use crate::train::strategy::Strategy as _;
+use crate::train::strategy::budget::BudgetStrategy;
+use crate::train::strategy::passes::FREE_SPACE_BIT;
 
 const GAUSSIAN_COUNT: usize = 60;
 /// Updates that all Gaussians miss.
@@ -73,4 +79,38 @@ pub fn late(fixture: &mut Fixture) -> Result<Judge> {
         );
         judge::updates(&after, &expected, &all)
     }))
+}
+
+/// A scene of many small Gaussians, in all directions from the camera.
+pub fn many(seed: u64) -> Scene {
+    let shape = Shape { gaussians: 6000, scales: (0.01, 0.4), sh_degree: 0, ..Shape::default() };
+    let mut scene = scene(seed, &shape);
+    scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|value| 2.5 * value));
+    scene
+}
+
+/// Runs three steps of a view that shows nothing, and one of the scene's camera that also marks fog. If it `drifts`,
+/// Adam moves all Gaussians about as far as it can. Returns which Gaussians the last step lists, and which it marks.
+pub fn drifted(fixture: &mut Fixture, drifts: bool, catches_up: bool) -> Result<[Vec<bool>; 2]> {
+    let count = fixture.scene.gaussians.len();
+    (fixture.config.sh_degree, fixture.fixed.extent, fixture.input.update) = (0, 120.0, true);
+    fixture.view.near = 4.0;
+    let sign = |row: usize, at: usize| if (row * 31 + at * 17) % 7 < 3 { 7.2e-3 } else { -7.2e-3 };
+    let first = |row| Row::from_floats(&std::array::from_fn(|at| if drifts { sign(row, at) } else { 0.0 }));
+    let second = Row::from_floats(&[1e-6; ROW_FLOATS]);
+    fixture.put_moments(&(0..count).map(first).collect::<Vec<_>>(), &vec![second; count])?;
+    fixture.engine.set_extension(BudgetStrategy.extension(), FREE_SPACE_BIT);
+    let cx = fixture.scene.camera.cx;
+    for step in 1..=4 {
+        (fixture.input.step, fixture.input.updates) = (step, step);
+        fixture.scene.camera.cx = if step < 4 { cx + 1e5 } else { cx };
+        if step == 4 && catches_up {
+            fixture.engine.catch_up()?;
+        }
+        fixture.train_with(if step < 4 { 0 } else { FREE_SPACE_BIT })?;
+    }
+    let splats = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count)?;
+    let stats = fixture.get::<[f32; 2]>(Buf::DENSIFY_STATS, count)?;
+    let listed = splats.iter().map(|&splat| splat != NO_SPLAT).collect();
+    Ok([listed, stats.iter().map(|&[_, views]| views >= STAT_NEAR).collect()])
 }
