@@ -137,11 +137,14 @@ void take_parts(Work work, uint kept, uint k, inout vec3 before, inout vec3 ligh
     StepUniforms u, inout Channel channel) {
     TileJob t = work.t;
     bool inside = t.x < u.width && t.y0 + k < u.height;
-    uint pixel = inside ? (t.y0 + k) * u.width + t.x : 0u;
-    vec4 of_last = image[pixel];
-    light = inside ? of_last.xyz : vec3(0.0);
-    at_end = inside ? of_last.w : 1.0;
-    final_ = inside ? last[pixel] : 0u;
+    uint pixel = (t.y0 + k) * u.width + t.x;
+    vec4 of_last = vec4(0.0, 0.0, 0.0, 1.0);
+    if (inside) {
+        of_last = image[pixel];
+        final_ = last[pixel];
+    }
+    light = of_last.xyz;
+    at_end = of_last.w;
     float transmittance = 1.0;
     for (uint e = 0u; e < kept; e++) {
         uint at = state_of(work, e, k);

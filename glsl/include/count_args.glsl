@@ -16,28 +16,33 @@ void put_visible(uint total) {
     put_groups(ARGS_SWEEP_SPLATS, partitions(total));
 }
 
+// Adds failures, and returns whether there is any. Atomic, because other workgroups of the dispatch read the word.
+bool fails(uint bits) {
+    return (atomicOr(counters.failure, bits) | bits) != 0u;
+}
+
 // The need, even beyond capacity; then no pairs are written.
 void put_instances(uint total) {
     counters.instance_count = total;
     if (total > step.instance_capacity) {
-        counters.failure |= FAILED_INSTANCES;
         dispatch_args[ARGS_SPLATS] = 0u;
     }
-    put_groups(ARGS_SWEEP_INSTANCES, counters.failure != 0u ? 0u : partitions(total));
+    bool has_failed = fails(total > step.instance_capacity ? FAILED_INSTANCES : 0u);
+    put_groups(ARGS_SWEEP_INSTANCES, has_failed ? 0u : partitions(total));
 }
 
 // All tiles of the scene, then the occupied tiles of object layers, given the longest list. Nothing after any failure:
 // pairs that were only counted have no lists, and the backward pass has no chunks.
 void put_blend(uint layers, uint longest) {
-    counters.failure |= (layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
-        | (longest > step.longest_list ? FAILED_SEGMENTS : 0u);
+    bool has_failed = fails((layers > step.layer_tile_capacity ? FAILED_LAYER_TILES : 0u)
+        | (longest > step.longest_list ? FAILED_SEGMENTS : 0u));
     uint jobs = step.tile_count + layers;
-    put_groups(ARGS_BLEND, counters.failure != 0u ? 0u : jobs);
+    put_groups(ARGS_BLEND, has_failed ? 0u : jobs);
     if (step.chunk_length > 0u) {
-        put_groups(ARGS_CHUNKS, counters.failure != 0u ? 0u : counters.instance_count / step.chunk_length + jobs);
+        put_groups(ARGS_CHUNKS, has_failed ? 0u : counters.instance_count / step.chunk_length + jobs);
         // Other workgroups of this dispatch may have counted them.
         uint parts = atomicAdd(counters.long_chunk_count, 0u), firsts = atomicAdd(counters.first_list_count, 0u);
-        put_groups(ARGS_WALK, counters.failure != 0u ? 0u : parts + firsts + jobs);
-        put_groups(ARGS_PRODUCTS, counters.failure != 0u ? 0u : parts);
+        put_groups(ARGS_WALK, has_failed ? 0u : parts + firsts + jobs);
+        put_groups(ARGS_PRODUCTS, has_failed ? 0u : parts);
     }
 }

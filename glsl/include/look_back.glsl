@@ -14,7 +14,7 @@ uint look_recount(uint part);
 uint look_partition(out bool has_failed) {
     if (gl_LocalInvocationIndex == 0u) {
         look_ticket = atomicAdd(look_back[LOOK_FIRST], 1u);
-        look_failed = counters.failure;
+        look_failed = atomicOr(counters.failure, 0u); // the last partition may set it
     }
     barrier();
     has_failed = look_failed != 0u;
