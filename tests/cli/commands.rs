@@ -108,6 +108,12 @@ fn a_plan_for_a_card_needs_no_card() {
     );
     let half = succeeds(&[&many[..], &["--moments", "half"]].concat());
     assert!(half.contains("16-bit moments") && !half.contains("u_means"), "{half}");
+    // Where both fit, it proposes packed ones for many Gaussians only.
+    let advises = |gaussians, moments| {
+        let plan = succeeds(&["plan", "--gaussians", gaussians, "--card", "80G", "--moments", moments]);
+        plan.contains("moments: --moments half saves")
+    };
+    assert!(advises("2M", "full") && !advises("2M", "half") && !advises("1999k", "full"));
 }
 
 /// A scene of `labelgs synth`, 96 x 72 px.

@@ -6,7 +6,7 @@ use crate::cli::support::parsers::{Size, bytes, count, size};
 use crate::engine::{Engine, EngineSize, LabelSize, capacity, card, predict_for, predict_votes};
 use crate::gpu;
 use crate::pass::buffers::{Capacity, TABLE};
-use crate::pass::{KernelShape, Supervision, Variant, training_step};
+use crate::pass::{KernelShape, Supervision, Update, Variant, training_step};
 use crate::scheduler::plan::{Limits, MemoryReport, PassList, Plan, PlanOptions};
 use crate::train::Moments;
 use crate::words::counted;
@@ -192,9 +192,12 @@ fn summary(subject: &Subject, memory: &Memory) -> Result<String> {
         0 => "fits:    no Gaussians at this image size\n".to_owned(),
         most => format!("fits:    up to {} at this image size and number of objects\n", counted(most, "Gaussian")),
     };
+    let moments = if room.half_moments { Moments::Half } else { Moments::Full };
     if let Some(total) = subject.half_fits(memory) {
         let needed = total as f64 / MIB_BYTES;
         text += &format!("moments: fits with `labelgs train --set moments=half`: {needed:.0} MiB\n");
+    } else if let Some(advice) = moments.advice(room.gaussians).filter(|_| subject.shape.update == Update::Lazy) {
+        text += &format!("moments: {advice}\n");
     }
     let kept = subject.limits.kept_max(memory.total());
     if kept > 0 {

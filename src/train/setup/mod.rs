@@ -83,6 +83,9 @@ pub(crate) fn start_size(
 ) -> Result<EngineSize> {
     region.map_or(Ok(()), |region| region.check(model))?;
     let gaussians = model.len() as u64;
+    if let Some(advice) = config.moments.advice(gaussians.max(config.budget)).filter(|_| !gpu.is_cpu()) {
+        tracing::info!("moments: {advice}");
+    }
     let most = if config.max_gaussians > 0 { config.max_gaussians } else { u64::MAX };
     let roomy =
         engine_size(dataset, config, (gaussians * 2).min(most).max(gaussians))?.with_frozen(Region::frozen(region));
