@@ -32,40 +32,22 @@ FETCHU(12, layer_from_label);
 
 #include "records.glsl"
 
-void finish(uint s, Records r, Sums sums) {
-    v_splats[3u * s] = sums.a;
-    v_splats[3u * s + 1u] = sums.b;
-    v_splats[3u * s + 2u] = vec4(sums.c.x, 0.0, 0.0, 0.0);
-    note_gradient(r, sums);
-}
-
 void main() {
     uint s = linear_group_id() * 64u + gl_LocalInvocationID.x;
-#ifdef GROUP
-    if (gl_LocalInvocationID.x == 0u) {
-        large_count = 0u;
-    }
-    barrier();
-#endif
-    if (s < counters.visible_count && counters.failure == 0u) {
-        Records r = records(s, fetchu(gaussian_from_splat, s));
-#ifdef GROUP
-        if (r.total > WALKERS) {
-            large[atomicAdd(large_count, 1u)] = s; // in any order: each splat is summed for itself
-        } else
-#endif
-        {
-            finish(s, r, sum_records(r, 0u, 1u));
-        }
+    bool is_splat = s < counters.visible_count && counters.failure == 0u;
+    Records r = Records(0u, 0u, 0u, 0u);
+    if (is_splat) {
+        r = records(s, fetchu(gaussian_from_splat, s));
     }
 #ifdef GROUP
-    barrier();
-    for (uint k = 0u; k < large_count; k++) {
-        Records r = records(large[k], fetchu(gaussian_from_splat, large[k]));
-        Sums sums = sum_together(r);
-        if (gl_LocalInvocationID.x == 0u) {
-            finish(large[k], r, sums);
-        }
-    }
+    Sums sums = sum_all(r);
+#else
+    Sums sums = sum_records(r, 0u, 1u);
 #endif
+    if (is_splat) {
+        v_splats[3u * s] = sums.a;
+        v_splats[3u * s + 1u] = sums.b;
+        v_splats[3u * s + 2u] = vec4(sums.c.x, 0.0, 0.0, 0.0);
+        note_gradient(r, sums);
+    }
 }

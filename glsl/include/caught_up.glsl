@@ -47,6 +47,15 @@ vec4 late_direction(vec4 m, vec4 v) {
     return m / (sqrt(v) + ADAM_EPSILON);
 }
 
+// Planes of parameters, for the random draws of packed moments and for limits.
+const uint plane_means = 0u, plane_scales = 1u, plane_quats = 2u, plane_sh0 = 3u, plane_sh1 = 4u, plane_sh2 = 5u, plane_sh3 = 6u;
+
+// An element after missed updates. These move a scale in one direction, so the limit of each is the limit at the end.
+vec4 settled(uint plane, vec4 value, vec4 sums, vec4 m, vec4 v) {
+    value -= sums * late_direction(m, v);
+    return plane == plane_scales ? limited(value) : value;
+}
+
 // Declares value4 of a plane: an element after the missed updates that look_up found.
 #define CAUGHT_UP(name, sums) \
     vec4 name##_now(uint e) { \
@@ -54,7 +63,7 @@ vec4 late_direction(vec4 m, vec4 v) {
         if (is_late) { \
             vec4 m, v; \
             load_moments(name, e, m, v); \
-            value -= (sums) * late_direction(m, v); \
+            value = settled(plane_##name, value, vec4(sums), m, v); \
         } \
         return value; \
     }

@@ -38,3 +38,8 @@ float sigmoid(float logit) {
 bool finite(float x) { // tests the exponent bits, because drivers fold x - x
     return (floatBitsToUint(x) & 0x7f800000u) != 0x7f800000u;
 }
+
+// Scales that are at least the smallest deviation, their last element, if there is one.
+vec4 limited(vec4 scale) {
+    return vec4(scale.w > 0.0 ? max(scale.xyz, vec3(log(scale.w))) : scale.xyz, scale.w);
+}

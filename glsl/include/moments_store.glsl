@@ -62,3 +62,11 @@ uvec4 pack_moments(vec4 m, vec4 v, uint seed, uint e, uint plane) {
 #define store_moments(name, e, m, v, seed, plane) m_##name[e] = m, u_##name[e] = v
 #define forget_moments(name, e, part) m_##name[e].part = 0.0, u_##name[e].part = 0.0
 #endif
+
+// All planes of parameters, and their moments.
+#define INOUT_PLANES(at, first, second) \
+    INOUT(at, vec4, means); INOUT(at + 1, vec4, scales); INOUT(at + 2, vec4, quats); INOUT(at + 3, vec4, sh0); \
+    INOUT(at + 4, vec4, sh1); INOUT(at + 5, vec4, sh2); INOUT(at + 6, vec4, sh3); \
+    MOMENTS(first, second, means); MOMENTS(first + 1, second + 1, scales); MOMENTS(first + 2, second + 2, quats); \
+    MOMENTS(first + 3, second + 3, sh0); MOMENTS(first + 4, second + 4, sh1); MOMENTS(first + 5, second + 5, sh2); \
+    MOMENTS(first + 6, second + 6, sh3)

@@ -1,4 +1,6 @@
 // Counter-based random numbers: a hash of (seed, index, draw), the same on every device.
+#ifndef RANDOM_GLSL
+#define RANDOM_GLSL
 #include "near_zero.glsl"
 
 uint pcg_hash(uint v) {
@@ -26,3 +28,4 @@ float normal_draw(uint seed, uint index, uint draw) { // Box and Muller
     float r = sqrt(2.0 * minus_log1m(1.0 - uniform_draw(seed, index, 2u * draw)));
     return r * cos_of_turns(uniform_draw(seed, index, 2u * draw + 1u));
 }
+#endif

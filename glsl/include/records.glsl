@@ -3,9 +3,7 @@
 
 #ifdef GROUP
 const uint WALKERS = 64u; // invocations of a workgroup
-shared uint large_count;  // splats with more records than that,
-shared uint large[WALKERS];
-shared vec4 shared_a[WALKERS / 2u], shared_b[WALKERS / 2u]; // and sums of one of them
+shared vec4 shared_a[WALKERS / 2u], shared_b[WALKERS / 2u]; // sums of a splat
 shared vec3 shared_c[WALKERS / 2u];
 #endif
 
@@ -77,6 +75,44 @@ Sums sum_together(Records r) {
             sums.a += shared_a[lane];
             sums.b += shared_b[lane];
             sums.c += shared_c[lane];
+        }
+        barrier();
+    }
+    return sums;
+}
+
+shared uint large_count; // splats with more records than invocations: whose they are, and one of them
+shared uint large_lane[WALKERS];
+shared Records large;
+
+// Sums the records of the splat of each invocation; a splat may have none.
+Sums sum_all(Records r) {
+    uint lane = gl_LocalInvocationID.x;
+    if (lane == 0u) {
+        large_count = 0u;
+    }
+    barrier();
+    Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
+    if (r.total <= WALKERS) {
+        sums = sum_records(r, 0u, 1u);
+    } else {
+        large_lane[atomicAdd(large_count, 1u)] = lane; // in any order: each splat is summed for itself
+    }
+    barrier();
+    for (uint k = 0u; k < large_count; k++) {
+        if (lane == large_lane[k]) {
+            large = r;
+        }
+        barrier();
+        Sums all = sum_together(large);
+        if (lane == 0u) {
+            shared_a[0] = all.a;
+            shared_b[0] = all.b;
+            shared_c[0] = all.c;
+        }
+        barrier();
+        if (lane == large_lane[k]) {
+            sums = Sums(shared_a[0], shared_b[0], shared_c[0]);
         }
         barrier();
     }

@@ -20,8 +20,7 @@ Ellipse project_splat(StepUniforms u, uint s, uint i, out float z) {
     vec3 direction = normalize(mean.xyz - u.camera_centre);
     float basis[15];
     sh_basis(direction, SH_DEGREE, basis);
-    vec3 coefficients[16];
-    vec3 raw = sh_colour(i, basis, coefficients), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
+    vec3 raw = sh_colour(i, basis), colour = max(raw, 0.0); // in drivers, max(NaN, 0) is 0
 
     bool sane = finite(centre.x + centre.y + q.x + q.y + q.z + log2_o + raw.x + raw.y + raw.z);
     if (!sane) {
@@ -31,7 +30,7 @@ Ellipse project_splat(StepUniforms u, uint s, uint i, out float z) {
     splats[3u * s] = vec4(centre, q.x, q.y);
     splats[3u * s + 1u] = vec4(q.z, log2_o, colour.x, colour.y);
     splats[3u * s + 2u] = vec4(colour.z, p.view.z, extent);
-    splat_from_gaussian[i] = s;
+    splat_from_gaussian[i] = s | uint(dot(vec3(greaterThan(raw, vec3(0.0))), vec3(1.0, 2.0, 4.0))) << SPLAT_BITS;
     z = p.view.z;
     Ellipse e = ellipse(u, centre, extent, q, log2_o);
     e.rows = sane ? e.rows : 0u;

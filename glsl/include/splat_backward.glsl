@@ -1,17 +1,25 @@
-// The body of a function: gradients of a splat carried back to the parameters of its Gaussian i. Given are the uniforms
-// u; mean and quat; the projection p; gradients a: mean2d, conic xy, b: conic z, ln opacity, colour rg, and blue; and
-// sane, which is false if these are not finite. The includer also includes the code that reads the coefficients.
+// Carries the gradients of a splat back to the parameters of its Gaussian, after the code that reads coefficients.
 
-    vec3 offset = mean.xyz - u.camera_centre;
-    float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
-    vec3 direction = offset * inv_distance;
-    float basis[15];
-    sh_basis(direction, SH_DEGREE, basis);
-    vec3 coefficients[16];
-    vec3 colour = sh_colour(i, basis, coefficients);
-    vec3 v_colour = mix(vec3(0.0), vec3(b.zw, blue), greaterThan(colour, vec3(0.0)));
-    vec3 v_direction = sh_direction_gradient(coefficients, direction, v_colour);
-    vec3 v_mean = (v_direction - direction * dot(direction, v_direction)) * inv_distance;
+struct GaussianGradient {
+    vec3 mean;
+    float logit;
+    vec3 log_scale;
+    vec4 quat;
+    vec3 colour;       // without the channels that were clamped at 0
+    vec3 by_direction; // part of the mean's gradient, through the direction from which its colour is seen
+    bool is_finite;    // otherwise all are 0
+};
+
+// a: mean2d, conic xy; b: conic z, ln opacity, colour rg; and blue. `above`: a bit for each channel that is not clamped.
+GaussianGradient project_splat_backward(StepUniforms u, uint i, vec4 mean, vec3 log_scale, vec4 quat, vec4 a, vec4 b,
+    float blue, uint above) {
+    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
+    float inv_distance;
+    vec3 direction = direction_of(mean.xyz - u.camera_centre, inv_distance);
+    vec3 v_colour = mix(vec3(0.0), vec3(b.zw, blue), notEqual(uvec3(above) & uvec3(1u, 2u, 4u), uvec3(0u)));
+    vec3 v_direction = sh_direction_gradient(i, direction, v_colour);
+    vec3 by_direction = (v_direction - direction * dot(direction, v_direction)) * inv_distance, v_mean = by_direction;
+    Projection p = project_gaussian(u, mean.xyz, log_scale, quat);
 
     // conic -> covariance -> M
     vec3 q = p.conic;
@@ -54,3 +62,12 @@
     float v_logit = b.y * (1.0 - opacity);
     float size = dot(abs(v_mean) + abs(v_log_scale) + abs(v_colour), vec3(1.0)) + dot(abs(v_quat), vec4(1.0)) + abs(v_logit);
     sane = sane && finite(size) && size < GRADIENT_MAX;
+    GaussianGradient gradient = GaussianGradient(vec3(0.0), 0.0, vec3(0.0), vec4(0.0), vec3(0.0), vec3(0.0), false);
+    if (sane) {
+        gradient = GaussianGradient(v_mean, v_logit, v_log_scale, v_quat, v_colour, by_direction, true);
+    } else {
+        atomicAdd(counters.nonfinite_count, 1u);
+        atomicMin(counters.nonfinite_first, i);
+    }
+    return gradient;
+}

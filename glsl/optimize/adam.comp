@@ -65,7 +65,7 @@ void main() {
     if (SEEN_ONLY != 0u && s == NO_SPLAT) {
         return;
     }
-    vec4 g = fetch4(gradients, s == NO_SPLAT ? 0u : s * STRIDE + (e - i * STRIDE));
+    vec4 g = fetch4(gradients, s == NO_SPLAT ? 0u : (s & SPLAT_MASK) * STRIDE + (e - i * STRIDE));
     g = s == NO_SPLAT ? vec4(0.0) : g;
     vec4 rate = RATE == 0u ? u.rate_means
         : RATE == 3u ? vec4(vec3(u.rate_sh0), u.rate_sh_rest)

@@ -7,6 +7,7 @@
 #include "projection.glsl"
 #include "sh.glsl"
 #include "moments_store.glsl"
+#include "strategy_moves.glsl"
 // update — update the Gaussians that a step touched: sum the gradient records of each, carry them back to its
 //          parameters, and apply its missed Adam updates, then the step's update.
 // Work:    64 Gaussians of the model per workgroup, one per invocation; colours by vec4, distributed among the
@@ -14,14 +15,16 @@
 // Reads:   step, counters; splat_from_gaussian [N]; tiles_touched, instance_offsets [V]; v_instances_a, _b, _c [I];
 //          missed; variant labels: labels [N], layer_from_label
 // Writes:  parameters, first and second moments [N], active colours alone; touched_at [N]; densify_stats [N];
-//          counters.nonfinite_* (integer atomics)
+//          counters.nonfinite_* (integer atomics); variant poses: pose_partials [ceil(N / 64), 2]
 // Math:    gather, project_backward and adam. A Gaussian with zero gradients is unchanged: it has missed one more
-//          update (caught_up.glsl).
+//          update (caught_up.glsl). MODES: move_all, too; variant poses: pose_backward. A Gaussian that is moved or
+//          limited stays late: the stored value moves, and what it has missed is added to that.
 // Order:   fixed, bitwise reproducible; no atomics on floats.
 // Mirror:  src/reference/project.rs::project_backward, densify.rs::accumulate, adam.rs::adam, lazy.rs::caught_up
 
 layout(constant_id = 11) const uint SH_DEGREE = 3;
 layout(constant_id = 18) const uint CHANGES = 1; // 0: the statistic alone
+layout(constant_id = 20) const uint MODES = 0;   // bits UPDATE_ of constants.glsl
 const uint REST_FLOATS = 3u * SH_DEGREE * (SH_DEGREE + 2u); // of the coefficients above degree 0
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
@@ -35,23 +38,14 @@ FETCH2(7, v_instances_c);
 INOUT(8, vec2, densify_stats);
 INOUT(9, uint, touched_at);
 READ(10, uvec4, missed);
-INOUT(11, vec4, means);
-INOUT(12, vec4, scales);
-INOUT(13, vec4, quats);
-INOUT(14, vec4, sh0);
-INOUT(15, vec4, sh1);
-INOUT(16, vec4, sh2);
-INOUT(17, vec4, sh3);
-MOMENTS(18, 25, means);
-MOMENTS(19, 26, scales);
-MOMENTS(20, 27, quats);
-MOMENTS(21, 28, sh0);
-MOMENTS(22, 29, sh1);
-MOMENTS(23, 30, sh2);
-MOMENTS(24, 31, sh3);
+INOUT_PLANES(11, 18, 25);
 #ifdef LABELS
 FETCHU(32, labels);
 FETCHU(33, layer_from_label);
+#endif
+#ifdef POSES
+WRITE(34, vec4, pose_partials);
+#include "pose_sums.glsl"
 #endif
 
 #define GROUP
@@ -64,70 +58,58 @@ EACH_PLANE(CAUGHT_UP)
 #include "sh_backward.glsl"
 #include "records.glsl"
 #include "late_adam.glsl"
+#include "splat_backward.glsl"
 
 shared uint seen_count;    // Gaussians with a splat
-shared uint large_lane[WALKERS]; // of the large ones
-shared uint touched_count; // Gaussians with a gradient: row, what they missed of colours, and the gradients of these
-shared uint touched_row[WALKERS];
-shared vec4 touched_late[WALKERS];
-shared vec3 touched_colour[WALKERS];
+shared vec3 touched_colour[WALKERS]; // gradients of colours of those that are updated, and values of the harmonics
 shared float touched_basis[15u * WALKERS];
 
-// Sums the records of the Gaussian of each invocation that has a splat.
-Sums sum_all(Records r, uint s) {
-    uint lane = gl_LocalInvocationID.x;
-    Sums sums = Sums(vec4(0.0), vec4(0.0), vec3(0.0));
-    if (r.total > WALKERS) {
-        uint k = atomicAdd(large_count, 1u); // in any order: each splat is summed for itself
-        large[k] = s;
-        large_lane[k] = lane;
-    } else {
-        sums = sum_records(r, 0u, 1u);
-    }
-    barrier();
-    for (uint k = 0u; k < large_count; k++) {
-        uint owner = large_lane[k];
-        Sums all = sum_together(records(large[k], linear_group_id() * WALKERS + owner));
-        if (lane == 0u) {
-            shared_a[0] = all.a;
-            shared_b[0] = all.b;
-            shared_c[0] = all.c;
-        }
-        barrier();
-        if (lane == owner) {
-            sums = Sums(shared_a[0], shared_b[0], shared_c[0]);
-        }
-        barrier();
-    }
-    return sums;
-}
-
-// Updates everything except colours, and stores what the colour update needs.
-void update_geometry(StepUniforms u, uint i, Sums sums) {
-    look_up(missed_updates(i));
+// Updates everything except colours, and stores what the colour update needs. Returns the gradients of the pose.
+void update_geometry(StepUniforms u, uint i, uint above, Sums sums, inout vec3 force, inout vec3 torque) {
+    look_up_trained(u, i);
     vec4 mean = means_now(i), quat = quats_now(i);
-    Projection p = project_gaussian(u, mean.xyz, scales_now(i).xyz, quat);
-    vec4 a = sums.a, b = sums.b;
-    float blue = sums.c.x;
-    bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));
-#include "splat_backward.glsl"
-    if (!sane) {
-        atomicAdd(counters.nonfinite_count, 1u);
-        atomicMin(counters.nonfinite_first, i);
-    }
-    if (!sane || CHANGES == 0u) {
+    vec3 log_scale = scales_now(i).xyz;
+    GaussianGradient v = project_splat_backward(u, i, mean, log_scale, quat, sums.a, sums.b, sums.c.x, above);
+    vec3 offset = mean.xyz - u.camera_centre;
+    force = v.mean;
+#ifdef POSES
+    torque = torque_of(offset, v.mean - v.by_direction, quat, v.quat);
+#endif
+    bool regularises = (MODES & UPDATE_REGULARISES) != 0u;
+    if (CHANGES == 0u || i >= u.trained_count || !(v.is_finite || regularises)) {
         return;
     }
-    means_step(u, i, vec4(v_mean, v_logit), u.rate_means);
-    scales_step(u, i, vec4(v_log_scale, 0.0), vec4(u.rate_scales));
-    quats_step(u, i, v_quat, vec4(u.rate_quats));
+    if (regularises) {
+        regularise(u, mean.w, log_scale, v.logit, v.log_scale);
+    }
+    means_step(u, i, vec4(v.mean, v.logit), u.rate_means);
+    scales_step(u, i, vec4(v.log_scale, 0.0), vec4(u.rate_scales));
+    quats_step(u, i, v.quat, vec4(u.rate_quats));
     touched_at[i] = missed[0].x + 1u;
-    uint slot = atomicAdd(touched_count, 1u); // in any order: each is updated for itself
-    touched_row[slot] = i;
-    touched_late[slot] = is_late ? vec4(late_rest.zw, late_shrink) : vec4(0.0);
-    touched_colour[slot] = v_colour;
+    uint slot = touch(i);
+    touched_colour[slot] = v.colour;
+    float inv_distance, basis[15];
+    sh_basis(direction_of(offset, inv_distance), SH_DEGREE, basis);
     for (uint k = 0u; k < 15u; k++) {
         touched_basis[15u * slot + k] = basis[k];
+    }
+}
+
+// Moves and limits a Gaussian after the step's update, which it may have missed.
+void explore_and_smooth(StepUniforms u, uint i) {
+    is_late = false;
+    look_up_after(i);
+    if ((MODES & UPDATE_EXPLORES) != 0u) {
+        means[i].xyz += random_move(u, i, means_now(i).w, scales_now(i).xyz, quats_now(i));
+    }
+    if ((MODES & UPDATE_SMOOTHS) != 0u) {
+        vec4 s = scales[i], m, v;
+        float limit = smallest_size(u, means_now(i).xyz, s.w);
+        if (!is_late || limit != s.w) {
+            load_moments(scales, i, m, v);
+            vec4 missing = is_late ? late_rest.x * late_direction(m, v) : vec4(0.0), now = is_late ? limited(s - missing) : s;
+            scales[i] = limited(vec4(now.xyz, limit)) + missing;
+        }
     }
 }
 
@@ -141,66 +123,56 @@ vec4 coefficient_gradient(uint slot, uint first) {
     return g;
 }
 
-// Finds the touched Gaussian of a vec4 in a plane with this many vec4 per Gaussian, and its element.
-uint find(uint at, uint stride, out uint part) {
-    uint slot = at / stride;
-    part = at - slot * stride;
-    vec4 late = touched_late[slot];
-    is_late = late.z > 0.0;
-    late_rest.zw = late.xy;
-    late_shrink = late.zw;
-    return slot;
-}
-
-void update_colours(StepUniforms u) {
-    uint lane = gl_LocalInvocationID.x, part;
-    for (uint at = lane; at < touched_count; at += WALKERS) {
-        uint slot = find(at, 1u, part);
-        float first = SH_DEGREE >= 1u ? touched_basis[15u * slot] * touched_colour[slot].x : 0.0;
-        sh0_step(u, touched_row[slot], vec4(SH_C0 * touched_colour[slot], first), vec4(vec3(u.rate_sh0), u.rate_sh_rest));
-    }
-    vec4 rate = vec4(u.rate_sh_rest);
-    for (uint at = lane; SH_DEGREE >= 1u && at < 2u * touched_count; at += WALKERS) {
-        uint slot = find(at, 2u, part);
-        sh1_step(u, 2u * touched_row[slot] + part, coefficient_gradient(slot, 1u + 4u * part), rate);
-    }
-    for (uint at = lane; SH_DEGREE >= 2u && at < 4u * touched_count; at += WALKERS) {
-        uint slot = find(at, 4u, part);
-        sh2_step(u, 4u * touched_row[slot] + part, coefficient_gradient(slot, 9u + 4u * part), rate);
-    }
-    for (uint at = lane; SH_DEGREE >= 3u && at < 5u * touched_count; at += WALKERS) {
-        uint slot = find(at, 5u, part);
-        sh3_step(u, 5u * touched_row[slot] + part, coefficient_gradient(slot, 25u + 4u * part), rate);
-    }
-}
+#define STEP_SH0(name, e, slot, first) name##_step(u, e, \
+    vec4(SH_C0 * touched_colour[slot], coefficient_gradient(slot, 0u).x), vec4(vec3(u.rate_sh0), u.rate_sh_rest))
+#define STEP(name, e, slot, first) name##_step(u, e, coefficient_gradient(slot, first), vec4(u.rate_sh_rest))
 
 void main() {
     StepUniforms u = step;
-    uint lane = gl_LocalInvocationID.x, i = linear_group_id() * WALKERS + lane;
+    uint lane = gl_LocalInvocationID.x, group = linear_group_id(), i = group * WALKERS + lane;
     if (lane == 0u) {
         seen_count = 0u;
-        large_count = 0u;
         touched_count = 0u;
     }
     barrier();
     bool is_trained = i < u.trained_count && counters.failure == 0u;
-    uint s = is_trained ? fetchu(splat_from_gaussian, i) : NO_SPLAT;
-    if (s != NO_SPLAT) {
+#ifdef POSES
+    bool counts = i < u.gaussian_count && counters.failure == 0u;
+#else
+    bool counts = is_trained;
+#endif
+    uint word = counts ? fetchu(splat_from_gaussian, i) : NO_SPLAT;
+    bool is_seen = word != NO_SPLAT;
+    if (is_seen) {
         atomicAdd(seen_count, 1u);
     }
     barrier();
-    if (seen_count == 0u) {
-        return;
+    vec3 force = vec3(0.0), torque = vec3(0.0);
+    if (seen_count > 0u) {
+        Records r = Records(0u, 0u, 0u, i);
+        if (is_seen) {
+            r = records(word & SPLAT_MASK, i);
+        }
+        Sums sums = sum_all(r);
+        note_gradient(r, sums);
+        bool has_gradient = any(notEqual(sums.a, vec4(0.0))) || any(notEqual(sums.b, vec4(0.0))) || sums.c.x != 0.0;
+        if (has_gradient || ((MODES & UPDATE_REGULARISES) != 0u && is_seen)) {
+            update_geometry(u, i, word >> SPLAT_BITS, sums, force, torque);
+        }
+        barrier();
+        EACH_COLOUR(sh0, 0u, 1u, 0u, STEP_SH0)
+        EACH_COLOUR(sh1, 1u, 2u, 1u, STEP)
+        EACH_COLOUR(sh2, 2u, 4u, 9u, STEP)
+        EACH_COLOUR(sh3, 3u, 5u, 25u, STEP)
     }
-    Records r = Records(0u, 0u, 0u, i);
-    if (s != NO_SPLAT) {
-        r = records(s, i);
+    if ((MODES & (UPDATE_EXPLORES | UPDATE_SMOOTHS)) != 0u && is_trained) {
+        explore_and_smooth(u, i);
     }
-    Sums sums = sum_all(r, s);
-    note_gradient(r, sums);
-    if (any(notEqual(sums.a, vec4(0.0))) || any(notEqual(sums.b, vec4(0.0))) || sums.c.x != 0.0) {
-        update_geometry(u, i, sums);
+#ifdef POSES
+    sum_pose(force, torque);
+    if (lane == 0u && i < u.gaussian_count) {
+        pose_partials[2u * group] = vec4(forces[0], 0.0);
+        pose_partials[2u * group + 1u] = vec4(torques[0], 0.0);
     }
-    barrier();
-    update_colours(u);
+#endif
 }

@@ -8,9 +8,7 @@
 // Work:    64 splats per workgroup.
 // Reads:   step; counters; gaussian_from_splat [V]; means, quats, sh0..sh3 [N]; v_means, v_quats, v_sh0 [V]
 // Writes:  pose_partials [ceil(V / 64), 2]: the force, and the torque around the camera, both in world axes
-// Math:    moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Rotating it rotates them around the
-//          camera, but not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part
-//          of the orientations, (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
+// Math:    see pose_sums.glsl
 // Order:   fixed, bitwise reproducible.
 // Mirror:  src/reference/pose.rs::backward
 
@@ -32,9 +30,7 @@ WRITE(12, vec4, pose_partials);
 
 #include "sh_colour.glsl"
 #include "sh_backward.glsl"
-
-shared vec3 forces[64];
-shared vec3 torques[64];
+#include "pose_sums.glsl"
 
 void main() {
     uint group = linear_group_id(), lane = gl_LocalInvocationID.x, s = group * 64u + lane;
@@ -43,28 +39,14 @@ void main() {
         uint i = fetchu(gaussian_from_splat, s);
         vec4 q = fetch4(quats, i), v_q = v_quats[s];
         vec3 offset = fetch4(means, i).xyz - step.camera_centre;
-        float inv_distance = inversesqrt(max(dot(offset, offset), 1e-24));
-        vec3 direction = offset * inv_distance;
-        float basis[15];
-        sh_basis(direction, SH_DEGREE, basis);
-        vec3 coefficients[16];
-        sh_colour(i, basis, coefficients);
-        vec3 v_direction = sh_direction_gradient(coefficients, direction, v_sh0[s].xyz / SH_C0);
+        float inv_distance;
+        vec3 direction = direction_of(offset, inv_distance);
+        vec3 v_direction = sh_direction_gradient(i, direction, v_sh0[s].xyz / SH_C0);
         force = v_means[s].xyz;
         vec3 of_place = force - (v_direction - direction * dot(direction, v_direction)) * inv_distance;
-        // Quaternions are w, x, y, z.
-        vec3 of_turn = q.x * v_q.yzw - v_q.x * q.yzw + cross(q.yzw, v_q.yzw);
-        torque = cross(offset, of_place) + 0.5 * of_turn;
+        torque = torque_of(offset, of_place, q, v_q);
     }
-    forces[lane] = force;
-    torques[lane] = torque;
-    for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
-        barrier();
-        if (lane < half_) {
-            forces[lane] += forces[lane + half_];
-            torques[lane] += torques[lane + half_];
-        }
-    }
+    sum_pose(force, torque);
     if (lane == 0u && s < counters.visible_count) {
         pose_partials[2u * group] = vec4(forces[0], 0.0);
         pose_partials[2u * group + 1u] = vec4(torques[0], 0.0);

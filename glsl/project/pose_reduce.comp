@@ -14,6 +14,7 @@
 // Mirror:  src/reference/pose.rs::backward
 
 layout(constant_id = 17) const uint ROW = 0;
+layout(constant_id = 18) const uint BY_SPLAT = 1; // the partials are those of pose_backward; 0: of update
 layout(local_size_x = 64) in;
 READ1(0, StepUniforms, step);
 READ1(1, Counters, counters);
@@ -23,26 +24,16 @@ READ(4, vec4, pose_partials);
 WRITE(5, vec4, v_shared);
 
 #include "pose.glsl"
-
-shared vec3 forces[64];
-shared vec3 torques[64];
+#include "pose_sums.glsl"
 
 void main() {
-    uint lane = gl_LocalInvocationID.x, groups = (counters.visible_count + 63u) / 64u;
+    uint lane = gl_LocalInvocationID.x, groups = ((BY_SPLAT != 0u ? counters.visible_count : step.gaussian_count) + 63u) / 64u;
     vec3 force = vec3(0.0), torque = vec3(0.0);
     for (uint group = lane; group < groups; group += 64u) {
         force += pose_partials[2u * group].xyz;
         torque += pose_partials[2u * group + 1u].xyz;
     }
-    forces[lane] = force;
-    torques[lane] = torque;
-    for (uint half_ = 32u; half_ > 0u; half_ /= 2u) {
-        barrier();
-        if (lane < half_) {
-            forces[lane] += forces[lane + half_];
-            torques[lane] += torques[lane + half_];
-        }
-    }
+    sum_pose(force, torque);
     if (lane == 0u) {
         uint turn = step_rows[ROW], move = step_rows[ROW + 1u];
         vec3 angle = vec3(correction(0u), correction(1u), correction(2u));

@@ -47,6 +47,11 @@ impl PendingUpdates {
                 m[at] *= first;
                 u[at] *= second;
             }
+            // The smallest deviation (`limited` in glsl/include/gaussian.glsl).
+            if plane == Buf::SCALES && values[4 * row + 3] > 0.0 {
+                let limit = values[4 * row + 3].ln();
+                values[4 * row..4 * row + 3].iter_mut().for_each(|value| *value = value.max(limit));
+            }
         }
     }
 }

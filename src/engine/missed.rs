@@ -4,7 +4,7 @@
 
 use super::{Engine, Input, ListKey};
 use crate::error::Result;
-use crate::pass::{Update, Variant, is_fused};
+use crate::pass::{Variant, is_fused};
 use crate::scheduler::plan::Buf;
 use crate::shaders::constants::{ADAM_BETA1, ADAM_BETA2, MISSED_MOST};
 use crate::shaders::structs::StepUniforms;
@@ -142,7 +142,6 @@ impl Engine {
     pub(super) fn caught_up(&self, key: ListKey) -> ListKey {
         let (UpdateMark { now, whole }, of) = (self.missed.mark, self.step_of(key));
         let catch_up = match of.filter(|_| self.may_be_late()) {
-            Some((_, true)) if self.shape.update == Update::Fused => true,
             Some((_, true)) => now - whole >= MISSED_MOST,
             Some((_, false)) => now > whole,
             None => return key,

@@ -19,6 +19,10 @@ pub struct Builder<'a> {
     pub counts: bool,
     /// The step's row with the photo's exposure, if any.
     pub exposure: Option<u32>,
+    /// First of the step's rows with the pose of its photo, if any.
+    pub pose: Option<u32>,
+    /// What a strategy adds to the update: bits `UPDATE_` of glsl/include/constants.glsl.
+    pub update_modes: u32,
     /// Partial sums that the photo loss writes.
     pub loss_partials: u32,
     /// True if Gaussians may have missed updates, which readers must apply.
@@ -69,6 +73,8 @@ impl<'a> Builder<'a> {
             sh_degree: 0,
             counts: false,
             exposure: None,
+            pose: None,
+            update_modes: 0,
             loss_partials: 0,
             late: false,
             marks_near: false,

@@ -1,7 +1,6 @@
 //! Adam on every attribute of the Gaussians and on shared parameters; the opacity reset.
 
-use super::build::{Builder, args, over_gaussians, over_splats};
-use super::project::GAUSSIAN_FROM_SPLAT;
+use super::build::{Builder, args, over_gaussians};
 use crate::pass::build::pass;
 use crate::scheduler::plan::{Buf, Grid, Stage};
 use crate::shaders::constants;
@@ -91,30 +90,15 @@ fn update(
     } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
 
-/// Adds the gradients of mean opacity and size to the gradients of the visible Gaussians.
-pub(crate) fn regularise(b: &mut Builder) {
+/// Moves faint Gaussians at random, and keeps all from becoming finer than the photos can show, as far as
+/// `update_modes` says so.
+pub(crate) fn move_all(b: &mut Builder) {
+    let modes = b.update_modes;
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, regularise {
-        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-        means: Buf::MEANS, scales: Buf::SCALES, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES,
-    } [], over_splats());
-}
-
-/// Keeps Gaussians from becoming finer than the photos can show.
-pub(crate) fn smooth(b: &mut Builder) {
-    b.list.stage = Stage::OPTIMISE;
-    pass!(b, smooth { step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales_in: Buf::SCALES,
-        scales: Buf::SCALES } [],
-        over_gaussians());
-}
-
-/// Moves faint Gaussians at random.
-pub(crate) fn explore(b: &mut Builder) {
-    b.list.stage = Stage::OPTIMISE;
-    pass!(b, explore {
-        step: Buf::STEP, counters: Buf::COUNTERS, means_in: Buf::MEANS, scales: Buf::SCALES, quats: Buf::QUATS,
-        means: Buf::MEANS,
-    } [], over_gaussians());
+    pass!(b, move_all {
+        step: Buf::STEP, counters: Buf::COUNTERS, means_in: Buf::MEANS, scales_in: Buf::SCALES, quats: Buf::QUATS,
+        means: Buf::MEANS, scales: Buf::SCALES,
+    } [modes: modes], over_gaussians());
 }
 
 /// Limits opacities to 0.01 and zeroes their moments.

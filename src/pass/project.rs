@@ -78,35 +78,44 @@ fn project_visible(b: &mut Builder, keys: Buf) {
 /// Corrects the pose of the step's camera by rows `row` and `row + 1` of the step.
 pub(crate) fn pose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::PROJECT;
+    b.pose = Some(row);
     pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE_GROUP);
 }
 
+/// Partial sums of the pose's gradient; gradients of splats are no longer needed.
+pub(super) const POSE_PARTIALS: Buf = Buf::V_SPLATS;
+
 /// Writes the gradient of that correction.
 pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
-    // The splat gradients are no longer needed.
-    let (sh_degree, partials) = (b.sh_degree, Buf::V_SPLATS);
+    let sh_degree = b.sh_degree;
     b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, pose_backward {
         step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
-        v_quats: Buf::V_QUATS, v_sh0: Buf::V_SH0, pose_partials: partials,
+        v_quats: Buf::V_QUATS, v_sh0: Buf::V_SH0, pose_partials: POSE_PARTIALS,
     } [sh_degree: sh_degree], over_splats());
+    pose_reduce(b, row, true);
+}
+
+/// Sums the partial sums of [`pose_backward`] (`by_splat`) or of the update.
+pub(super) fn pose_reduce(b: &mut Builder, row: u32, by_splat: bool) {
     pass!(b, pose_reduce {
         step: Buf::STEP, counters: Buf::COUNTERS, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED,
-        pose_partials: partials, v_shared: Buf::V_SHARED,
-    } [row: row], ONE_GROUP);
+        pose_partials: POSE_PARTIALS, v_shared: Buf::V_SHARED,
+    } [row: row, by_splat: by_splat.into()], ONE_GROUP);
 }
 
 /// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
-    let sh_degree = b.sh_degree;
+    let (sh_degree, modes) = (b.sh_degree, b.update_modes);
     b.list.stage = Stage::PROJECT_BACKWARD;
     pass!(b, project_backward {
         step: Buf::STEP, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
         scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
         v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
         v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-    } [sh_degree: sh_degree], over_splats());
+        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
+    } [sh_degree: sh_degree, modes: modes], over_splats());
 }
 
 #[cfg(test)]

@@ -83,8 +83,6 @@ pub enum Update {
     /// Separate passes: one sums gradients, one propagates them to the parameters, and one per attribute updates all
     /// Gaussians.
     Split,
-    /// One pass does this for Gaussians that the view touched, after a pass that updates all others.
-    Fused,
     /// One pass, for Gaussians that the view touched; the others miss updates until something touches or changes them.
     Lazy,
 }

@@ -124,6 +124,10 @@ impl Extension for PosePasses {
             Hook::Picture | Hook::Loss | Hook::Updated => {}
         }
     }
+
+    fn splits_update(&self, _passes: u32) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

@@ -1,17 +1,19 @@
-//! The passes that strategies add to training steps. A variant number has one bit per pass.
+//! The passes that strategies add to training steps. A variant number has one bit per pass. The
+//! kernels of the update do most of their work.
 
 use super::StepContext;
 use crate::pass::{Builder, Extension, Hook, densify, optimize};
+use crate::shaders::constants::{UPDATE_EXPLORES, UPDATE_REGULARISES, UPDATE_SMOOTHS};
 use crate::shaders::structs::StepUniforms;
 
 /// Marks Gaussians that fog the camera of the step.
 pub const FREE_SPACE_BIT: u32 = 1;
 /// Adds the gradients of mean opacity and size.
-pub(crate) const REGULARISE_BIT: u32 = 2;
+pub(crate) const REGULARISE_BIT: u32 = UPDATE_REGULARISES;
 /// Moves faint Gaussians at random.
-pub(crate) const EXPLORE_BIT: u32 = 4;
+pub(crate) const EXPLORE_BIT: u32 = UPDATE_EXPLORES;
 /// Keeps Gaussians from becoming finer than the photos can show.
-pub(crate) const SMOOTH_BIT: u32 = 8;
+pub(crate) const SMOOTH_BIT: u32 = UPDATE_SMOOTHS;
 
 /// The passes, selected by their bits.
 #[derive(Debug)]
@@ -19,27 +21,23 @@ pub(super) struct StrategyPasses;
 
 impl Extension for StrategyPasses {
     fn extend(&self, passes: u32, hook: Hook, b: &mut Builder) {
-        let has = |bit: u32| passes & bit != 0;
-        if hook == Hook::Gradients && has(REGULARISE_BIT) {
-            optimize::regularise(b);
+        b.update_modes = passes & !FREE_SPACE_BIT;
+        // An update in one kernel moves them, too.
+        if hook == Hook::Updated && !b.late && passes & (EXPLORE_BIT | SMOOTH_BIT) != 0 {
+            optimize::move_all(b);
         }
-        if hook == Hook::Updated && has(EXPLORE_BIT) {
-            optimize::explore(b);
-        }
-        if hook == Hook::Updated && has(SMOOTH_BIT) {
-            optimize::smooth(b);
-        }
+        let marks = passes & FREE_SPACE_BIT != 0;
         // The projection reads all Gaussians that may be late anyway.
-        if hook == Hook::Camera && has(FREE_SPACE_BIT) {
+        if hook == Hook::Camera && marks {
             b.marks_near = b.late;
         }
-        if hook == Hook::Updated && has(FREE_SPACE_BIT) && !b.late {
+        if hook == Hook::Updated && marks && !b.late {
             densify::mark_near(b);
         }
     }
 
-    fn splits_update(&self, passes: u32) -> bool {
-        passes & !FREE_SPACE_BIT != 0
+    fn splits_update(&self, _passes: u32) -> bool {
+        false
     }
 }
 

@@ -66,6 +66,7 @@ pub fn sizes(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<Judge> {
         fixture.config.antialias = true;
         fixture.engine.set_extension(BudgetStrategy.extension(), SMOOTH_BIT);
         fixture.train_with(passes)?;
+        fixture.engine.catch_up()?;
         let after = fixture.get::<[f32; 4]>(Buf::SCALES, before.len())?;
         Ok((fixture.rows(PARAMETER_PLANES, before.len())?, before, after, fixture.scene.camera))
     };

@@ -9,7 +9,7 @@ pub mod judge;
 pub mod model;
 pub mod moments;
 pub mod order;
-mod pose;
+pub mod pose;
 pub mod relocation;
 pub mod scenes;
 mod training;
@@ -139,6 +139,11 @@ impl Rig<'_> {
         Fixture::new(Arc::clone(self.gpu), scene, true, self.kernels, readable())
     }
 
+    /// Makes a fixture with the shape's own update.
+    fn own(&self, scene: Scene) -> Result<Fixture> {
+        Fixture::with_room(Arc::clone(self.gpu), scene, true, (self.kernels, readable()), |room| room)
+    }
+
     /// Makes a fixture with the update in one kernel, if the device supports it, and with full or packed moments.
     fn lazy(&self, scene: Scene, half: bool) -> Result<Option<Fixture>> {
         let Some(kernels) = self.kernels.with_lazy_updates(self.gpu.capabilities()) else { return Ok(None) };
@@ -182,11 +187,11 @@ pub fn changes(rules: &Rules, gpu: &Arc<Gpu>, kernels: KernelShape, done: impl F
             model::reset(&mut rig.fixture(scene_of(&before))?, before, ERROR_FACTOR)
         }),
         ("exposure of a photo", exposure::step),
-        ("pose of a photo", pose::step),
+        ("pose of a photo", |rig| pose::step(rig.gpu, rig.kernels)),
         ("antialiased splats and their gradient", |rig| {
             antialias::step(&mut rig.fixture(antialias::fine(93))?, ERROR_FACTOR)
         }),
-        ("smallest sizes of Gaussians", |rig| antialias::sizes(|| rig.fixture(antialias::around(94)), ERROR_FACTOR)),
+        ("smallest sizes of Gaussians", |rig| antialias::sizes(|| rig.own(antialias::around(94)), ERROR_FACTOR)),
         ("lift of labels by the paper's rule", |rig| model::lift(&mut rig.fixture(model::dominant(131))?)),
     ];
     let (mut clock, rig) = (CheckClock::new(done), Rig { gpu, kernels });

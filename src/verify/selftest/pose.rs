@@ -2,10 +2,11 @@
 
 use super::compare::{Tolerance, close};
 use super::fixture::{Fixture, readable};
-use super::scenes::{Shape, scene};
-use super::{ERROR_FACTOR, Judge, Rig, judge};
-use crate::engine::SharedRow;
+use super::scenes::{Scene, Shape, scene};
+use super::{ERROR_FACTOR, Judge, judge};
+use crate::engine::{EngineSize, SharedRow};
 use crate::error::Result;
+use crate::gpu::Gpu;
 use crate::pass::{KernelShape, Update};
 use crate::reference::pose::{PoseRows, backward, corrected};
 use crate::reference::{Row, Rules};
@@ -30,21 +31,25 @@ fn rows() -> Vec<[f32; 4]> {
 }
 
 /// Runs a step on a photo whose pose is corrected. Compares the splats of the corrected camera and the gradient of the
-/// correction; the other photo has no gradient.
-pub(super) fn step(rig: &Rig) -> Result<Judge> {
+/// correction, by the shape's own update; the other photo has no gradient.
+pub fn step(gpu: &Arc<Gpu>, kernels: KernelShape) -> Result<Judge> {
     let shape = Shape { gaussians: 150, width: 61, height: 45, ..Shape::default() };
-    let (scene, rows) = (scene(92, &shape), rows());
-    let options = (KernelShape { update: Update::Split, ..rig.kernels }, readable());
-    let mut fixture = Fixture::with_room(Arc::clone(rig.gpu), scene, false, options, |room| {
-        room.with_shared_rows(rows.len() as u32)
-    })?;
-    let place = RowOffsets { all: SharedLayout { scene: 0, photo: STEP_PHOTO_ROW as u32 }, ..RowOffsets::default() };
-    fixture.engine.set_extension(Poses::default().extension(place), 1);
-    fixture.engine.set_shared(&rows)?;
-    fixture.shared = (STEP_PHOTO_ROW..rows.len()).map(|row| SharedRow { row: row as u32, rates: [0.0; 4] }).collect();
-    fixture.train_with(1)?;
+    let (scene, rows) = (Scene { frozen: 40, ..scene(92, &shape) }, rows());
+    let run = |update| -> Result<(Fixture, Vec<[f32; 4]>)> {
+        let options = (KernelShape { update, ..kernels }, readable());
+        let with = |room: EngineSize| room.with_shared_rows(rows.len() as u32);
+        let mut fixture = Fixture::with_room(Arc::clone(gpu), scene.clone(), false, options, with)?;
+        let all = SharedLayout { scene: 0, photo: STEP_PHOTO_ROW as u32 };
+        fixture.engine.set_extension(Poses::default().extension(RowOffsets { all, ..RowOffsets::default() }), 1);
+        fixture.engine.set_shared(&rows)?;
+        let shared = (STEP_PHOTO_ROW..rows.len()).map(|row| SharedRow { row: row as u32, rates: [0.0; 4] });
+        fixture.shared = shared.collect();
+        fixture.train_with(1)?;
+        let v_shared = fixture.get::<[f32; 4]>(Buf::V_SHARED, rows.len())?;
+        Ok((fixture, v_shared))
+    };
+    let ((_, v_shared), (mut fixture, _)) = (run(kernels.update)?, run(Update::Split)?);
     let (splats, v_model) = (fixture.splats()?, fixture.gradient_rows()?);
-    let v_shared = fixture.get::<[f32; 4]>(Buf::V_SHARED, rows.len())?;
     let (model, camera) = (fixture.model(), fixture.scene.camera);
     Ok(Box::new(move |rules: &Rules| {
         let of_step: PoseRows = std::array::from_fn(|k| rows[STEP_PHOTO_ROW + k].map(f64::from));

@@ -17,7 +17,6 @@ use crate::shaders::constants::NO_SPLAT;
 use crate::shaders::structs::StepUniforms;
 use crate::train::StrategyKind;
 use crate::train::strategy::passes::EXPLORE_BIT;
-use crate::train::strategy::{StepContext, make};
 
 /// Relocates with this many draws; the fixture's model is the population. Opacities and scales of copies may differ.
 pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway: f64) -> Result<Judge> {
@@ -54,14 +53,11 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
     for without in [u32::MAX, EXPLORE_BIT, 0] {
         let mut fixture = rig()?;
         let count = fixture.scene.gaussians.len();
-        fixture.config.strategy = StrategyKind::Mcmc;
         // Large enough to stand out from the picture's gradients, and to move all except opaque Gaussians.
         (fixture.config.opacity_weight, fixture.config.scale_weight) = (Some(1.0), Some(1.0));
         fixture.config.position_lr_init = 2e-5;
         fixture.input.update = true;
-        let strategy = make(StrategyKind::Mcmc);
-        let all = strategy.passes(StepContext { step: 1, config: &fixture.config, extent: fixture.fixed.extent });
-        fixture.engine.set_extension(strategy.extension(), all);
+        let all = fixture.set_strategy(StrategyKind::Mcmc);
         fixture.train_with(all & !without)?;
         visible = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count)?;
         (uniforms, start) = (fixture.uniforms(), fixture.model().rows);
