@@ -8,6 +8,7 @@
 #include "sh.glsl"
 #include "moments_store.glsl"
 #include "strategy_moves.glsl"
+#include "arrival.glsl"
 // update — update the Gaussians that a step touched: sum the gradient records of each, carry them back to its
 //          parameters, and apply its missed Adam updates, then the step's update.
 // Work:    64 Gaussians of the model per workgroup, one per invocation; colours by vec4, distributed among the
@@ -159,7 +160,8 @@ void main() {
         if (has_gradient || ((MODES & UPDATE_REGULARISES) != 0u && is_seen)) {
             update_geometry(u, i, word >> SPLAT_BITS, sums, force, torque);
         }
-        barrier();
+        // Others write the coefficients that an invocation has read for its gradient.
+        buffer_barrier();
         EACH_COLOUR(sh0, 0u, 1u, 0u, STEP_SH0)
         EACH_COLOUR(sh1, 1u, 2u, 1u, STEP)
         EACH_COLOUR(sh2, 2u, 4u, 9u, STEP)
