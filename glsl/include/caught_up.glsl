@@ -42,6 +42,21 @@ void look_up_trained(StepUniforms u, uint i) {
     look_up(i < u.trained_count ? missed_updates(i) : 0u);
 }
 
+// The same after this step's update, which the Gaussian may also have missed.
+void look_up_after(StepUniforms u, uint i) {
+    uvec4 now = missed[0];
+    uint last = max(touched(i), now.y);
+    is_late = false;
+    if (last <= now.x) {
+        look_up(min(now.x - last, MISSED_MOST));
+        is_late = true;
+        vec2 shrink = late_shrink * vec2(ADAM_BETA1, ADAM_BETA2);
+        float factor = shrink.x * inversesqrt(shrink.y) * u.adam_correction1 * inversesqrt(u.adam_correction2);
+        late_means += factor * u.rate_means;
+        late_rest += factor * vec4(u.rate_scales, u.rate_quats, u.rate_sh0, u.rate_sh_rest);
+    }
+}
+
 // What a sum is multiplied by. Where v is 0, so is m.
 vec4 late_direction(vec4 m, vec4 v) {
     return m / (sqrt(v) + ADAM_EPSILON);

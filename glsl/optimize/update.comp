@@ -98,8 +98,7 @@ void update_geometry(StepUniforms u, uint i, uint above, Sums sums, inout vec3 f
 
 // Moves and limits a Gaussian after the step's update, which it may have missed.
 void explore_and_smooth(StepUniforms u, uint i) {
-    is_late = false;
-    look_up_after(i);
+    look_up_after(u, i);
     if ((MODES & UPDATE_EXPLORES) != 0u) {
         means[i].xyz += random_move(u, i, means_now(i).w, scales_now(i).xyz, quats_now(i));
     }
