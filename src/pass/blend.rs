@@ -31,19 +31,8 @@ fn group_forward(b: &mut Builder, pairs: Buf, main: bool, products: bool) {
     let (labels, (disagreement, depth)) = (walks && supervision.has_layers(), channels(supervision));
     let group_lanes = b.shape.group_blend.map_or(0, |blend| b.shape.tile_pixels() / blend.forward_rows);
     pass!(b, group_forward(labels: labels, main: main, disagreement: walks && disagreement, depth: walks && depth,
-        products: products) {
-        step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-        instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-        image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-        main_gaussian: Buf::MAIN_GAUSSIAN,
-        main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
-        view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
-        label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
-        label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
-        labels: Buf::LABELS, disagreement: Buf::DISAGREEMENT, depths: Buf::DEPTHS,
-        chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES, chunk_channel: Buf::CHUNK_CHANNEL,
-        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS,
-    } [lift: supervision.lifts().into(), counts: b.counts.into(), group_lanes: group_lanes,
+        products: products) { instance_from_sorted: pairs, gaussian_from_splat: GAUSSIAN_FROM_SPLAT }
+            [lift: supervision.lifts().into(), counts: b.counts.into(), group_lanes: group_lanes,
         long_list: b.long_list.unwrap_or(u32::MAX)],
         args(if products { constants::ARGS_PRODUCTS } else { constants::ARGS_WALK }));
 }
@@ -59,17 +48,9 @@ fn forward(b: &mut Builder, pairs: Buf, main: bool) {
     let (segments, counts) = (b.segments(), b.counts);
     let (labels, lift) = (b.supervision.has_layers(), b.supervision.lifts());
     for segment in 0..segments {
-        pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1) {
-            step: Buf::STEP, counters: Buf::COUNTERS, tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS,
-            instance_from_sorted: pairs, splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS,
-            image: Buf::IMAGE, last: Buf::LAST, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            main_gaussian: Buf::MAIN_GAUSSIAN,
-            main_weight_depth: Buf::MAIN_WEIGHT_DEPTH, layer_tiles: Buf::LAYER_TILES, target: Buf::TARGET,
-            view_labels: Buf::VIEW_LABELS, layer_occluders: Buf::LAYER_OCCLUDERS,
-            label_from_layer: Buf::LABEL_FROM_LAYER, layer_state: Buf::LAYER_STATE, layer_loss: Buf::LAYER_LOSS,
-            label_keys: Buf::LABEL_KEYS, layer_from_label: Buf::LAYER_FROM_LABEL, layer_weights: Buf::LAYER_WEIGHTS,
-            segment_colours: Buf::SEGMENT_COLOURS, segment_rest: Buf::SEGMENT_REST,
-        } [lift: lift.into(), counts: counts.into(), segment: segment, segments: segments],
+        pass!(b, blend_forward(labels: labels, main: main, segmented: segments > 1)
+            { instance_from_sorted: pairs, gaussian_from_splat: GAUSSIAN_FROM_SPLAT }
+                [lift: lift.into(), counts: counts.into(), segment: segment, segments: segments],
             args(constants::ARGS_BLEND));
     }
 }
@@ -81,30 +62,15 @@ pub(super) fn blend_backward(b: &mut Builder, pairs: Buf) {
     let (disagreement, depth) = channels(supervision);
     b.list.stage = Stage::BLEND_BACKWARD;
     if let Some(blend) = b.shape.group_blend {
-        pass!(b, group_backward(labels: labels, disagreement: disagreement, depth: depth) {
-            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
-            v_image: Buf::V_IMAGE,
-            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-            counters: Buf::COUNTERS, chunk_jobs: Buf::CHUNK_JOBS, chunk_states: Buf::CHUNK_STATES,
-            layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE, layer_weights: Buf::LAYER_WEIGHTS,
-            target: Buf::TARGET, view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS,
-            gaussian_from_splat: GAUSSIAN_FROM_SPLAT, depths: Buf::DEPTHS, chunk_channel: Buf::CHUNK_CHANNEL,
-        } [group_lanes: b.shape.tile_pixels() / blend.backward_rows], args(constants::ARGS_CHUNKS));
+        pass!(b, group_backward(labels: labels, disagreement: disagreement, depth: depth)
+            { instance_from_sorted: pairs, gaussian_from_splat: GAUSSIAN_FROM_SPLAT }
+                [group_lanes: b.shape.tile_pixels() / blend.backward_rows], args(constants::ARGS_CHUNKS));
         return;
     }
     for segment in (0..segments).rev() {
-        pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1) {
-            step: Buf::STEP, tile_starts: Buf::TILE_STARTS, instance_from_sorted: pairs,
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, splats: Buf::SPLATS, image: Buf::IMAGE, last: Buf::LAST,
-            v_image: Buf::V_IMAGE,
-            v_instances_a: Buf::V_INSTANCES_A, v_instances_b: Buf::V_INSTANCES_B, v_instances_c: Buf::V_INSTANCES_C,
-            counters: Buf::COUNTERS, layer_tiles: Buf::LAYER_TILES, layer_state: Buf::LAYER_STATE,
-            layer_weights: Buf::LAYER_WEIGHTS, segment_back: Buf::SEGMENT_BACK, target: Buf::TARGET,
-            view_labels: Buf::VIEW_LABELS, labels: Buf::LABELS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            disagreement: Buf::DISAGREEMENT, segment_rest: Buf::SEGMENT_REST,
-            depths: Buf::DEPTHS,
-        } [segment: segment, segments: segments], args(constants::ARGS_BLEND));
+        pass!(b, blend_backward(labels: labels, disagreement: disagreement, depth: depth, segmented: segments > 1)
+            { instance_from_sorted: pairs, gaussian_from_splat: GAUSSIAN_FROM_SPLAT }
+                [segment: segment, segments: segments], args(constants::ARGS_BLEND));
     }
 }
 

@@ -9,39 +9,27 @@ use crate::scheduler::plan::{Buf, Stage};
 /// Marks the Gaussians in the free space of the step's camera.
 pub(crate) fn mark_near(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, mark_near {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
-        counters: Buf::COUNTERS,
-    } [], over_gaussians());
+    pass!(b, mark_near {} [], over_gaussians());
 }
 
 /// Decides the fate of each Gaussian and counts the result.
 pub(super) fn mark(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, densify_mark {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, densify_stats: Buf::DENSIFY_STATS,
-        children_counts: Buf::CHILDREN_COUNTS, counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS,
-    } [], over_gaussians());
+    pass!(b, densify_mark {} [], over_gaussians());
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
 /// Weighs the Gaussians for [`relocate`], and counts those to be removed.
 pub(super) fn weigh(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, relocate_weigh {
-        step: Buf::STEP, means: Buf::MEANS, densify_stats: Buf::DENSIFY_STATS, children_counts: Buf::CHILDREN_COUNTS,
-        counters: Buf::COUNTERS,
-    } [], over_gaussians());
+    pass!(b, relocate_weigh {} [], over_gaussians());
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
 /// Draws Gaussians and decides how many copies each gets.
 pub(super) fn relocate(b: &mut Builder) {
     weigh(b);
-    pass!(b, relocate_draw {
-        step: Buf::STEP, child_offsets: Buf::CHILD_OFFSETS, children_counts: Buf::CHILDREN_COUNTS,
-        counters: Buf::COUNTERS, densify_actions: Buf::DENSIFY_ACTIONS, means: Buf::MEANS,
-    } [], over_gaussians());
+    pass!(b, relocate_draw {} [], over_gaussians());
     scan::scan(b, Buf::CHILDREN_COUNTS, Buf::CHILD_OFFSETS, Count::Gaussians, Total::Densified);
 }
 
@@ -50,30 +38,20 @@ pub(super) fn apply(b: &mut Builder, labels: bool) {
     b.list.copy(Buf::MEANS, Buf::OLD_MEANS, 0);
     b.list.copy(Buf::SCALES, Buf::OLD_SCALES, 0);
     b.list.copy(Buf::QUATS, Buf::OLD_QUATS, 0);
-    pass!(b, densify_geometry {
-        step: Buf::STEP, old_means: Buf::OLD_MEANS, old_scales: Buf::OLD_SCALES, old_quats: Buf::OLD_QUATS,
-        densify_actions: Buf::DENSIFY_ACTIONS, child_offsets: Buf::CHILD_OFFSETS, means: Buf::MEANS,
-        scales: Buf::SCALES,
-        quats: Buf::QUATS,
-    } [], over_gaussians());
+    pass!(b, densify_geometry {} [], over_gaussians());
     for a in &MODEL_ATTRIBUTES {
         let geometry = [Buf::MEANS, Buf::SCALES, Buf::QUATS].contains(&a.planes[0]);
         let moments = a.moments(b.half).iter().map(|&plane| (plane, true));
         let planes = [(a.planes[0], false)].into_iter().skip(usize::from(geometry)).chain(moments);
         for (plane, are_moments) in planes {
             b.list.copy(plane, Buf::OLD_VALUES, 0);
-            pass!(b, densify_copy(half: b.half && are_moments) {
-                step: Buf::STEP, old_values: Buf::OLD_VALUES, densify_actions: Buf::DENSIFY_ACTIONS,
-                child_offsets: Buf::CHILD_OFFSETS, values: plane,
-            } [stride: a.stride, moments: u32::from(are_moments)], args(a.args));
+            pass!(b, densify_copy(half: b.half && are_moments) { values: plane }
+                [stride: a.stride, moments: u32::from(are_moments)], args(a.args));
         }
     }
     if labels {
         b.list.copy(Buf::LABELS, Buf::OLD_LABELS, 0);
-        pass!(b, densify_labels {
-            step: Buf::STEP, old_labels: Buf::OLD_LABELS, densify_actions: Buf::DENSIFY_ACTIONS,
-            child_offsets: Buf::CHILD_OFFSETS, labels: Buf::LABELS,
-        } [], over_gaussians());
+        pass!(b, densify_labels {} [], over_gaussians());
     }
     b.list.fill(Buf::DENSIFY_STATS, 0);
 }

@@ -21,15 +21,12 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
     }
     let columns = |channels| Grid::Groups(width.div_ceil(64), height.div_ceil(STRIP_PIXELS), channels);
     let rows = Grid::Groups(height.div_ceil(64), width.div_ceil(STRIP_PIXELS), 3);
-    pass!(b, ssim_columns { step: Buf::STEP, image: Buf::IMAGE, target: Buf::TARGET, moments: Buf::SSIM_A } [],
+    pass!(b, ssim_columns { moments: Buf::SSIM_A } [],
         columns(3));
-    pass!(b, ssim_rows { step: Buf::STEP, moments: Buf::SSIM_A, target: Buf::TARGET, v_moments: Buf::SSIM_B } [],
+    pass!(b, ssim_rows { moments: Buf::SSIM_A, v_moments: Buf::SSIM_B } [],
         rows);
-    pass!(b, ssim_rows_backward { step: Buf::STEP, v_moments: Buf::SSIM_B, v_rows: Buf::SSIM_A } [], rows);
-    pass!(b, loss_columns_backward {
-        step: Buf::STEP, v_rows: Buf::SSIM_A, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
-        loss_partials: Buf::LOSS_PARTIALS,
-    } [], columns(1));
+    pass!(b, ssim_rows_backward { v_moments: Buf::SSIM_B, v_rows: Buf::SSIM_A } [], rows);
+    pass!(b, loss_columns_backward { v_rows: Buf::SSIM_A } [], columns(1));
     if b.supervision != Supervision::Disagreement {
         reduce(b);
     }
@@ -38,11 +35,9 @@ pub(crate) fn photo_loss(b: &mut Builder, width: u32, height: u32) {
 fn tiled_loss(b: &mut Builder, width: u32, height: u32) {
     let side = b.shape.loss_tile;
     let (labels, exposure) = (b.supervision.has_layers(), b.exposure.is_some());
-    pass!(b, loss_tile(labels: labels, disagreement: !labels && sums_all(b), exposure: exposure) {
-        step: Buf::STEP, counters: Buf::COUNTERS, image: Buf::IMAGE, target: Buf::TARGET, v_image: Buf::V_IMAGE,
-        loss_partials: Buf::LOSS_PARTIALS, layer_loss: Buf::LAYER_LOSS, disagreement: Buf::DISAGREEMENT,
-        step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
-    } [row: b.exposure.unwrap_or(0)], Grid::Groups(width.div_ceil(side), height.div_ceil(side), 1));
+    pass!(b, loss_tile(labels: labels, disagreement: !labels && sums_all(b), exposure: exposure)
+        { shared_parameters: Buf::SHARED }
+            [row: b.exposure.unwrap_or(0)], Grid::Groups(width.div_ceil(side), height.div_ceil(side), 1));
 }
 
 /// Applies the photo's exposure (row `row` of the step) to the picture, unless the loss pass does so.
@@ -52,9 +47,7 @@ pub(crate) fn expose(b: &mut Builder, row: u32) {
     if b.shape.loss_tile > 0 {
         return;
     }
-    pass!(b, expose {
-        step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
-    } [row: row], over_pixels(b, 64));
+    pass!(b, expose { shared_parameters: Buf::SHARED } [row: row], over_pixels(b, 64));
 }
 
 /// Converts the gradient of the exposed picture to that of the blended picture, unless the loss pass does so. Writes
@@ -64,16 +57,12 @@ pub(crate) fn expose_backward(b: &mut Builder, row: u32, stride: u32) {
     let mut count = b.loss_partials;
     if b.shape.loss_tile == 0 {
         count = b.capacity.pixels.div_ceil(u64::from(constants::EXPOSED)) as u32;
-        pass!(b, expose_backward {
-            step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, image: Buf::IMAGE,
-            v_image: Buf::V_IMAGE, exposure_partials: Buf::EXPOSURE_PARTIALS, target: Buf::TARGET,
-        } [row: row, partials: count], over_pixels(b, u64::from(constants::EXPOSED)));
+        pass!(b, expose_backward { shared_parameters: Buf::SHARED }
+            [row: row, partials: count], over_pixels(b, u64::from(constants::EXPOSED)));
     }
     let rows = b.capacity.shared_rows as u32;
-    pass!(b, expose_reduce {
-        step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED, exposure_partials: Buf::EXPOSURE_PARTIALS,
-        v_shared: Buf::V_SHARED,
-    } [stride: stride, rows: rows, row: row, partials: count], ONE_GROUP);
+    pass!(b, expose_reduce { shared_parameters: Buf::SHARED }
+        [stride: stride, rows: rows, row: row, partials: count], ONE_GROUP);
 }
 
 /// Grid over the pixels of an image, `each` per workgroup.
@@ -97,10 +86,7 @@ pub(super) fn reduce_disagreement(b: &mut Builder) {
 /// Sums the loss.
 fn reduce(b: &mut Builder) {
     b.list.stage = Stage::LOSS;
-    pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {
-        loss_partials: Buf::LOSS_PARTIALS, counters: Buf::COUNTERS, layer_loss: Buf::LAYER_LOSS, step: Buf::STEP,
-        disagreement: Buf::DISAGREEMENT,
-    } [partials: b.loss_partials], ONE_GROUP);
+    pass!(b, loss_reduce(labels: b.supervision.has_layers(), disagreement: b.supervision == Supervision::Disagreement) {} [partials: b.loss_partials], ONE_GROUP);
 }
 
 /// Returns the number of partial loss sums of an image: one per tile, or per subgroup of each strip.

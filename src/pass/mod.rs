@@ -132,9 +132,7 @@ fn begin<'a>(name: &str, shape: &'a KernelShape, capacity: &'a Capacity, sh_degr
     let late = capacity.late_gaussians > 0;
     let mut b = Builder { sh_degree, late, ..Builder::new(name, shape, capacity) };
     let (cells, visible_items) = (capacity.look_cells as u32, KernelShape::visible_items(capacity.gaussians));
-    pass!(b, step_begin(look: shape.group_walks) {
-        step: Buf::STEP, counters: Buf::COUNTERS, dispatch_args: Buf::DISPATCH_ARGS, look_back: Buf::LOOK_BACK,
-    } [cells: cells, visible_items: visible_items], Grid::Groups(cells.div_ceil(4096).clamp(1, 4096), 1, 1));
+    pass!(b, step_begin(look: shape.group_walks) {} [cells: cells, visible_items: visible_items], Grid::Groups(cells.div_ceil(4096).clamp(1, 4096), 1, 1));
     b
 }
 

@@ -82,12 +82,7 @@ fn update(
 ) {
     let rows = b.capacity.shared_rows as u32;
     let [parameters, first, second] = planes;
-    pass!(b, adam(shared: shared, half: b.half && !shared) {
-        step: Buf::STEP, counters: Buf::COUNTERS, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, gradients: gradients,
-        parameters_in: parameters, m_parameters_in: first, u_parameters_in: second, parameters: parameters,
-        m_parameters: first, u_parameters: second, step_rows: Buf::STEP_ROWS, step_rates: Buf::STEP_RATES,
-        weights: Buf::W_SHARED,
-    } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
+    pass!(b, adam(shared: shared, half: b.half && !shared) { gradients: gradients, parameters_in: parameters, m_parameters_in: first, u_parameters_in: second, parameters: parameters, m_parameters: first, u_parameters: second, weights: Buf::W_SHARED } [stride: stride, rate: rate, seen_only: seen_only, rows: rows], grid);
 }
 
 /// Moves faint Gaussians at random, and keeps all from becoming finer than the photos can show, as far as
@@ -95,17 +90,13 @@ fn update(
 pub(crate) fn move_all(b: &mut Builder) {
     let modes = b.update_modes;
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, move_all {
-        step: Buf::STEP, counters: Buf::COUNTERS, means_in: Buf::MEANS, scales_in: Buf::SCALES, quats: Buf::QUATS,
-        means: Buf::MEANS, scales: Buf::SCALES,
-    } [modes: modes], over_gaussians());
+    pass!(b, move_all { means_in: Buf::MEANS, scales_in: Buf::SCALES } [modes: modes], over_gaussians());
 }
 
 /// Limits opacities to 0.01 and zeroes their moments.
 pub(super) fn opacity_reset(b: &mut Builder) {
     b.list.stage = Stage::OPTIMISE;
-    pass!(b, opacity_reset(half: b.half) { step: Buf::STEP, means: Buf::MEANS, m_means: Buf::M_MEANS,
-        u_means: Buf::U_MEANS } [],
+    pass!(b, opacity_reset(half: b.half) {} [],
         over_gaussians());
 }
 

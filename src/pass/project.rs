@@ -26,10 +26,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
         sort::sort(b, buffers, constants::DEPTH_BITS, Count::Splats, "by depth", true);
         return;
     }
-    pass!(b, cull {
-        step: Buf::STEP, means: Buf::MEANS, scales: Buf::SCALES, depth_keys: Buf::DEPTH_KEYS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN, counters: Buf::COUNTERS,
-    } [], over_gaussians());
+    pass!(b, cull {} [], over_gaussians());
     let buffers = SortBuffers {
         keys: [Buf::DEPTH_KEYS_A, Buf::DEPTH_KEYS_B],
         values: [GAUSSIAN_FROM_SPLAT, Buf::DEPTH_VALUES_B],
@@ -37,9 +34,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
     };
     let buffers = buffers.ending_in_first(b.shape, DEPTH_BITS);
     scan::scan_visible(b, Buf::DEPTH_KEYS, Buf::VISIBLE_OFFSETS);
-    pass!(b, compact {
-        step: Buf::STEP, depth_keys: Buf::DEPTH_KEYS, visible_offsets: Buf::VISIBLE_OFFSETS,
-        keys_out: buffers.keys[0], values_out: buffers.values[0], counters: Buf::COUNTERS, } [], over_gaussians());
+    pass!(b, compact { keys_out: buffers.keys[0], values_out: buffers.values[0] } [], over_gaussians());
     sort::sort(b, buffers, DEPTH_BITS, Count::Splats, "by depth", false);
     project_forward(b);
     scan::scan(b, Buf::TILES_TOUCHED, Buf::INSTANCE_OFFSETS, Count::Splats, Total::Instances);
@@ -47,12 +42,7 @@ pub(super) fn visible_splats(b: &mut Builder) {
 
 fn project_forward(b: &mut Builder) {
     let sh_degree = b.sh_degree;
-    pass!(b, project_forward(labels: b.supervision.has_layers()) {
-        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-        splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-    } [sh_degree: sh_degree], over_splats());
+    pass!(b, project_forward(labels: b.supervision.has_layers()) { gaussian_from_splat: GAUSSIAN_FROM_SPLAT } [sh_degree: sh_degree], over_splats());
 }
 
 /// Does all of this in one pass, except the sort.
@@ -60,17 +50,7 @@ fn project_visible(b: &mut Builder, keys: Buf) {
     let (sh_degree, sort_pass, gaussians) = (b.sh_degree, b.sort_passes, b.capacity.gaussians);
     let (look_first, visible_items) = (b.next_look(gaussians), KernelShape::visible_items(gaussians));
     let labels = b.supervision.has_layers();
-    pass!(b, project_visible(labels: labels, lazy: b.late, half: b.late && b.half, sweep: b.shape.sweeps()) {
-        step: Buf::STEP, counters: Buf::COUNTERS, means: Buf::MEANS, scales: Buf::SCALES,
-        quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-        splats: Buf::SPLATS, tiles_touched: Buf::TILES_TOUCHED, splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-        labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, m_means: Buf::M_MEANS, m_scales: Buf::M_SCALES,
-        m_quats: Buf::M_QUATS, m_sh0: Buf::M_SH0, m_sh1: Buf::M_SH1, m_sh2: Buf::M_SH2, m_sh3: Buf::M_SH3,
-        u_means: Buf::U_MEANS, u_scales: Buf::U_SCALES, u_quats: Buf::U_QUATS, u_sh0: Buf::U_SH0, u_sh1: Buf::U_SH1,
-        u_sh2: Buf::U_SH2, u_sh3: Buf::U_SH3, touched_at: Buf::TOUCHED_AT, missed: Buf::MISSED, keys_out: keys,
-        gaussian_from_splat: GAUSSIAN_FROM_SPLAT, look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
-        densify_stats: Buf::DENSIFY_STATS,
-    } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items,
+    pass!(b, project_visible(labels: labels, lazy: b.late, half: b.late && b.half, sweep: b.shape.sweeps()) { keys_out: keys, gaussian_from_splat: GAUSSIAN_FROM_SPLAT } [sh_degree: sh_degree, sort_pass: sort_pass, look_first: look_first, visible_items: visible_items,
         marks_near: u32::from(b.marks_near), key_bits: constants::DEPTH_BITS,
         digit_bits: sort::digit_bits(b.shape, constants::DEPTH_BITS)], args(constants::ARGS_VISIBLE));
 }
@@ -79,7 +59,7 @@ fn project_visible(b: &mut Builder, keys: Buf) {
 pub(crate) fn pose(b: &mut Builder, row: u32) {
     b.list.stage = Stage::PROJECT;
     b.pose = Some(row);
-    pass!(b, pose { step: Buf::STEP, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED } [row: row], ONE_GROUP);
+    pass!(b, pose { shared_parameters: Buf::SHARED } [row: row], ONE_GROUP);
 }
 
 /// Partial sums of the pose's gradient; gradients of splats are no longer needed.
@@ -89,33 +69,20 @@ pub(super) const POSE_PARTIALS: Buf = Buf::V_SPLATS;
 pub(crate) fn pose_backward(b: &mut Builder, row: u32) {
     let sh_degree = b.sh_degree;
     b.list.stage = Stage::PROJECT_BACKWARD;
-    pass!(b, pose_backward {
-        step: Buf::STEP, counters: Buf::COUNTERS, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3, v_means: Buf::V_MEANS,
-        v_quats: Buf::V_QUATS, v_sh0: Buf::V_SH0, pose_partials: POSE_PARTIALS,
-    } [sh_degree: sh_degree], over_splats());
+    pass!(b, pose_backward { gaussian_from_splat: GAUSSIAN_FROM_SPLAT, pose_partials: POSE_PARTIALS } [sh_degree: sh_degree], over_splats());
     pose_reduce(b, row, true);
 }
 
 /// Sums the partial sums of [`pose_backward`] (`by_splat`) or of the update.
 pub(super) fn pose_reduce(b: &mut Builder, row: u32, by_splat: bool) {
-    pass!(b, pose_reduce {
-        step: Buf::STEP, counters: Buf::COUNTERS, step_rows: Buf::STEP_ROWS, shared_parameters: Buf::SHARED,
-        pose_partials: POSE_PARTIALS, v_shared: Buf::V_SHARED,
-    } [row: row, by_splat: by_splat.into()], ONE_GROUP);
+    pass!(b, pose_reduce { shared_parameters: Buf::SHARED, pose_partials: POSE_PARTIALS } [row: row, by_splat: by_splat.into()], ONE_GROUP);
 }
 
 /// Carries the gradients of splats back to the parameters of their Gaussians.
 pub(super) fn project_backward(b: &mut Builder) {
     let (sh_degree, modes) = (b.sh_degree, b.update_modes);
     b.list.stage = Stage::PROJECT_BACKWARD;
-    pass!(b, project_backward {
-        step: Buf::STEP, gaussian_from_splat: GAUSSIAN_FROM_SPLAT, means: Buf::MEANS,
-        scales: Buf::SCALES, quats: Buf::QUATS, sh0: Buf::SH0, sh1: Buf::SH1, sh2: Buf::SH2, sh3: Buf::SH3,
-        v_splats: Buf::V_SPLATS, v_means: Buf::V_MEANS, v_scales: Buf::V_SCALES, v_quats: Buf::V_QUATS,
-        v_sh0: Buf::V_SH0, v_sh1: Buf::V_SH1, v_sh2: Buf::V_SH2, v_sh3: Buf::V_SH3, counters: Buf::COUNTERS,
-        splat_from_gaussian: Buf::SPLAT_FROM_GAUSSIAN,
-    } [sh_degree: sh_degree, modes: modes], over_splats());
+    pass!(b, project_backward { gaussian_from_splat: GAUSSIAN_FROM_SPLAT } [sh_degree: sh_degree, modes: modes], over_splats());
 }
 
 #[cfg(test)]

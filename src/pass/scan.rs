@@ -39,10 +39,7 @@ fn look_back(b: &mut Builder, (values, out): (Buf, Buf), count: Count, total: To
         _ => (b.capacity.gaussians, over_gaussians()),
     };
     let first = b.next_look(items);
-    pass!(b, scan_once(list: list) {
-        step: Buf::STEP, counters: Buf::COUNTERS, values: values, look_back: Buf::LOOK_BACK,
-        offsets: out, layer_tiles: out, dispatch_args: Buf::DISPATCH_ARGS,
-    } [count_source: count as u32, total: total as u32, look_first: first], grid);
+    pass!(b, scan_once(list: list) { values: values, offsets: out, layer_tiles: out } [count_source: count as u32, total: total as u32, look_first: first], grid);
 }
 
 /// Same as [`scan`], with each key other than `KEY_INVISIBLE` counting as 1.
@@ -53,14 +50,7 @@ pub fn scan_visible(b: &mut Builder, keys: Buf, offsets: Buf) {
 fn reduce_then_scan(b: &mut Builder, (values, offsets): (Buf, Buf), count: Count, total: Total, flag: bool) {
     let lanes = b.capacity.scan_lanes as u32;
     let groups = Grid::Groups(lanes / b.shape.subgroup, 1, 1);
-    pass!(b, scan_reduce(flag: flag) {
-        step: Buf::STEP, counters: Buf::COUNTERS, values: values, partials: Buf::SCAN_PARTIALS,
-    } [count_source: count as u32, lanes: lanes], groups);
-    pass!(b, scan_spine {
-        partials: Buf::SCAN_PARTIALS, counters: Buf::COUNTERS, step: Buf::STEP, dispatch_args: Buf::DISPATCH_ARGS,
-    } [lanes: lanes, total: total as u32], ONE_GROUP);
-    pass!(b, scan_apply(flag: flag) {
-        step: Buf::STEP, counters: Buf::COUNTERS, values: values, partials: Buf::SCAN_PARTIALS,
-        offsets: offsets,
-    } [count_source: count as u32, lanes: lanes], groups);
+    pass!(b, scan_reduce(flag: flag) { values: values, partials: Buf::SCAN_PARTIALS } [count_source: count as u32, lanes: lanes], groups);
+    pass!(b, scan_spine { partials: Buf::SCAN_PARTIALS } [lanes: lanes, total: total as u32], ONE_GROUP);
+    pass!(b, scan_apply(flag: flag) { values: values, partials: Buf::SCAN_PARTIALS, offsets: offsets } [count_source: count as u32, lanes: lanes], groups);
 }

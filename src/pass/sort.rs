@@ -59,26 +59,16 @@ pub fn sort(b: &mut Builder, buffers: SortBuffers, bits: u32, count: Count, by: 
         let identity_now = identity && pass == 0;
         let values_in = if identity_now { buffers.keys[from] } else { buffers.values[from] };
         if b.shape.sweeps() {
-            pass!(b, radix_sweep(narrow: buffers.narrow) {
-                step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from], values_in: values_in,
-                look_back: Buf::LOOK_BACK, keys_out: buffers.keys[to], values_out: buffers.values[to],
-            } [count_source: count as u32, shift: shift, sort_pass: b.sort_passes, digit_bits: digit_bits,
+            pass!(b, radix_sweep(narrow: buffers.narrow) { keys_in: buffers.keys[from], values_in: values_in, keys_out: buffers.keys[to], values_out: buffers.values[to] } [count_source: count as u32, shift: shift, sort_pass: b.sort_passes, digit_bits: digit_bits,
                 identity: u32::from(identity_now)], count.partitions());
             b.sort_passes += 1;
             continue;
         }
         // The last digit covers only the remaining bits: its tables and their scan by one subgroup are smaller.
         let digit_bits = digit_bits.min(bits.max(1) - shift);
-        pass!(b, radix_count {
-            step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
-            histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
-        } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
+        pass!(b, radix_count { keys_in: buffers.keys[from], histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits], groups);
         pass!(b, radix_scan { totals: Buf::SORT_TOTALS } [cells: workgroups << digit_bits], ONE_GROUP);
-        pass!(b, radix_scatter {
-            step: Buf::STEP, counters: Buf::COUNTERS, keys_in: buffers.keys[from],
-            values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS,
-            keys_out: buffers.keys[to], values_out: buffers.values[to],
-        } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
+        pass!(b, radix_scatter { keys_in: buffers.keys[from], values_in: values_in, histogram: Buf::SORT_HISTOGRAM, totals: Buf::SORT_TOTALS, keys_out: buffers.keys[to], values_out: buffers.values[to] } [count_source: count as u32, lanes: lanes, shift: shift, digit_bits: digit_bits,
             identity: u32::from(identity_now)], groups);
     }
     b.list.stage = around;

@@ -14,7 +14,7 @@ pub(super) fn find_nonfinite(b: &mut Builder, planes: &[Buf]) {
         let decl = &TABLE[plane.index()];
         let is_of = |domain: Domain| decl.domain.count == domain.count;
         let rows_fixed = if is_of(Domain::SHARED_ROWS) { b.capacity.shared_rows as u32 } else { 0 };
-        pass!(b, find_nonfinite { step: Buf::STEP, plane: plane, nonfinite_rows: Buf::NONFINITE_ROWS }
+        pass!(b, find_nonfinite { plane: plane }
             [count_source: u32::from(decl.domain.is_trained()), plane: index as u32, row_words: decl.element_bytes / 4,
                 rows_fixed: rows_fixed], Grid::Groups(FINITE_GROUPS, 1, 1));
     }

@@ -43,21 +43,10 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
     if b.shape.group_walks {
         let (sweep, sort_pass) = (b.shape.sweeps(), b.sort_passes);
         let look_first = b.next_look(b.capacity.gaussians);
-        pass!(b, emit_ordered(labels: labels, sweep: sweep, narrow: narrow) {
-            step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL, order: Buf::DEPTH_ORDER,
-            look_back: Buf::LOOK_BACK, dispatch_args: Buf::DISPATCH_ARGS,
-        } [sort_pass: sort_pass, look_first: look_first, key_bits: bits.max(1),
+        pass!(b, emit_ordered(labels: labels, sweep: sweep, narrow: narrow) { tile_keys: buffers.keys[0], gaussian_from_splat: GAUSSIAN_FROM_SPLAT, order: Buf::DEPTH_ORDER } [sort_pass: sort_pass, look_first: look_first, key_bits: bits.max(1),
             digit_bits: sort::digit_bits(b.shape, bits)], over_splats());
     } else {
-        pass!(b, emit_instances(labels: labels) {
-            step: Buf::STEP, counters: Buf::COUNTERS, splats: Buf::SPLATS,
-            tiles_touched: Buf::TILES_TOUCHED, instance_offsets: Buf::INSTANCE_OFFSETS, tile_keys: buffers.keys[0],
-            splat_from_instance: Buf::SPLAT_FROM_INSTANCE, gaussian_from_splat: GAUSSIAN_FROM_SPLAT,
-            labels: Buf::LABELS, layer_from_label: Buf::LAYER_FROM_LABEL,
-        } [], over_splats());
+        pass!(b, emit_instances(labels: labels) { tile_keys: buffers.keys[0], gaussian_from_splat: GAUSSIAN_FROM_SPLAT } [], over_splats());
     }
     let (keys, pairs) = sort::sort(b, buffers, bits, Count::Instances, "by tile", true);
     tile_ranges(b, keys, if narrow { 2 } else { 1 });
@@ -66,11 +55,7 @@ pub(super) fn bin_splats(b: &mut Builder) -> Buf {
 
 fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
     let groups = args(constants::ARGS_TILES);
-    pass!(b, tile_ranges(labels: b.supervision.has_layers(), parts: b.long_list.is_some()) {
-        step: Buf::STEP, counters: Buf::COUNTERS, tile_keys: keys,
-        tile_starts: Buf::TILE_STARTS, tile_ends: Buf::TILE_ENDS, layer_occupied: Buf::LAYER_OCCUPIED,
-        long_chunks: Buf::LONG_CHUNKS, first_lists: Buf::FIRST_LISTS, dispatch_args: Buf::DISPATCH_ARGS,
-    } [keys_per_word: keys_per_word, long_list: b.long_list.unwrap_or(u32::MAX)], groups);
+    pass!(b, tile_ranges(labels: b.supervision.has_layers(), parts: b.long_list.is_some()) { tile_keys: keys } [keys_per_word: keys_per_word, long_list: b.long_list.unwrap_or(u32::MAX)], groups);
     if !b.supervision.has_layers() {
         return;
     }
@@ -78,8 +63,5 @@ fn tile_ranges(b: &mut Builder, keys: Buf, keys_per_word: u32) {
         return scan::list(b, Buf::LAYER_OCCUPIED, Buf::LAYER_TILES);
     }
     scan::scan(b, Buf::LAYER_OCCUPIED, Buf::LAYER_OFFSETS, Count::VirtualTiles, Total::LayerTiles);
-    pass!(b, layer_list {
-        step: Buf::STEP, counters: Buf::COUNTERS, layer_occupied: Buf::LAYER_OCCUPIED,
-        layer_offsets: Buf::LAYER_OFFSETS, layer_tiles: Buf::LAYER_TILES,
-    } [], groups);
+    pass!(b, layer_list {} [], groups);
 }
