@@ -7,7 +7,8 @@ use crate::lab;
 use ash::vk;
 
 /// Names of features that can be hidden.
-const HIDEABLE_FEATURES: [&str; 10] = [
+const HIDEABLE_FEATURES: [&str; 11] = [
+    "cpu",
     "memory_model",
     "timeline",
     "robust",
@@ -39,6 +40,12 @@ impl HiddenFeatures {
 
     fn has(&self, name: &str) -> bool {
         self.0.iter().any(|hidden| hidden == name)
+    }
+
+    /// Returns the type of the device: a software device whose CPU is hidden counts as a GPU, and gets the kernels,
+    /// staging and steps in flight of one.
+    pub(super) fn device_type(&self, found: vk::PhysicalDeviceType) -> vk::PhysicalDeviceType {
+        if self.has("cpu") { vk::PhysicalDeviceType::DISCRETE_GPU } else { found }
     }
 
     pub(super) fn features(&self, features: &mut Features) {

@@ -19,7 +19,7 @@ impl Capabilities {
     /// Queries a device.
     pub(super) fn probe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Self> {
         // SAFETY: the handle belongs to this instance; here and below, the structs match the device's version.
-        let core = unsafe { instance.get_physical_device_properties(physical) };
+        let mut core = unsafe { instance.get_physical_device_properties(physical) };
         let version = core.api_version;
         let extensions = vk_call("vkEnumerateDeviceExtensionProperties", || unsafe {
             instance.enumerate_device_extension_properties(physical)
@@ -28,6 +28,7 @@ impl Capabilities {
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
         let hidden = HiddenFeatures::from_env()?;
+        core.device_type = hidden.device_type(core.device_type);
         let statistics = has(ash::khr::pipeline_executable_properties::NAME);
         let has_flow = has(ash::khr::shader_subgroup_uniform_control_flow::NAME);
         let mut features = features(instance, physical, (has_size_control, has_flow), statistics);

@@ -37,8 +37,20 @@ fn narrow_lavapipe() -> Option<Driver> {
     device().is_some_and(|turn| turn.is_cpu()).then(narrow)
 }
 
+/// The usual driver with the kernels, staging and steps in flight of a GPU. Mesa 22.3 sometimes crashes if kernels
+/// compile beside the steps.
+#[cfg(feature = "lab")]
+fn as_gpu() -> Option<Driver> {
+    Some(vec![("LABELGS_HIDE", "cpu".into()), ("LABELGS_AHEAD", "no".into())])
+}
+
+#[cfg(not(feature = "lab"))]
+fn as_gpu() -> Option<Driver> {
+    None
+}
+
 fn drivers() -> Vec<Driver> {
-    swiftshader().into_iter().chain(narrow_lavapipe()).collect()
+    swiftshader().into_iter().chain(narrow_lavapipe()).chain(as_gpu()).collect()
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Scan and sort on numbers of every kind: exact answers.
+//! Scan and sort by lanes, as on CPUs, on numbers of every kind: exact answers. `sweeps` tests those of GPUs.
 
 use super::fixture::readable;
 use crate::reference::scan::exclusive_scan;
@@ -23,7 +23,9 @@ const ITEM_COUNT_MAX: usize = 5000;
 
 fn engine(gpu: std::sync::Arc<labelgs::gpu::Gpu>) -> Engine {
     let room = EngineSize::new(ITEM_COUNT_MAX as u64, (64, 64));
-    Engine::new(gpu, room, readable()).expect("the engine starts")
+    let (subgroup, is_cpu) = (&gpu.capabilities().subgroup, gpu.is_cpu());
+    let shape = KernelShape { emulated: subgroup.is_emulated, ..KernelShape::new(subgroup.size, is_cpu) };
+    Engine::with_shape(gpu, shape, room, readable()).expect("the engine starts")
 }
 
 /// Records the passes that `declare` adds.
