@@ -8,6 +8,10 @@ use crate::pass::buffers::TABLE;
 use crate::pass::{GroupBlend, KernelShape, Update};
 use crate::scheduler::plan::{MemoryReport, PlanOptions};
 
+/// Share of a GPU's memory that a plan counts, percent: the engine uses 90 % of the memory that the driver reports as
+/// free (`gpu/probe.rs`), and a desktop leaves some 95 % of it free.
+const PLANNED_PERCENT: u64 = 85;
+
 /// Returns kernels and limits of a typical GPU with `memory` bytes: subgroups of 32, bindings and allocations of up to
 /// 4 GiB.
 pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
@@ -15,7 +19,7 @@ pub(crate) fn card(memory: u64) -> (KernelShape, PlanLimits) {
     let limits = PlanLimits {
         max_storage_range: BINDING_BYTES_MAX,
         max_allocation: BINDING_BYTES_MAX,
-        max_memory: memory,
+        max_memory: memory / 100 * PLANNED_PERCENT,
         ..PlanLimits::default()
     };
     // GPUs bind far more buffers than the default limits allow.
