@@ -166,7 +166,7 @@ pub enum Command {
     /// The numbers come from the driver. Exits with status 1 if a kernel spills.
     ///
     /// Example: labelgs kernels
-    Kernels,
+    Kernels(kernels::KernelsArgs),
     /// Measure the time of each pass of a training step.
     ///
     /// Example: labelgs profile scene --masks scene/masks --steps 50
@@ -207,7 +207,7 @@ impl Command {
             Self::Devices => devices::run(context),
             Self::Selftest(args) => selftest::run(args, context),
             Self::Plan(args) => plan::run(args, context),
-            Self::Kernels => kernels::run(context),
+            Self::Kernels(args) => kernels::run(args, context),
             Self::Profile(args) => profile::run(args, context),
         }
     }

@@ -44,8 +44,7 @@ impl Gpu {
     /// defaults. `windows` has the window of each storage buffer, if buffers share bindings; empty for the first
     /// window.
     pub(crate) fn pipeline(&self, shader: &'static ShaderDesc, spec: &[u32], windows: &[u8]) -> Result<Arc<Pipeline>> {
-        let specialised = shader.spec.iter().enumerate().filter(|(_, constant)| !constant.is_pushed);
-        let spec = specialised.map(|(place, constant)| spec.get(place).copied().unwrap_or(constant.default)).collect();
+        let spec = shader.specialised(spec);
         let subgroup_size = self.pinned(shader, self.subgroup_size());
         let spirv = shader.spirv.as_ptr() as usize;
         let windows = self.windows(shader, windows);

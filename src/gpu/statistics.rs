@@ -37,8 +37,8 @@ impl Gpu {
         }
     }
 
-    /// Compiles a kernel for a subgroup size, and returns the compiler's statistics. `spec` has a word for each
-    /// constant of the shader.
+    /// Compiles a kernel for a subgroup size, and returns the compiler's statistics. `spec` has the
+    /// specialisation constants.
     pub fn statistics(&self, shader: &'static ShaderDesc, spec: &[u32], size: u32) -> Result<Vec<Statistic>> {
         let Some(functions) = &self.statistics else { return Err(unknown(&self.capabilities)) };
         let pipeline = Pipeline::new(self, shader, (spec, &self.windows(shader, &[])), self.pinned(shader, size))?;

@@ -4,6 +4,7 @@ use super::{GroupBlend, KernelShape};
 use crate::error::Result;
 use crate::gpu::{Gpu, Statistic};
 use crate::shaders::{self, ShaderDesc};
+use rayon::prelude::*;
 
 /// A kernel as compiled for one subgroup size.
 #[derive(Clone, Debug)]
@@ -16,13 +17,13 @@ pub struct CompiledKernel {
     pub statistics: Vec<Statistic>,
 }
 
-/// Names that drivers (Mesa's for AMD and Intel, NVIDIA's) use for the same statistic.
+/// Names that drivers (Mesa's for AMD, Intel and NVIDIA, NVIDIA's) use for the same statistic.
 pub const STATISTIC_NAMES: [(&str, &[&str]); 7] = [
-    ("registers", &["VGPRs", "Register Count", "Max live registers"]),
-    ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size"]),
+    ("registers", &["VGPRs", "Register Count", "Max live registers", "Number of GPRs"]),
+    ("spills", &["Spilled VGPRs", "Spilled SGPRs", "Spill Count", "Fill Count", "Local Memory Size", "SLM Size"]),
     ("shared B", &["LDS size", "Shared Memory Size", "Workgroup Memory Size"]),
     ("waves", &["Subgroups per SIMD"]),
-    ("instructions", &["Instructions", "Instruction Count"]),
+    ("instructions", &["Instructions", "Instruction Count", "Instruction count"]),
     ("latency", &["Latency", "Cycle Count"]),
     ("cycles", &["Inverse Throughput"]),
 ];
@@ -65,10 +66,22 @@ pub fn compiled_kernels(gpu: &Gpu) -> Result<Vec<CompiledKernel>> {
             let shape = if by_groups { shape.with_group_blend_of(GroupBlend::DEFAULT) } else { shape };
             let spec = shader.spec.iter().map(|constant| shape.constant(constant.name).unwrap_or(constant.default));
             let spec: Vec<u32> = spec.collect();
-            let statistics = gpu.statistics(shader, &spec, shape.subgroup)?;
-            kernels.push(CompiledKernel { name: shader.name, subgroup: shape.subgroup, statistics });
+            kernels.push((*shader, spec, shape.subgroup));
         }
     }
+    compiled(gpu, kernels)
+}
+
+/// Compiles kernels with these constants and subgroup sizes on all cores of the CPU. `gpu` must be opened for
+/// statistics.
+pub(crate) fn compiled(gpu: &Gpu, kernels: Vec<(&'static ShaderDesc, Vec<u32>, u32)>) -> Result<Vec<CompiledKernel>> {
+    let mut kernels = kernels
+        .into_par_iter()
+        .map(|(shader, spec, subgroup)| {
+            let statistics = gpu.statistics(shader, &spec, subgroup)?;
+            Ok(CompiledKernel { name: shader.name, subgroup, statistics })
+        })
+        .collect::<Result<Vec<_>>>()?;
     kernels.sort_by_key(|kernel| (kernel.name, kernel.subgroup));
     Ok(kernels)
 }

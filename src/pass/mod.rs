@@ -21,6 +21,7 @@ mod tile;
 mod update;
 
 pub use build::Builder;
+pub(crate) use kernels::compiled;
 pub use kernels::{CompiledKernel, STATISTIC_NAMES, compiled_kernels};
 pub(crate) use optimize::{Attribute, MODEL_ATTRIBUTES, SHARED_PLANES};
 pub use shape::{GroupBlend, KernelShape, Update};

@@ -99,6 +99,12 @@ impl ShaderDesc {
         self.bindings.iter().filter(|binding| binding.kind == kind).count() as u32
     }
 
+    /// Returns the values of the specialisation constants from the constants of a pass; defaults where it has none.
+    pub(crate) fn specialised(&self, words: &[u32]) -> Vec<u32> {
+        let constants = self.spec.iter().enumerate().filter(|(_, constant)| !constant.is_pushed);
+        constants.map(|(place, constant)| words.get(place).copied().unwrap_or(constant.default)).collect()
+    }
+
     /// Invocations on each axis of a workgroup, with these values of the specialisation constants.
     pub fn workgroup(&self, words: &[u32]) -> [u32; 3] {
         self.local_size.map(|size| match size {
