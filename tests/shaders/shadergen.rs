@@ -382,3 +382,32 @@ fn siblings_have_an_interface_of_their_own_and_a_star_reaches_all_callers() {
     );
     one_finding(&[("variants.txt", "wide = gone: A")], &["variants.txt:1", "there is no shader `gone`"]);
 }
+
+/// On a GPU, a barrier that a part of a workgroup does not reach hangs or lets the others go on too early.
+#[test]
+fn a_barrier_that_only_some_invocations_reach_is_a_finding() {
+    let body = "INOUT(1, uint, found);\nshared uint first;\nuint own() { return gl_LocalInvocationIndex; }";
+    let differing = [
+        "if (own() == found[0]) { memoryBarrierBuffer(); }",
+        "for (uint i = found[0]; i < own(); i++) { barrier(); }",
+        "if (gl_GlobalInvocationID.x > found[0]) { return; }\n    barrier();",
+        "if (atomicAdd(found[0], 1u) == 0u) { barrier(); }",
+        "if (found[own()] == 0u) { barrier(); }",
+        "uint sum = 0u;\n    for (uint i = 0u; i < own() + found[0]; i++) { sum += found[i]; }\n    \
+         if (sum > 4u) { barrier(); }",
+        "uint some[4];\n    some[found[0]] = own();\n    if (some[found[1]] > 4u) { barrier(); }",
+        "if (subgroupAdd(found[own()]) > 1u) { barrier(); }",
+    ];
+    for code in differing {
+        probe(body, code, &["glsl/test/probe.comp:1", "1 barriers of probe stand where only some"]);
+    }
+    let equal = [
+        "if (gl_WorkGroupID.x == found[0]) { barrier(); }",
+        "if (own() == found[0]) { first = atomicAdd(found[0], 1u); }\n    barrier();\n    if (first > 4u) { barrier(); }",
+        "for (uint i = 0u; i < found[0]; i++) {\n    if (found[own()] > i) { found[own()] = i; }\n    barrier();\n    }",
+    ];
+    for code in equal {
+        let shader = small(body, code);
+        generate(&[("test/probe.comp", &shader)]).unwrap_or_else(|findings| panic!("{code}: {findings:#?}"));
+    }
+}

@@ -8,6 +8,7 @@ pub mod emit;
 pub mod interface;
 pub mod reflect;
 pub mod source;
+pub mod uniform;
 pub mod variants;
 
 use compile::{Define, GlslCompiler, Purpose};
@@ -289,6 +290,17 @@ fn build(compiler: &GlslCompiler, shader: &Shader, variant: &Variant) -> Result<
     };
     let (_, declared) = compile(Purpose::Reflect).map_err(fail)?;
     let (words, shipped) = compile(Purpose::Ship).map_err(fail)?;
+    // Emulated subgroups decide by sums of all lanes, which look like values of a lane.
+    let is_emulated = variant.defines.iter().any(|(name, _)| name == "EMULATED");
+    let split = if is_emulated { 0 } else { uniform::split_barriers(&shipped) };
+    if split > 0 {
+        let rule = format!(
+            "{split} barriers of {} stand where only some invocations of a workgroup may arrive; move them out of \
+             branches and loops that depend on the invocation",
+            variant.name
+        );
+        return Err(vec![Finding::new(format!("{}:1", shader.path), rule)]);
+    }
     let interface = reflect::interface(&declared);
     Ok(Variant { words, interface, used: reflect::used_bindings(&shipped), ..variant.clone() })
 }
