@@ -57,10 +57,10 @@ uint find(uint at, uint stride, out uint slot, out uint part) {
     return stride * touched_row[slot] + part;
 }
 
-// Runs UPDATE(name, e, slot, first) for each vec4 of the listed Gaussians in a plane of a degree, distributed among the
-// invocations; `first`: of its floats among the coefficients above degree 0.
-#define EACH_COLOUR(name, degree, stride, before, UPDATE) \
-    for (uint at = gl_LocalInvocationID.x, slot, part; SH_DEGREE >= degree && at < stride * touched_count; at += 64u) { \
+// Runs UPDATE(name, e, slot, first) for each vec4 of the listed Gaussians in a plane from a degree on, shared among
+// the invocations; `first`: of its floats among the coefficients above degree 0.
+#define EACH_COLOUR(name, from, stride, before, UPDATE) \
+    for (uint at = gl_LocalInvocationID.x, slot, part; SH_DEGREE >= from && at < stride * touched_count; at += 64u) { \
         uint e = find(at, stride, slot, part); \
         UPDATE(name, e, slot, before + 4u * part); \
     }

@@ -1,6 +1,6 @@
-// Gradients of a camera's pose by its Gaussians: the force, and the torque around the camera, both in world axes. Moving
-// the camera by u moves all Gaussians by -u: force = sum dL/dp. Rotating it rotates them around the camera, but not
-// their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the orientations,
+// Gradients of a camera's pose by its Gaussians: the force, and the torque around the camera, both in world axes.
+// Moving the camera by u moves all Gaussians by -u: force = sum dL/dp. Rotating it rotates them around the camera, but
+// not their colours: torque = sum (p - c) x (dL/dp without the view direction's part) + the part of the orientations,
 // (q v_xyz - v_w q_xyz + q_xyz x v_xyz) / 2.
 
 shared vec3 forces[64], torques[64];

@@ -6,8 +6,8 @@
 #define value4(name, e) fetch4(name, e)
 #endif
 
-// Adds TERM(k, c) of the coefficients c of Gaussian i above degree 0 to a sum. `last` is its sh0. Each coefficient is used
-// once, so few registers hold them.
+// Adds TERM(k, c) of the coefficients c of Gaussian i above degree 0 to a sum. `last` is its sh0. Each coefficient is
+// used once, so few registers hold them.
 #define ADD_COEFFICIENTS(sum, i, last, TERM) \
     if (SH_DEGREE >= 1u) { \
         vec4 a = value4(sh1, 2u * i), b = value4(sh1, 2u * i + 1u); \
@@ -16,7 +16,8 @@
     if (SH_DEGREE >= 2u) { \
         vec4 a = value4(sh2, 4u * i), b = value4(sh2, 4u * i + 1u), c = value4(sh2, 4u * i + 2u); \
         last = value4(sh2, 4u * i + 3u); \
-        sum += TERM(3, a.xyz) + TERM(4, vec3(a.w, b.xy)) + TERM(5, vec3(b.zw, c.x)) + TERM(6, c.yzw) + TERM(7, last.xyz); \
+        sum += TERM(3, a.xyz) + TERM(4, vec3(a.w, b.xy)) + TERM(5, vec3(b.zw, c.x)) + TERM(6, c.yzw) \
+            + TERM(7, last.xyz); \
     } \
     if (SH_DEGREE >= 3u) { \
         vec4 a = value4(sh3, 5u * i), b = value4(sh3, 5u * i + 1u), c = value4(sh3, 5u * i + 2u); \

@@ -10,7 +10,7 @@ struct GaussianGradient {
     bool is_finite;    // otherwise all are 0
 };
 
-// a: mean2d, conic xy; b: conic z, ln opacity, colour rg; and blue. `above`: a bit for each channel that is not clamped.
+// a: mean2d, conic xy; b: conic z, ln opacity, colour rg; and blue. `above`: a bit for each channel without a clamp.
 GaussianGradient project_splat_backward(StepUniforms u, uint i, vec4 mean, vec3 log_scale, vec4 quat, vec4 a, vec4 b,
     float blue, uint above) {
     bool sane = finite(dot(abs(a), vec4(1.0)) + dot(abs(b), vec4(1.0)) + abs(blue));

@@ -1,16 +1,16 @@
 // What strategies add to an update of a Gaussian. The includer includes gaussian.glsl before.
 #include "random.glsl"
 
-// Adds the gradient of mean opacity and mean standard deviation. 3DGS-MCMC: L += opacity_weight sum o + scale_weight sum
-// (s_x + s_y + s_z), over the visible Gaussians.
+// Adds the gradient of mean opacity and mean standard deviation. 3DGS-MCMC: L += opacity_weight sum o + scale_weight
+// sum (s_x + s_y + s_z), over the visible Gaussians.
 void regularise(StepUniforms u, float logit, vec3 log_scale, inout float v_logit, inout vec3 v_log_scale) {
     float opacity = sigmoid(logit);
     v_logit += u.opacity_weight * opacity * (1.0 - opacity);
     v_log_scale += u.scale_weight * exp(log_scale);
 }
 
-// Random move within the Gaussian's own shape; fainter Gaussians move farther. 3DGS-MCMC: x += noise sigmoid(-NOISE_STEEP
-// (o - NOISE_OPACITY)) Sigma xi, xi standard normal.
+// Random move within the Gaussian's own shape; fainter Gaussians move farther. 3DGS-MCMC: x += noise
+// sigmoid(-NOISE_STEEP (o - NOISE_OPACITY)) Sigma xi, xi standard normal.
 vec3 random_move(StepUniforms u, uint i, float logit, vec3 log_scale, vec4 quat) {
     float inv_norm;
     mat3 rotation = rotation_from_quat(unit_quat(quat, inv_norm));

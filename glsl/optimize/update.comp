@@ -107,7 +107,8 @@ void explore_and_smooth(StepUniforms u, uint i) {
         float limit = smallest_size(u, means_now(i).xyz, s.w);
         if (!is_late || limit != s.w) {
             load_moments(scales, i, m, v);
-            vec4 missing = is_late ? late_rest.x * late_direction(m, v) : vec4(0.0), now = is_late ? limited(s - missing) : s;
+            vec4 missing = is_late ? late_rest.x * late_direction(m, v) : vec4(0.0);
+            vec4 now = is_late ? limited(s - missing) : s;
             scales[i] = limited(vec4(now.xyz, limit)) + missing;
         }
     }

@@ -3,7 +3,7 @@
 use super::build::{Builder, over_splats};
 use super::project::GAUSSIAN_FROM_SPLAT;
 use crate::pass::build::pass;
-use crate::scheduler::plan::{Buf, Stage};
+use crate::scheduler::plan::Stage;
 
 /// Sums the records and updates the densification statistic.
 pub(super) fn gather(b: &mut Builder) {

@@ -5,7 +5,7 @@ use super::build::{Builder, over_gaussians};
 use super::shape::Update;
 use super::{Extension, KernelShape, project};
 use crate::pass::build::pass;
-use crate::scheduler::plan::{Buf, Stage};
+use crate::scheduler::plan::Stage;
 
 /// Returns true if one kernel does a step's update, or only its statistic, because no extension interferes.
 pub(crate) fn is_fused(shape: &KernelShape, (extension, passes): (&dyn Extension, u32)) -> bool {

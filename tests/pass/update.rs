@@ -9,6 +9,7 @@ use crate::support::scenes::{Scene, Shape, scene};
 use labelgs::pass::{KernelShape, Update};
 use labelgs::run::StrategyKind;
 use labelgs::scheduler::plan::Buf;
+use labelgs::verify::selftest::relocation::set_strategy;
 use labelgs::verify::selftest::update::{drifted, late, many, partly_frozen, step};
 use labelgs::verify::selftest::{antialias, fixture, pose};
 
@@ -51,7 +52,7 @@ fn steps(update: Update, form: Form, count: u32, catches_up: bool) -> Option<Vec
     let mut passes = 0;
     if let Some(kind) = form.strategy {
         (fixture.config.antialias, fixture.config.position_lr_init) = (form.antialiased, 2e-5);
-        passes = fixture.set_strategy(kind);
+        passes = set_strategy(&mut fixture, kind);
     }
     let (cx, depth) = (fixture.scene.camera.cx, fixture.scene.camera.translation.z);
     let mut all = Vec::new();

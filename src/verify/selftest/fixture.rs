@@ -17,7 +17,7 @@ use crate::shaders::structs::StepUniforms;
 use crate::train::input::step_input::{self, ObjectLight, SceneScale, StepInput, StepView};
 use crate::train::setup::near_plane::NEAR_DEFAULT;
 use crate::train::strategy::{self, StepContext};
-use crate::train::{LabelRule, StrategyKind, TrainConfig};
+use crate::train::{LabelRule, TrainConfig};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
@@ -247,15 +247,6 @@ impl Fixture {
             0 => self.train(),
             passes => self.train_as(ListKey::Extended(self.variant(), passes)),
         }
-    }
-
-    /// Chooses a strategy. Returns all passes that it has with the settings, for [`Fixture::train_with`].
-    pub fn set_strategy(&mut self, kind: StrategyKind) -> u32 {
-        self.config.strategy = kind;
-        let strategy = strategy::make(kind);
-        let all = strategy.passes(StepContext { step: 1, config: &self.config, extent: self.fixed.extent });
-        self.engine.set_extension(strategy.extension(), all);
-        all
     }
 
     /// Same as [`Fixture::train`], with another list.

@@ -17,6 +17,7 @@ use crate::shaders::constants::NO_SPLAT;
 use crate::shaders::structs::StepUniforms;
 use crate::train::StrategyKind;
 use crate::train::strategy::passes::EXPLORE_BIT;
+use crate::train::strategy::{StepContext, make};
 
 /// Relocates with this many draws; the fixture's model is the population. Opacities and scales of copies may differ.
 pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway: f64) -> Result<Judge> {
@@ -44,6 +45,15 @@ pub fn relocation(fixture: &mut Fixture, before: Population, draws: u32, leeway:
     }))
 }
 
+/// Chooses a strategy. Returns all passes that it has with the settings, for [`Fixture::train_with`].
+pub fn set_strategy(fixture: &mut Fixture, kind: StrategyKind) -> u32 {
+    fixture.config.strategy = kind;
+    let strategy = make(kind);
+    let all = strategy.passes(StepContext { step: 1, config: &fixture.config, extent: fixture.fixed.extent });
+    fixture.engine.set_extension(strategy.extension(), all);
+    all
+}
+
 /// Runs three steps of the strategy mcmc, each on a new fixture of `rig`: plain, with regularisation, and also with
 /// random moves. Returns the verdicts of the moves and of the loss terms.
 pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Judge; 2]> {
@@ -57,7 +67,7 @@ pub fn exploration(rig: impl Fn() -> Result<Fixture>, leeway: f64) -> Result<[Ju
         (fixture.config.opacity_weight, fixture.config.scale_weight) = (Some(1.0), Some(1.0));
         fixture.config.position_lr_init = 2e-5;
         fixture.input.update = true;
-        let all = fixture.set_strategy(StrategyKind::Mcmc);
+        let all = set_strategy(&mut fixture, StrategyKind::Mcmc);
         fixture.train_with(all & !without)?;
         visible = fixture.get::<u32>(Buf::SPLAT_FROM_GAUSSIAN, count)?;
         (uniforms, start) = (fixture.uniforms(), fixture.model().rows);
