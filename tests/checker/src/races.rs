@@ -1,0 +1,127 @@
+//! Finds accesses of buffers in no order.
+//!
+//! Every unit of memory (4 bytes, or 2 for shaders with 16-bit accesses) remembers its last write and its last reads
+//! in the running dispatch. Atomics do not conflict with each other, but with plain accesses. `lane.rs` says what
+//! orders two accesses. Between dispatches, everything is ordered: pipeline barriers are not checked.
+
+use crate::lane::{Clock, Lane, MANY};
+use std::collections::HashMap;
+
+/// An access.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Access {
+    /// The dispatch.
+    dispatch: u32,
+    /// Its workgroup.
+    pub group: u32,
+    /// Its invocation, or [`MANY`].
+    pub lane: u16,
+    subgroup: u16,
+    subgroup_epoch: u32,
+    time: u32,
+    /// Its instruction.
+    pub pc: u32,
+    /// True for atomics.
+    pub is_atomic: bool,
+}
+
+/// Last accesses of a unit.
+#[derive(Clone, Debug, Default)]
+pub struct Shadow {
+    write: Access,
+    read: Access,
+}
+
+/// Kinds of access.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum How {
+    /// Plain read.
+    Read,
+    /// Plain write.
+    Write,
+    /// Atomic read and write.
+    Atomic,
+}
+
+/// State of the running dispatch.
+#[derive(Debug, Default)]
+pub struct Races {
+    dispatch: u32,
+    /// What atomics on a word hand over.
+    clocks: HashMap<(usize, u64), Clock>,
+    /// Reads by workgroups other than the last.
+    readers: HashMap<(usize, u64), Vec<Access>>,
+}
+
+impl Access {
+    /// True if it comes before all that the invocation does now.
+    fn is_before(&self, lane: &Lane) -> bool {
+        if self.group != lane.group {
+            return lane.known.as_ref().is_some_and(|known| known.covers(self.group, self.lane, self.time));
+        }
+        self.lane == lane.number
+            || self.time < lane.horizon
+            || (self.lane != MANY && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch)
+    }
+}
+
+impl Races {
+    /// Begins a dispatch.
+    pub fn begin(&mut self) {
+        self.dispatch += 1;
+        self.clocks.clear();
+        self.readers.clear();
+    }
+
+    /// Notes an access of a unit. Returns an earlier one that it conflicts with.
+    pub fn access(
+        &mut self,
+        (memory, unit): (usize, u64),
+        shadow: &mut Shadow,
+        lane: &Lane,
+        how: How,
+        pc: u32,
+    ) -> Option<Access> {
+        let mut now = Access {
+            dispatch: self.dispatch,
+            group: lane.group,
+            lane: lane.number,
+            subgroup: lane.subgroup,
+            subgroup_epoch: lane.subgroup_epoch,
+            time: lane.time,
+            pc,
+            is_atomic: how == How::Atomic,
+        };
+        let conflicts = |old: &Access| {
+            old.dispatch == now.dispatch && !(old.is_atomic && now.is_atomic) && !old.is_before(lane)
+        };
+        let mut found = Some(shadow.write).filter(conflicts);
+        if how == How::Read {
+            let old = shadow.read;
+            if old.dispatch == now.dispatch && !old.is_before(lane) {
+                if old.group == now.group {
+                    (now.lane, now.time) = (MANY, now.time.max(old.time));
+                } else {
+                    let others = self.readers.entry((memory, unit)).or_default();
+                    others.retain(|other| other.group != old.group);
+                    others.push(old);
+                }
+            }
+            shadow.read = now;
+            return found;
+        }
+        found = found.or(Some(shadow.read).filter(conflicts));
+        if !self.readers.is_empty() && let Some(others) = self.readers.get(&(memory, unit)) {
+            found = found.or(others.iter().copied().find(conflicts));
+        }
+        shadow.write = now;
+        found
+    }
+
+    /// An atomic of an invocation hands over what it knows, and learns what was handed over.
+    pub fn hand_over(&mut self, place: (usize, u64), lane: &mut Lane) {
+        if lane.offers() || self.clocks.contains_key(&place) {
+            lane.atomic(self.clocks.entry(place).or_default());
+        }
+    }
+}

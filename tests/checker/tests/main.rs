@@ -1,0 +1,5 @@
+//! The interpreter on small shaders: faults that were planted, their mended twins, and arithmetic.
+
+mod faults;
+mod numbers;
+mod support;
