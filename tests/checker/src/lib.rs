@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 pub mod findings;
+pub mod driver;
 mod lane;
 pub mod lower;
 pub mod machine;
