@@ -100,7 +100,7 @@ impl Races {
             let old = shadow.read;
             if old.dispatch == now.dispatch && !old.is_before(lane) {
                 if old.group == now.group {
-                    (now.lane, now.time) = (MANY, now.time.max(old.time));
+                    (now.lane, now.time, now.pc) = (MANY, now.time.max(old.time), old.pc);
                 } else {
                     let others = self.readers.entry((memory, unit)).or_default();
                     others.retain(|other| other.group != old.group);

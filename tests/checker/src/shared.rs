@@ -47,10 +47,11 @@ impl Touch {
         if old.epoch != epoch || old.lane == lane.number {
             return;
         }
+        // Messages name the instruction of an earlier invocation.
         if old.is_wide || old.subgroup != lane.subgroup {
-            (self.lane, self.is_wide) = (MANY, true);
+            (self.lane, self.is_wide, self.pc) = (MANY, true, old.pc);
         } else if old.subgroup_epoch == subgroup_epoch {
-            self.lane = MANY;
+            (self.lane, self.pc) = (MANY, old.pc);
         }
     }
 }

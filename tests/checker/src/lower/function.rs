@@ -391,19 +391,12 @@ impl<'a> Lowering<'a> {
 
     /// Replaces labels by places in the code.
     fn finish(mut self) -> Result<Program> {
-        let start = |label: &mut u32| -> Result<()> {
-            *label = *self.starts.get(label).ok_or_else(|| format!("block %{label}"))?;
-            Ok(())
-        };
         for instruction in &mut self.program.code {
-            match instruction {
-                Instruction::Jump(to) => start(to)?,
-                Instruction::Branch { yes, no, .. } => [yes, no].into_iter().try_for_each(start)?,
-                Instruction::Switch { default, cases, .. } => {
-                    [default].into_iter().chain(cases.iter_mut().map(|(_, to)| to)).try_for_each(start)?;
-                }
-                Instruction::Load { width: 2, .. } | Instruction::Store { width: 2, .. } => self.program.granule = 2,
-                _ => {}
+            for label in instruction.targets() {
+                *label = *self.starts.get(label).ok_or_else(|| format!("block %{label}"))?;
+            }
+            if matches!(instruction, Instruction::Load { width: 2, .. } | Instruction::Store { width: 2, .. }) {
+                self.program.granule = 2;
             }
         }
         if self.program.code.len() >= 1 << 30 {

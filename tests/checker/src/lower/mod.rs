@@ -25,6 +25,7 @@ pub fn lower(words: &[u32], specialised: &HashMap<u32, u32>) -> Result<Program> 
     let mut program = function::lower(&globals, function)?;
     program.local_size = globals.local_size(&module)?;
     program.hash = module_hash(words);
+    registers::drop_dead(&mut program);
     registers::allocate(&mut program);
     Ok(program)
 }

@@ -7,6 +7,45 @@ use crate::program::{Instruction, Place, Program, Register, Source};
 use std::collections::BinaryHeap;
 use std::cmp::Reverse;
 
+/// Drops what only computes words that nobody reads: members of structs that are loaded as a whole, most of all.
+pub fn drop_dead(program: &mut Program) {
+    let mut counts: Vec<u32> = Vec::new();
+    for instruction in &mut program.code {
+        instruction.visit(&mut |source: &mut Source| count(&mut counts, *source, 1));
+    }
+    let mut keeps = vec![true; program.code.len()];
+    let mut changed = true;
+    while changed {
+        changed = false;
+        for (instruction, keeps) in program.code.iter_mut().zip(&mut keeps).rev().filter(|(_, keeps)| **keeps) {
+            let only_computes = !matches!(instruction, Instruction::Atomic { .. } | Instruction::Exchange { .. });
+            let result = instruction.result().copied().filter(|to| only_computes && *to >= program.registers);
+            if result.is_some_and(|to| counts.get(to as usize).is_none_or(|uses| *uses == 0)) {
+                instruction.visit(&mut |source: &mut Source| count(&mut counts, *source, u32::MAX));
+                (*keeps, changed) = (false, true);
+            }
+        }
+    }
+    // New places of all instructions: a dropped one is the next that is kept.
+    let before = |sum: &mut u32, keeps: &bool| Some(std::mem::replace(sum, *sum + u32::from(*keeps)));
+    let places: Vec<u32> = keeps.iter().scan(0, before).collect();
+    let mut all = keeps.iter().copied();
+    program.origins.retain(|_| all.next().unwrap_or(true));
+    let mut all = keeps.iter().copied();
+    program.code.retain(|_| all.next().unwrap_or(true));
+    for target in program.code.iter_mut().flat_map(Instruction::targets) {
+        *target = places[*target as usize];
+    }
+}
+
+/// Adds to the number of uses of a register.
+fn count(counts: &mut Vec<u32>, source: Source, more: u32) {
+    if let Err(register) = source.place() {
+        counts.resize(counts.len().max(register + 1), 0);
+        counts[register] = counts[register].wrapping_add(more);
+    }
+}
+
 /// Replaces virtual registers by real ones.
 pub fn allocate(program: &mut Program) {
     let pinned = program.registers;
@@ -111,16 +150,10 @@ struct Block {
     next: Vec<usize>,
 }
 
-fn blocks(program: &Program) -> Vec<Block> {
-    let targets = |instruction: &Instruction| match instruction {
-        Instruction::Jump(to) => vec![*to],
-        Instruction::Branch { yes, no, .. } => vec![*yes, *no],
-        Instruction::Switch { default, cases, .. } => cases.iter().map(|(_, to)| *to).chain([*default]).collect(),
-        _ => Vec::new(),
-    };
+fn blocks(program: &mut Program) -> Vec<Block> {
     let mut starts: Vec<u32> = vec![0];
-    for (at, instruction) in program.code.iter().enumerate() {
-        let targets = targets(instruction);
+    for (at, instruction) in program.code.iter_mut().enumerate() {
+        let targets: Vec<u32> = instruction.targets().into_iter().map(|to| *to).collect();
         if !targets.is_empty() || matches!(instruction, Instruction::Return) {
             starts.push(at as u32 + 1);
         }
@@ -129,11 +162,11 @@ fn blocks(program: &Program) -> Vec<Block> {
     starts.retain(|start| (*start as usize) < program.code.len());
     starts.sort_unstable();
     starts.dedup();
-    let end = |place: usize| starts.get(place + 1).copied().unwrap_or(program.code.len() as u32);
+    let count = program.code.len() as u32;
     let block = |(place, &first): (usize, &u32)| {
-        let last = end(place) - 1;
-        let instruction = &program.code[last as usize];
-        let mut next = targets(instruction);
+        let last = starts.get(place + 1).copied().unwrap_or(count) - 1;
+        let instruction = &mut program.code[last as usize];
+        let mut next: Vec<u32> = instruction.targets().into_iter().map(|to| *to).collect();
         if next.is_empty() && !matches!(instruction, Instruction::Return) {
             next.push(last + 1);
         }
@@ -158,6 +191,16 @@ impl Instruction {
             | Self::Fetch { to, .. }
             | Self::Exchange { to, .. } => Some(to),
             _ => None,
+        }
+    }
+
+    /// Where the instruction may go on, if not at the next.
+    pub(super) fn targets(&mut self) -> Vec<&mut u32> {
+        match self {
+            Self::Jump(to) => vec![to],
+            Self::Branch { yes, no, .. } => vec![yes, no],
+            Self::Switch { default, cases, .. } => cases.iter_mut().map(|(_, to)| to).chain([default]).collect(),
+            _ => Vec::new(),
         }
     }
 
