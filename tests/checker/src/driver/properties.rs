@@ -15,8 +15,12 @@ fn name(text: &CStr) -> [c_char; 256] {
     name
 }
 
+/// Workgroups at most along each axis.
+pub(super) const MAX_GROUPS: [u32; 3] = [u32::MAX >> 1, 65535, 65535];
+/// Descriptors at most, of each kind.
+const MANY: u32 = 1 << 20;
+
 fn limits() -> vk::PhysicalDeviceLimits {
-    const MANY: u32 = 1 << 20;
     vk::PhysicalDeviceLimits {
         max_image_dimension1_d: 16384,
         max_image_dimension2_d: 16384,
@@ -43,7 +47,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_descriptor_set_sampled_images: MANY,
         max_descriptor_set_storage_images: MANY,
         max_compute_shared_memory_size: 48 << 10,
-        max_compute_work_group_count: [u32::MAX >> 1, 65535, 65535],
+        max_compute_work_group_count: MAX_GROUPS,
         max_compute_work_group_invocations: 1024,
         max_compute_work_group_size: [1024, 1024, 64],
         min_memory_map_alignment: 64,
@@ -88,7 +92,7 @@ pub(super) unsafe extern "system" fn properties2(_: vk::PhysicalDevice, to: *mut
                 (to.device_uuid, to.driver_uuid) = (*b"labelgs checker\0", *b"labelgs checker\0");
                 (to.subgroup_size, to.subgroup_supported_stages) = (lanes, stages);
                 to.subgroup_supported_operations = operations;
-                (to.max_per_set_descriptors, to.max_memory_allocation_size) = (1 << 20, HEAP_BYTES);
+                (to.max_per_set_descriptors, to.max_memory_allocation_size) = (MANY, HEAP_BYTES);
                 (to.max_multiview_view_count, to.max_multiview_instance_index) = (6, 1 << 27);
             }
             vk::StructureType::PHYSICAL_DEVICE_SUBGROUP_PROPERTIES => {
@@ -99,6 +103,14 @@ pub(super) unsafe extern "system" fn properties2(_: vk::PhysicalDevice, to: *mut
                 let to = unsafe { &mut *next.cast::<vk::PhysicalDeviceVulkan12Properties<'_>>() };
                 (to.driver_name, to.driver_info) = (name(c"labelgs checker"), name(c"runs every invocation alone"));
                 to.max_timeline_semaphore_value_difference = u64::MAX >> 1;
+                // The validation layer compares with these too.
+                to.max_per_stage_descriptor_update_after_bind_uniform_buffers = MANY;
+                to.max_per_stage_descriptor_update_after_bind_storage_buffers = MANY;
+                to.max_per_stage_descriptor_update_after_bind_sampled_images = MANY;
+                to.max_per_stage_update_after_bind_resources = u32::MAX;
+                to.max_descriptor_set_update_after_bind_uniform_buffers = MANY;
+                to.max_descriptor_set_update_after_bind_storage_buffers = MANY;
+                to.max_descriptor_set_update_after_bind_sampled_images = MANY;
             }
             vk::StructureType::PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES => {
                 let to = unsafe { &mut *next.cast::<vk::PhysicalDeviceSubgroupSizeControlProperties<'_>>() };

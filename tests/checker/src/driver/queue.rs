@@ -2,6 +2,7 @@
 
 use super::command::{self, Bindings, Command};
 use super::device::{Device, Queue, State};
+use super::properties::MAX_GROUPS;
 use super::sync::{Queries, Timeline};
 use super::{chain, lock, log, object, slice};
 use crate::machine::{Bound, Dispatch};
@@ -62,8 +63,15 @@ fn run(state: &mut State, command: Command) {
     match command {
         Command::Dispatch { with, groups } => dispatch(state, &with, groups),
         Command::Indirect { with, groups } => {
-            let groups = [0, 4, 8].map(|byte| word(state, &groups, byte).0);
-            dispatch(state, &with, groups);
+            let found = [0, 4, 8].map(|byte| word(state, &groups, byte));
+            let groups = found.map(|(count, _)| count);
+            let fits = groups.iter().zip(MAX_GROUPS).all(|(count, most)| *count <= most);
+            if fits && found.iter().all(|(_, is_written)| *is_written) {
+                return dispatch(state, &with, groups);
+            }
+            let hash = with.pipeline.map_or(0, |program| program.hash);
+            log::say(hash, &format!("an indirect dispatch of {groups:?} workgroups, which nobody wrote or are too many"));
+            state.is_lost = true;
         }
         Command::Copy { from, to } => {
             for byte in (0..to.bytes).step_by(4) {
