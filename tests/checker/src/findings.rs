@@ -13,6 +13,8 @@ pub enum Kind {
     SharedRace,
     /// Two invocations access a word of a buffer in no order, and one writes.
     BufferRace,
+    /// An invocation uses what another wrote, in order, but not both through a `coherent` buffer.
+    Coherence,
     /// Invocations of a workgroup run different memory fences between two barriers.
     Fence,
     /// Invocations of a subgroup meet a subgroup operation without the others.
@@ -29,6 +31,7 @@ impl fmt::Display for Kind {
             Self::Barrier => "barrier in non-uniform flow",
             Self::SharedRace => "race in shared memory",
             Self::BufferRace => "race in a buffer",
+            Self::Coherence => "use of a buffer that is not coherent",
             Self::Fence => "fence in non-uniform flow",
             Self::Subgroup => "subgroup operation in non-uniform flow",
             Self::Unwritten => "read of an unwritten word",

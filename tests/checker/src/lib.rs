@@ -17,6 +17,7 @@
 //! | barrier | invocations of a workgroup wait at different barriers, or some have ended |
 //! | shared race | two invocations access a word of shared memory without a barrier between, and one writes |
 //! | buffer race | two invocations access a word of a buffer in no order, and one writes, or one is atomic and one is not |
+//! | coherence | an invocation uses what another wrote in this dispatch, in order, but not both through a `coherent` buffer |
 //! | fence | invocations of a workgroup run different `memoryBarrier*()` between two barriers |
 //! | subgroup | a subgroup operation that not all lanes of the subgroup reach |
 //! | unwritten | a read of shared memory, or of device memory, that nobody has written |
@@ -38,7 +39,6 @@
 //!
 //! * Barriers in a loop that invocations reach in different rounds, but equally often.
 //! * Missing pipeline barriers between dispatches: everything is ordered there. The planner has its own tests.
-//! * Missing `coherent`: all memory is.
 //! * Faults of paths that the data of a test do not take.
 //! * What compilers do: contraction, flushed denormals, the reconvergence that a driver really has.
 //!

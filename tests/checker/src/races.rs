@@ -1,5 +1,7 @@
 //! Finds accesses of buffers in no order.
 //!
+//! What an invocation writes, another sees only if both use a `coherent` buffer, or atomics.
+//!
 //! Every unit of memory (4 bytes, or 2 for shaders with 16-bit accesses) remembers its last write and its last reads
 //! in the running dispatch. Atomics do not conflict with each other, but with plain accesses. `lane.rs` says what
 //! orders two accesses. Between dispatches, everything is ordered: pipeline barriers are not checked.
@@ -23,6 +25,8 @@ pub struct Access {
     pub pc: u32,
     /// True for atomics.
     pub is_atomic: bool,
+    /// True if it went through a `coherent` buffer.
+    is_coherent: bool,
 }
 
 /// Last accesses of a unit.
@@ -41,6 +45,15 @@ pub enum How {
     Write,
     /// Atomic read and write.
     Atomic,
+}
+
+/// How two accesses conflict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Conflict {
+    /// They are in no order.
+    Unordered,
+    /// They are in order, but not both through a `coherent` buffer, so the first may not be visible to the second.
+    Incoherent,
 }
 
 /// State of the running dispatch.
@@ -79,9 +92,9 @@ impl Races {
         (memory, unit): (usize, u64),
         shadow: &mut Shadow,
         lane: &Lane,
-        how: How,
+        (how, is_coherent): (How, bool),
         pc: u32,
-    ) -> Option<Access> {
+    ) -> Option<(Access, Conflict)> {
         let mut now = Access {
             dispatch: self.dispatch,
             group: lane.group,
@@ -91,11 +104,18 @@ impl Races {
             time: lane.time,
             pc,
             is_atomic: how == How::Atomic,
+            is_coherent,
         };
         let conflicts = |old: &Access| {
             old.dispatch == now.dispatch && !(old.is_atomic && now.is_atomic) && !old.is_before(lane)
         };
         let mut found = Some(shadow.write).filter(conflicts);
+        let last = &shadow.write;
+        let is_other = last.dispatch == now.dispatch && (last.group != lane.group || last.lane != lane.number);
+        let is_plain = !last.is_atomic || !now.is_atomic;
+        let hidden = is_other && is_plain && !(last.is_coherent && is_coherent);
+        let hidden = hidden.then_some((shadow.write, Conflict::Incoherent));
+        let unordered = |found: Option<Access>| found.map(|access| (access, Conflict::Unordered));
         if how == How::Read {
             let old = shadow.read;
             if old.dispatch == now.dispatch && !old.is_before(lane) {
@@ -108,14 +128,14 @@ impl Races {
                 }
             }
             shadow.read = now;
-            return found;
+            return unordered(found).or(hidden);
         }
         found = found.or(Some(shadow.read).filter(conflicts));
         if !self.readers.is_empty() && let Some(others) = self.readers.get(&(memory, unit)) {
             found = found.or(others.iter().copied().find(conflicts));
         }
         shadow.write = now;
-        found
+        unordered(found).or(hidden)
     }
 
     /// An atomic of an invocation hands over what it knows, and learns what was handed over.

@@ -246,6 +246,22 @@ fn hand_over_by_control_barriers() {
 }
 
 #[test]
+fn what_others_wrote_through_a_buffer_that_is_not_coherent() {
+    planted(Kind::Coherence, &LANES, "
+        layout(local_size_x = 128) in;
+        #ifdef FAULT
+        #define coherent
+        #endif
+        layout(binding = 1) coherent buffer Data { uint data[]; };
+        void main() {
+            uint index = gl_GlobalInvocationID.x;
+            data[index] = index;
+            controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease);
+            if (data[index ^ 127] == 5000) data[512 + index] = 1;
+        }");
+}
+
+#[test]
 fn fences_that_not_all_run() {
     planted(Kind::Fence, &LANES, &format!("{HEAD}
         void main() {{

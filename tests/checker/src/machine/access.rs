@@ -6,7 +6,7 @@ use crate::findings::{Invocation, Kind, located};
 use crate::lane::Lane;
 use crate::memory::POISON;
 use crate::program::{Atomic, Place, Register, Source, Space};
-use crate::races::How;
+use crate::races::{Conflict, How};
 use crate::shared::SharedMemory;
 
 impl Lane {
@@ -185,9 +185,15 @@ impl<const W: usize> Machine<'_, W> {
         let granule = program.granule;
         for part in 0..width / granule {
             let unit = byte / u64::from(granule) + u64::from(part);
-            let Some(other) = self.races.access((memory, unit), found.shadow(unit), lane, how, pc) else { continue };
+            let how = (how, how == How::Atomic || program.bindings[usize::from(binding)].is_coherent);
+            let found = self.races.access((memory, unit), found.shadow(unit), lane, how, pc);
+            let Some((other, conflict)) = found else { continue };
             let name = lane.name();
-            self.findings.add(program, Kind::BufferRace, pc, u64::from(binding), || {
+            let kind = match conflict {
+                Conflict::Unordered => Kind::BufferRace,
+                Conflict::Incoherent => Kind::Coherence,
+            };
+            self.findings.add(program, kind, pc, u64::from(binding), || {
                 let there = located(program, program.origins[other.pc as usize]);
                 let other = Invocation { group: other.group, lane: other.lane };
                 format!("{name} and {other} (at {there}) access byte {at} of binding {number}")
