@@ -15,9 +15,9 @@
 //! | kind | what is reported |
 //! | --- | --- |
 //! | barrier | invocations of a workgroup wait at different barriers, or some have ended |
-//! | shared race | two invocations access a word of shared memory without a barrier between, and one writes |
-//! | buffer race | two invocations access a word of a buffer in no order, and one writes, or one is atomic and one is not |
-//! | coherence | an invocation uses what another wrote in this dispatch, in order, but not both through a `coherent` buffer |
+//! | shared race | two invocations access a word of shared memory with no barrier between, and one writes |
+//! | buffer race | the same of a word of a buffer, in no order; an atomic and a plain access conflict too |
+//! | coherence | in order, but not both through a `coherent` buffer |
 //! | fence | invocations of a workgroup run different `memoryBarrier*()` between two barriers |
 //! | subgroup | a subgroup operation that not all lanes of the subgroup reach |
 //! | unwritten | a read of shared memory, or of device memory, that nobody has written |
@@ -30,8 +30,8 @@
 //!
 //! * Subgroups have one size for the whole device. Workgroups run in random order, four at a time. A seed decides; the
 //!   same seed gives the same run. Subgroups are interleaved where they wait, and at atomics on buffers.
-//! * Races are found by order, not by luck: two accesses conflict if no chain of barriers, fences and atomics leads from
-//!   one to the other, however they fell in this run. The module `lane` says which chains count. They are those of the
+//! * Races are found by order, not by luck: two accesses conflict if no chain of barriers, fences and atomics leads
+//!   from one to the other, however they fell in this run. The module `lane` says which chains count. They are those of the
 //!   Vulkan memory model: `barrier()` of GLSL orders shared memory only.
 //! * Arithmetic is that of [`ops`]: one rounding for each operation, no contraction.
 //!

@@ -130,27 +130,91 @@ impl Semantics {
 #[derive(Clone, Debug)]
 #[allow(missing_docs, reason = "the fields say what the operands of SPIR-V are")]
 pub enum Instruction {
-    Unary { op: Unary, to: Register, a: Source },
-    Binary { op: Binary, to: Register, a: Source, b: Source },
-    Ternary { op: Ternary, to: Register, a: Source, b: Source, c: Source },
-    Move { to: Register, from: Source },
+    Unary {
+        op: Unary,
+        to: Register,
+        a: Source,
+    },
+    Binary {
+        op: Binary,
+        to: Register,
+        a: Source,
+        b: Source,
+    },
+    Ternary {
+        op: Ternary,
+        to: Register,
+        a: Source,
+        b: Source,
+        c: Source,
+    },
+    Move {
+        to: Register,
+        from: Source,
+    },
     /// `to` = `base` + `index` * `stride`, saturated; an `index` of `bound` or more is a finding.
-    Offset { to: Register, base: Option<Source>, index: Source, stride: u32, bound: u32 },
+    Offset {
+        to: Register,
+        base: Option<Source>,
+        index: Source,
+        stride: u32,
+        bound: u32,
+    },
     /// Reads 4 or 2 bytes.
-    Load { to: Register, place: Place, width: u32 },
-    Store { place: Place, from: Source, width: u32 },
-    Atomic { op: Atomic, to: Register, place: Place, value: Source, comparator: Source },
+    Load {
+        to: Register,
+        place: Place,
+        width: u32,
+    },
+    Store {
+        place: Place,
+        from: Source,
+        width: u32,
+    },
+    Atomic {
+        op: Atomic,
+        to: Register,
+        place: Place,
+        value: Source,
+        comparator: Source,
+    },
     /// Bytes of a buffer from `plus` on, divided by `stride`.
-    Length { to: Register, binding: u16, plus: u32, stride: u32 },
+    Length {
+        to: Register,
+        binding: u16,
+        plus: u32,
+        stride: u32,
+    },
     /// One component of an element of a texel buffer.
-    Fetch { to: Register, binding: u16, index: Source, component: u32 },
-    Exchange { op: Exchange, to: Register, a: Source, b: Source },
+    Fetch {
+        to: Register,
+        binding: u16,
+        index: Source,
+        component: u32,
+    },
+    Exchange {
+        op: Exchange,
+        to: Register,
+        a: Source,
+        b: Source,
+    },
     Barrier(Semantics),
     /// A fence of its own, or a part of an atomic instruction.
-    Fence { semantics: Semantics, is_part: bool },
+    Fence {
+        semantics: Semantics,
+        is_part: bool,
+    },
     Jump(u32),
-    Branch { condition: Source, yes: u32, no: u32 },
-    Switch { value: Source, default: u32, cases: Vec<(u32, u32)> },
+    Branch {
+        condition: Source,
+        yes: u32,
+        no: u32,
+    },
+    Switch {
+        value: Source,
+        default: u32,
+        cases: Vec<(u32, u32)>,
+    },
     Return,
 }
 
@@ -218,9 +282,6 @@ pub fn module_hash(words: &[u32]) -> u64 {
 impl Builtin {
     /// True if it has three components.
     pub fn is_vector(self) -> bool {
-        matches!(
-            self,
-            Self::NumWorkgroups | Self::WorkgroupId | Self::LocalInvocationId | Self::GlobalInvocationId
-        )
+        matches!(self, Self::NumWorkgroups | Self::WorkgroupId | Self::LocalInvocationId | Self::GlobalInvocationId)
     }
 }

@@ -106,9 +106,8 @@ impl Races {
             is_atomic: how == How::Atomic,
             is_coherent,
         };
-        let conflicts = |old: &Access| {
-            old.dispatch == now.dispatch && !(old.is_atomic && now.is_atomic) && !old.is_before(lane)
-        };
+        let conflicts =
+            |old: &Access| old.dispatch == now.dispatch && !(old.is_atomic && now.is_atomic) && !old.is_before(lane);
         let mut found = Some(shadow.write).filter(conflicts);
         let last = &shadow.write;
         let is_other = last.dispatch == now.dispatch && (last.group != lane.group || last.lane != lane.number);
@@ -131,7 +130,9 @@ impl Races {
             return unordered(found).or(hidden);
         }
         found = found.or(Some(shadow.read).filter(conflicts));
-        if !self.readers.is_empty() && let Some(others) = self.readers.get(&(memory, unit)) {
+        if !self.readers.is_empty()
+            && let Some(others) = self.readers.get(&(memory, unit))
+        {
             found = found.or(others.iter().copied().find(conflicts));
         }
         shadow.write = now;

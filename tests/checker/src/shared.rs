@@ -34,8 +34,7 @@ pub struct SharedMemory(Vec<Word>);
 impl Touch {
     fn conflicts(&self, lane: &Lane, is_atomic: bool) -> bool {
         let is_own = self.lane == lane.number;
-        let is_earlier =
-            !self.is_wide && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch;
+        let is_earlier = !self.is_wide && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch;
         self.epoch == lane.epoch + 1 && !is_own && !is_earlier && !(self.is_atomic && is_atomic)
     }
 
@@ -43,7 +42,8 @@ impl Touch {
     fn add(&mut self, lane: &Lane, is_atomic: bool, pc: u32) {
         let old = *self;
         let (epoch, subgroup_epoch) = (lane.epoch + 1, lane.subgroup_epoch);
-        *self = Self { epoch, subgroup_epoch, subgroup: lane.subgroup, lane: lane.number, is_wide: false, is_atomic, pc };
+        *self =
+            Self { epoch, subgroup_epoch, subgroup: lane.subgroup, lane: lane.number, is_wide: false, is_atomic, pc };
         if old.epoch != epoch || old.lane == lane.number {
             return;
         }

@@ -4,20 +4,24 @@ use crate::support::{Buffers, compile};
 use labelgs_checker::findings::Kind;
 
 const SEEDS: u64 = 8;
-const LANES: [u32; 5] = [4, 8, 16, 32, 64];
 
-/// The shader with `FAULT` defined has findings of this kind only, with every seed and size of subgroups. Without it,
-/// there is none.
-fn planted(kind: Kind, sizes: &[u32], glsl: &str) {
-    let faulty = compile(&format!("#define FAULT\n{glsl}"), &[]);
-    let mended = compile(glsl, &[]);
+/// The shader with `FAULT` defined has findings of this kind only, with every seed. Without it, there is none.
+fn planted_at(sizes: &[u32], kind: Kind, glsl: &str) {
+    let faulty = compile(&format!("#define FAULT\n{HEAD}{glsl}"), &[]);
+    let mended = compile(&format!("{HEAD}{glsl}"), &[]);
     for (&lanes, seed) in sizes.iter().flat_map(|lanes| (0..SEEDS).map(move |seed| (lanes, seed))) {
-        let run = |program| Buffers { device: vec![2], ..Buffers::zeros(&[64, 1024, 1024]) }.run(program, [4, 1, 1], lanes, seed);
+        let buffers = || Buffers { device: vec![2], ..Buffers::zeros(&[64, 1024, 1024, 1024]) };
+        let run = |program| buffers().run(program, [4, 1, 1], lanes, seed);
         let (found, none) = (run(&faulty), run(&mended));
         assert!(found.contains(&kind), "{lanes} lanes, seed {seed}: {kind} is not found, only {found:?}");
         assert!(found.iter().all(|found| *found == kind), "{lanes} lanes, seed {seed}: {found:?}");
         assert_eq!(none, [], "{lanes} lanes, seed {seed}: the mended shader");
     }
+}
+
+/// The same with subgroups of every size.
+pub fn planted(kind: Kind, glsl: &str) {
+    planted_at(&[4, 8, 16, 32, 64], kind, glsl);
 }
 
 const HEAD: &str = "
@@ -31,21 +35,26 @@ const HEAD: &str = "
 
 #[test]
 fn barriers_that_not_all_reach() {
-    planted(Kind::Barrier, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Barrier,
+        "
+        void main() {
             words[lane] = 1;
             #ifdef FAULT
             if (lane < 64)
             #endif
                 barrier();
             data[index] = words[lane];
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn invocations_that_end_before_a_barrier() {
-    planted(Kind::Barrier, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Barrier,
+        "
+        void main() {
             words[lane] = 1;
             #ifdef FAULT
             if (lane == 77) return;
@@ -53,26 +62,32 @@ fn invocations_that_end_before_a_barrier() {
             barrier();
             if (lane == 77) return;
             data[index] = words[lane];
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn different_barriers() {
-    planted(Kind::Barrier, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Barrier,
+        "
+        void main() {
             words[lane] = 1;
             #ifdef FAULT
-            if (lane % 2 == 0) {{ barrier(); data[index] = 1; }} else {{ barrier(); data[index] = 2; }}
+            if (lane % 2 == 0) { barrier(); data[index] = 1; } else { barrier(); data[index] = 2; }
             #else
-            if (group % 2 == 0) {{ barrier(); data[index] = 1; }} else {{ barrier(); data[index] = 2; }}
+            if (group % 2 == 0) { barrier(); data[index] = 1; } else { barrier(); data[index] = 2; }
             #endif
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn a_barrier_in_a_loop_that_some_leave_early() {
-    planted(Kind::Barrier, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Barrier,
+        "
+        void main() {
             #ifdef FAULT
             uint rounds = lane == 5 ? 2 : 3;
             #else
@@ -80,13 +95,16 @@ fn a_barrier_in_a_loop_that_some_leave_early() {
             #endif
             for (uint round = 0; round < rounds; ++round) barrier();
             data[index] = rounds;
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn races_in_shared_memory() {
-    planted(Kind::SharedRace, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::SharedRace,
+        "
+        void main() {
             words[lane] = lane;
             barrier();
             uint other = words[127 - lane];
@@ -96,14 +114,17 @@ fn races_in_shared_memory() {
             words[lane] = other;
             barrier();
             data[index] = words[lane];
-        }}"));
+        }",
+    );
 }
 
 /// As `count_visible` of a projection once was: a loop without a round has no barrier.
 #[test]
 fn races_beside_a_skipped_loop() {
-    planted(Kind::SharedRace, &LANES, &format!("{HEAD}
-        uint count() {{
+    planted(
+        Kind::SharedRace,
+        "
+        uint count() {
             #ifndef FAULT
             barrier();
             #endif
@@ -112,18 +133,21 @@ fn races_beside_a_skipped_loop() {
             atomicAdd(words[lane / 32], 1);
             barrier();
             return words[3];
-        }}
-        void main() {{
+        }
+        void main() {
             uint sum = count();
-            for (uint before = 0; before < group; ++before) {{ barrier(); sum += 1; }}
+            for (uint before = 0; before < group; ++before) { barrier(); sum += 1; }
             data[index] = sum + count();
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn plain_accesses_of_shared_words_with_atomics() {
-    planted(Kind::SharedRace, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::SharedRace,
+        "
+        void main() {
             if (lane == 0) words[0] = 0;
             barrier();
             atomicMax(words[0], lane);
@@ -131,14 +155,18 @@ fn plain_accesses_of_shared_words_with_atomics() {
             barrier();
             #endif
             data[index] = words[0];
-        }}"));
+        }",
+    );
 }
 
 /// A barrier of the subgroup orders its own lanes.
 #[test]
 fn subgroup_barriers_order_a_subgroup() {
-    planted(Kind::SharedRace, &[32], &format!("{HEAD}
-        void main() {{
+    planted_at(
+        &[32],
+        Kind::SharedRace,
+        "
+        void main() {
             words[lane] = 0;
             barrier();
             words[lane] = lane;
@@ -148,123 +176,16 @@ fn subgroup_barriers_order_a_subgroup() {
             #else
             data[index] = words[lane ^ 31];
             #endif
-        }}"));
-}
-
-#[test]
-fn plain_accesses_of_a_buffer_by_two_workgroups() {
-    planted(Kind::BufferRace, &LANES, &format!("{HEAD}
-        void main() {{
-            #ifdef FAULT
-            data[lane] = group;
-            #else
-            data[index] = group;
-            #endif
-        }}"));
-}
-
-/// A counter that others may change is read once, atomically.
-#[test]
-fn plain_reads_of_words_with_atomics() {
-    planted(Kind::BufferRace, &LANES, &format!("{HEAD}
-        void main() {{
-            #ifdef FAULT
-            data[index] = counters[3];
-            #else
-            data[index] = atomicOr(counters[3], 0);
-            #endif
-            if (lane == 0 && group == 2) atomicOr(counters[3], 4);
-        }}"));
-}
-
-#[test]
-fn buffers_between_invocations_of_a_workgroup() {
-    planted(Kind::BufferRace, &LANES, &format!("{HEAD}
-        void main() {{
-            data[index] = lane;
-            #ifndef FAULT
-            memoryBarrierBuffer();
-            #endif
-            barrier();
-            memoryBarrierBuffer();
-            counters[0];
-            uint other = data[index ^ 127];
-            barrier();
-            if (other == 1000) counters[1] = other;
-        }}"));
-}
-
-/// The last workgroup sums what the others wrote. Without a second fence, invocation 0 hands over its own word only.
-#[test]
-fn hand_over_to_the_last_workgroup() {
-    planted(Kind::BufferRace, &LANES, &format!("{HEAD}
-        shared uint ticket;
-        void main() {{
-            data[index] = lane;
-            memoryBarrierBuffer();
-            barrier();
-            #ifndef FAULT
-            memoryBarrierBuffer();
-            #endif
-            if (lane == 0) ticket = atomicAdd(counters[0], 1);
-            barrier();
-            memoryBarrierBuffer();
-            barrier();
-            memoryBarrierBuffer();
-            if (ticket == 3) {{
-                uint sum = 0;
-                for (uint other = 0; other < 4; ++other) sum += data[128 * other + lane];
-                counters[8 + lane % 2] = 0;
-            }}
-        }}").replace("counters[8 + lane % 2] = 0;", "data[512 + lane] = sum;"));
-}
-
-/// The same by a control barrier that names buffers.
-#[test]
-fn hand_over_by_control_barriers() {
-    planted(Kind::BufferRace, &LANES, &format!("{HEAD}
-        shared uint ticket;
-        void meet() {{
-            #ifdef FAULT
-            controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsShared, gl_SemanticsAcquireRelease);
-            #else
-            controlBarrier(gl_ScopeWorkgroup, gl_ScopeDevice, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
-                gl_SemanticsAcquireRelease);
-            #endif
-        }}
-        void main() {{
-            data[index] = lane;
-            meet();
-            if (lane == 0) ticket = atomicAdd(counters[0], 1);
-            meet();
-            if (ticket == 3) {{
-                uint sum = 0;
-                for (uint other = 0; other < 4; ++other) sum += data[128 * other + lane];
-                data[512 + lane] = sum;
-            }}
-        }}"));
-}
-
-#[test]
-fn what_others_wrote_through_a_buffer_that_is_not_coherent() {
-    planted(Kind::Coherence, &LANES, "
-        layout(local_size_x = 128) in;
-        #ifdef FAULT
-        #define coherent
-        #endif
-        layout(binding = 1) coherent buffer Data { uint data[]; };
-        void main() {
-            uint index = gl_GlobalInvocationID.x;
-            data[index] = index;
-            controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer, gl_SemanticsAcquireRelease);
-            if (data[index ^ 127] == 5000) data[512 + index] = 1;
-        }");
+        }",
+    );
 }
 
 #[test]
 fn fences_that_not_all_run() {
-    planted(Kind::Fence, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Fence,
+        "
+        void main() {
             data[index] = lane;
             #ifdef FAULT
             if (lane == 0)
@@ -272,13 +193,16 @@ fn fences_that_not_all_run() {
                 memoryBarrierBuffer();
             barrier();
             if (lane == 0) atomicAdd(counters[0], 1);
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn subgroup_operations_without_all_lanes() {
-    planted(Kind::Subgroup, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Subgroup,
+        "
+        void main() {
             uint sum = 0;
             #ifdef FAULT
             if (lane % 2 == 0)
@@ -287,13 +211,16 @@ fn subgroup_operations_without_all_lanes() {
             #endif
                 sum = subgroupAdd(lane);
             data[index] = sum;
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn subgroup_operations_in_a_loop_that_some_leave_early() {
-    planted(Kind::Subgroup, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Subgroup,
+        "
+        void main() {
             uint sum = 0;
             #ifdef FAULT
             uint rounds = lane % 4;
@@ -302,47 +229,59 @@ fn subgroup_operations_in_a_loop_that_some_leave_early() {
             #endif
             for (uint round = 0; round < rounds; ++round) sum += subgroupAdd(lane + round);
             data[index] = sum;
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn reads_of_unwritten_shared_words() {
-    planted(Kind::Unwritten, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Unwritten,
+        "
+        void main() {
             #ifdef FAULT
             if (lane < 100)
             #endif
                 words[lane] = lane;
             barrier();
             data[index] = words[127 - lane];
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn reads_of_unwritten_memory() {
-    planted(Kind::Unwritten, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Unwritten,
+        "
+        void main() {
             #ifdef FAULT
             if (lane < 100)
             #endif
                 fresh[index] = lane;
             data[index] = fresh[index];
-        }}"));
+        }",
+    );
 }
 
 #[test]
 fn accesses_out_of_bounds() {
-    planted(Kind::Bounds, &LANES, &format!("{HEAD}
-        void main() {{
+    planted(
+        Kind::Bounds,
+        "
+        void main() {
             #ifdef FAULT
             uint at = index * 3;
             #else
             uint at = index * 2;
             #endif
             data[at] = lane;
-        }}"));
-    planted(Kind::Bounds, &LANES, &format!("{HEAD}
-        void main() {{
+        }",
+    );
+    planted(
+        Kind::Bounds,
+        "
+        void main() {
             #ifdef FAULT
             uint at = lane + 1;
             #else
@@ -351,9 +290,12 @@ fn accesses_out_of_bounds() {
             words[at] = lane;
             barrier();
             data[index] = words[at];
-        }}"));
-    planted(Kind::Bounds, &LANES, &format!("{HEAD}
-        void main() {{
+        }",
+    );
+    planted(
+        Kind::Bounds,
+        "
+        void main() {
             uint local[4];
             for (uint place = 0; place < 4; ++place) local[(place + lane) % 4] = place;
             #ifdef FAULT
@@ -362,5 +304,6 @@ fn accesses_out_of_bounds() {
             uint at = counters[2] + lane % 4;
             #endif
             data[index] = local[at];
-        }}"));
+        }",
+    );
 }

@@ -13,14 +13,33 @@ use std::sync::Mutex;
 #[derive(Clone)]
 pub(super) enum Command {
     /// Workgroups by number.
-    Dispatch { with: Bindings, groups: [u32; 3] },
+    Dispatch {
+        with: Bindings,
+        groups: [u32; 3],
+    },
     /// Workgroups by three words in memory.
-    Indirect { with: Bindings, groups: Bound },
+    Indirect {
+        with: Bindings,
+        groups: Bound,
+    },
     /// Copies as many bytes as the second range has.
-    Copy { from: Bound, to: Bound },
-    Fill { to: Bound, word: u32 },
-    Reset { pool: vk::QueryPool, first: u32, count: u32 },
-    Timestamp { pool: vk::QueryPool, query: u32 },
+    Copy {
+        from: Bound,
+        to: Bound,
+    },
+    Fill {
+        to: Bound,
+        word: u32,
+    },
+    Reset {
+        pool: vk::QueryPool,
+        first: u32,
+        count: u32,
+    },
+    Timestamp {
+        pool: vk::QueryPool,
+        query: u32,
+    },
 }
 
 /// What a dispatch uses.

@@ -1,6 +1,6 @@
 //! The device, its queues, and the state that all submits share.
 
-use super::{LOADER_MAGIC, Function, destroy as drop_object, handle, lock, object};
+use super::{Function, LOADER_MAGIC, destroy as drop_object, handle, lock, object};
 use crate::machine::Memories;
 use crate::races::Races;
 use ash::vk;

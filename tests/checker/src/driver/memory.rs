@@ -93,11 +93,7 @@ pub(super) unsafe extern "system" fn destroy_buffer(_: vk::Device, buffer: vk::B
     unsafe { destroy::<Buffer>(buffer) };
 }
 
-pub(super) unsafe extern "system" fn requirements(
-    _: vk::Device,
-    buffer: vk::Buffer,
-    to: *mut vk::MemoryRequirements,
-) {
+pub(super) unsafe extern "system" fn requirements(_: vk::Device, buffer: vk::Buffer, to: *mut vk::MemoryRequirements) {
     let size = unsafe { object::<Buffer>(buffer) }.bytes.next_multiple_of(64);
     unsafe { *to = vk::MemoryRequirements { size, alignment: 64, memory_type_bits: 3 } };
 }

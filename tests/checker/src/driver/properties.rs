@@ -178,7 +178,8 @@ pub(super) unsafe extern "system" fn features2(_: vk::PhysicalDevice, to: *mut v
 }
 
 fn memories() -> vk::PhysicalDeviceMemoryProperties {
-    let mut all = vk::PhysicalDeviceMemoryProperties { memory_type_count: 2, memory_heap_count: 2, ..Default::default() };
+    let mut all =
+        vk::PhysicalDeviceMemoryProperties { memory_type_count: 2, memory_heap_count: 2, ..Default::default() };
     let host = vk::MemoryPropertyFlags::HOST_VISIBLE
         | vk::MemoryPropertyFlags::HOST_COHERENT
         | vk::MemoryPropertyFlags::HOST_CACHED;

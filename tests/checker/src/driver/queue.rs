@@ -70,7 +70,10 @@ fn run(state: &mut State, command: Command) {
                 return dispatch(state, &with, groups);
             }
             let hash = with.pipeline.map_or(0, |program| program.hash);
-            log::say(hash, &format!("an indirect dispatch of {groups:?} workgroups, which nobody wrote or are too many"));
+            log::say(
+                hash,
+                &format!("an indirect dispatch of {groups:?} workgroups, which nobody wrote or are too many"),
+            );
             state.is_lost = true;
         }
         Command::Copy { from, to } => {

@@ -39,8 +39,8 @@ fn ternary(op: Op) -> Option<Ternary> {
 }
 
 fn extended_unary(op: GlslStd450Op) -> Option<Unary> {
-    same!(op, GlslStd450Op to Unary: FAbs SAbs FSign SSign Floor Ceil Trunc RoundEven Fract Sqrt InverseSqrt Exp Exp2 Log Log2
-        Sin Cos Tan Asin Acos Atan FindILsb FindUMsb FindSMsb)
+    same!(op, GlslStd450Op to Unary: FAbs SAbs FSign SSign Floor Ceil Trunc RoundEven Fract Sqrt InverseSqrt Exp Exp2 Log
+        Log2 Sin Cos Tan Asin Acos Atan FindILsb FindUMsb FindSMsb)
 }
 
 fn extended_binary(op: GlslStd450Op) -> Option<Binary> {

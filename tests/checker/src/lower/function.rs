@@ -5,10 +5,9 @@ use super::constants::Globals;
 use super::memory::Pointer;
 use super::types::{Id, Type};
 use super::{Result, id, literal};
-use crate::ops::Binary;
 use crate::program::{BindingUse, Exchange, Instruction, Program, Register, Source, Space};
 use rspirv::dr;
-use rspirv::spirv::{GroupOperation, Op, StorageClass};
+use rspirv::spirv::{Op, StorageClass};
 use std::collections::HashMap;
 
 /// What a function becomes, while it is read.
@@ -75,7 +74,11 @@ impl<'a> Lowering<'a> {
                     new.program.builtins.push((builtin, new.next_register));
                     new.region(words)
                 }
-                (StorageClass::StorageBuffer | StorageClass::Uniform | StorageClass::UniformConstant, Some(number), _) => {
+                (
+                    StorageClass::StorageBuffer | StorageClass::Uniform | StorageClass::UniformConstant,
+                    Some(number),
+                    _,
+                ) => {
                     let (is_written, is_coherent) = (false, variable.is_coherent);
                     new.program.bindings.push(BindingUse { number, is_written, is_coherent });
                     Space::Buffer(new.program.bindings.len() as u16 - 1)
@@ -167,8 +170,7 @@ impl<'a> Lowering<'a> {
             let label = block.label.as_ref().and_then(|label| label.result_id).unwrap_or_default();
             for phi in block.instructions.iter().filter(|instruction| instruction.class.opcode == Op::Phi) {
                 let (of, operands) = (phi.result_type.unwrap_or_default(), &phi.operands);
-                let words: Words =
-                    (0..self.globals.types.words(of)?).map(|_| Source(self.register())).collect();
+                let words: Words = (0..self.globals.types.words(of)?).map(|_| Source(self.register())).collect();
                 let pair = |at: usize| Ok((id(operands, 2 * at + 1)?, id(operands, 2 * at)?));
                 let sources = (0..operands.len() / 2).map(pair).collect::<Result<HashMap<_, _>>>()?;
                 self.values.insert(phi.result_id.unwrap_or_default(), words.clone());
@@ -231,9 +233,7 @@ impl<'a> Lowering<'a> {
             Op::ImageFetch => {
                 let binding = *self.images.get(&id(operands, 0)?).ok_or("an image that was not loaded")?;
                 let index = self.value(operands, 1)?[0];
-                let fetch = |component| {
-                    self.new_word(|to| Instruction::Fetch { to, binding, index, component })
-                };
+                let fetch = |component| self.new_word(|to| Instruction::Fetch { to, binding, index, component });
                 (0..4).map(fetch).collect()
             }
             _ => match self.exchange(from)? {
@@ -263,61 +263,6 @@ impl<'a> Lowering<'a> {
             other => return Err(format!("barriers of scope {other}")),
         }
         Ok(())
-    }
-
-    /// Lowers an operation of subgroups. Returns `None` if it is of another kind.
-    fn exchange(&mut self, from: &dr::Instruction) -> Result<Option<Words>> {
-        let operands = &from.operands;
-        let combined = match from.class.opcode {
-            Op::GroupNonUniformIAdd => Some((Binary::IAdd, 0)),
-            Op::GroupNonUniformFAdd => Some((Binary::FAdd, 0)),
-            Op::GroupNonUniformUMin => Some((Binary::UMin, u32::MAX)),
-            Op::GroupNonUniformUMax => Some((Binary::UMax, 0)),
-            Op::GroupNonUniformFMin => Some((Binary::FMin, f32::INFINITY.to_bits())),
-            Op::GroupNonUniformFMax => Some((Binary::FMax, f32::NEG_INFINITY.to_bits())),
-            Op::GroupNonUniformBitwiseAnd => Some((Binary::BitwiseAnd, u32::MAX)),
-            Op::GroupNonUniformBitwiseOr => Some((Binary::BitwiseOr, 0)),
-            _ => None,
-        };
-        if let Some((op, least)) = combined {
-            let op = match operands.get(1) {
-                Some(dr::Operand::GroupOperation(GroupOperation::Reduce)) => Exchange::Reduce(op),
-                Some(dr::Operand::GroupOperation(GroupOperation::InclusiveScan)) => Exchange::InclusiveScan(op),
-                Some(dr::Operand::GroupOperation(GroupOperation::ExclusiveScan)) => Exchange::ExclusiveScan(op, least),
-                other => return Err(format!("the group operation {other:?}")),
-            };
-            let (a, b) = (self.value(operands, 2)?, self.constant(0));
-            return Ok(Some(self.exchanges(op, &a, b)));
-        }
-        let zero = self.constant(0);
-        Ok(Some(match from.class.opcode {
-            Op::GroupNonUniformElect => self.exchanges(Exchange::Elect, &[zero], zero),
-            Op::GroupNonUniformBallot => {
-                let a = self.value(operands, 1)?[0];
-                let half = |first| self.new_word(|to| Instruction::Exchange { op: Exchange::Ballot(first), to, a, b: zero });
-                let halves = [0, 32].map(half);
-                vec![halves[0], halves[1], zero, zero]
-            }
-            Op::GroupNonUniformAll | Op::GroupNonUniformAny => {
-                let a = self.value(operands, 1)?;
-                let all = from.class.opcode == Op::GroupNonUniformAll;
-                self.exchanges(if all { Exchange::All } else { Exchange::Any }, &a, zero)
-            }
-            Op::GroupNonUniformBroadcastFirst => {
-                let a = self.value(operands, 1)?;
-                self.exchanges(Exchange::BroadcastFirst, &a, zero)
-            }
-            Op::GroupNonUniformShuffle | Op::GroupNonUniformBroadcast | Op::GroupNonUniformShuffleXor => {
-                let (a, b) = (self.value(operands, 1)?, self.value(operands, 2)?[0]);
-                let xor = from.class.opcode == Op::GroupNonUniformShuffleXor;
-                self.exchanges(if xor { Exchange::ShuffleXor } else { Exchange::Shuffle }, &a, b)
-            }
-            _ => return Ok(None),
-        }))
-    }
-
-    fn exchanges(&mut self, op: Exchange, a: &[Source], b: Source) -> Words {
-        a.iter().map(|&a| self.new_word(|to| Instruction::Exchange { op, to, a, b })).collect()
     }
 
     fn terminator(&mut self, block: Id, from: &dr::Instruction) -> Result<()> {

@@ -168,7 +168,8 @@ impl Lowering<'_> {
 
     /// Scope and semantics of memory, as successive operands.
     pub(super) fn semantics(&self, operands: &[dr::Operand], at: usize) -> Result<Semantics> {
-        let constant = |at| self.value(operands, at).ok().and_then(|words| self.known(words[0])).ok_or("a computed scope");
+        let constant =
+            |at| self.value(operands, at).ok().and_then(|words| self.known(words[0])).ok_or("a computed scope");
         Ok(Semantics { scope: constant(at)?, bits: constant(at + 1)? })
     }
 }

@@ -7,6 +7,7 @@ mod constants;
 mod function;
 mod memory;
 mod registers;
+mod subgroups;
 mod types;
 
 use crate::program::{Program, module_hash};

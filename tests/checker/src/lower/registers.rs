@@ -4,8 +4,8 @@
 //! to its last instruction in the order of the code, and in every block that its value reaches.
 
 use crate::program::{Instruction, Place, Program, Register, Source};
-use std::collections::BinaryHeap;
 use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 /// Drops what only computes words that nobody reads: members of structs that are loaded as a whole, most of all.
 pub fn drop_dead(program: &mut Program) {
@@ -98,7 +98,9 @@ fn spans(program: &mut Program, pinned: Register) -> Vec<(u32, u32)> {
     for instruction in &mut program.code {
         let mut read = Vec::new();
         instruction.visit(&mut |source: &mut Source| {
-            if let Err(register) = source.place() && register as u32 >= pinned {
+            if let Err(register) = source.place()
+                && register as u32 >= pinned
+            {
                 read.push(register as u32 - pinned);
             }
         });
@@ -137,7 +139,9 @@ fn spans(program: &mut Program, pinned: Register) -> Vec<(u32, u32)> {
     }
     for (number, block) in blocks.iter().enumerate() {
         for (live, at) in [(&live_in[number], block.first), (&live_out[number], block.last)] {
-            (0..count as usize).filter(|place| live[place / 64] >> (place % 64) & 1 == 1).for_each(|place| extend(place, at));
+            (0..count as usize)
+                .filter(|place| live[place / 64] >> (place % 64) & 1 == 1)
+                .for_each(|place| extend(place, at));
         }
     }
     spans

@@ -122,7 +122,8 @@ impl Types {
                 Ok((*part, index * self.words(*part)?))
             }
             Type::Struct(members) => {
-                let before = members.iter().take(index as usize).map(|member| self.words(*member)).sum::<Result<u32>>()?;
+                let before =
+                    members.iter().take(index as usize).map(|member| self.words(*member)).sum::<Result<u32>>()?;
                 Ok((*members.get(index as usize).ok_or("a member that is not there")?, before))
             }
             other => Err(format!("parts of {other:?}")),
@@ -156,9 +157,8 @@ impl Types {
 
     /// Numbers of a type in memory, in the order of its words in registers.
     pub fn leaves(&self, of: Id, columns: Option<u32>) -> Result<Vec<Leaf>> {
-        let moved = |leaves: Vec<Leaf>, by: u32| {
-            leaves.into_iter().map(move |leaf| Leaf { offset: leaf.offset + by, ..leaf })
-        };
+        let moved =
+            |leaves: Vec<Leaf>, by: u32| leaves.into_iter().map(move |leaf| Leaf { offset: leaf.offset + by, ..leaf });
         match self.get(of)? {
             Type::Number(bits) => Ok(vec![Leaf { offset: 0, width: bits / 8 }]),
             Type::Vector(part, count) | Type::Matrix(part, count) | Type::Array(part, count) => {

@@ -62,15 +62,7 @@ impl<const W: usize> Machine<'_, W> {
         value
     }
 
-    pub(super) fn store(
-        &mut self,
-        parts: Parts<'_, W>,
-        mask: u64,
-        place: &Place,
-        value: Source,
-        width: u32,
-        pc: u32,
-    ) {
+    pub(super) fn store(&mut self, parts: Parts<'_, W>, mask: u64, place: &Place, value: Source, width: u32, pc: u32) {
         let (shared, subgroup) = parts;
         let offsets = self.offsets(subgroup, place);
         let value = *subgroup.get(self.constants, value);

@@ -101,7 +101,8 @@ fn check_barrier<const W: usize>(machine: &mut Machine<'_, W>, group: &Group<W>,
     let program = machine.program;
     let pc = waiting[0].pc;
     let invocations = program.local_size.iter().product::<u32>();
-    let here: u32 = waiting.iter().filter(|fragment| fragment.pc == pc).map(|fragment| fragment.mask.count_ones()).sum();
+    let here: u32 =
+        waiting.iter().filter(|fragment| fragment.pc == pc).map(|fragment| fragment.mask.count_ones()).sum();
     if here == invocations {
         return;
     }
@@ -119,9 +120,8 @@ fn check_barrier<const W: usize>(machine: &mut Machine<'_, W>, group: &Group<W>,
 /// All invocations must have run the same fences since the last barrier.
 fn check_fences<const W: usize>(machine: &mut Machine<'_, W>, group: &Group<W>, pc: Option<u32>) {
     let program = machine.program;
-    let differs = |a: &Lane, b: &Lane| {
-        a.trail != b.trail || (a.subgroup == b.subgroup && a.subgroup_trail != b.subgroup_trail)
-    };
+    let differs =
+        |a: &Lane, b: &Lane| a.trail != b.trail || (a.subgroup == b.subgroup && a.subgroup_trail != b.subgroup_trail);
     let mut before: Option<&Lane> = None;
     let mut pair = None;
     for lane in group.all(program) {

@@ -199,7 +199,9 @@ fn run_fragment<const W: usize>(
             }
             Instruction::Offset { to, base, index, stride, bound } => {
                 let index = *subgroup.get(constants, *index);
-                if *bound != u32::MAX && let Some(lane) = lanes(mask).find(|lane| index[*lane] >= *bound) {
+                if *bound != u32::MAX
+                    && let Some(lane) = lanes(mask).find(|lane| index[*lane] >= *bound)
+                {
                     let (index, from) = (index[lane], subgroup.lanes[lane].clone());
                     machine.found(Kind::Bounds, pc, 0, || {
                         format!("{} uses index {} of {bound} elements", from.name(), index.cast_signed())
