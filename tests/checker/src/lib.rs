@@ -44,6 +44,7 @@
 //!
 //! Where to start reading: [`program`] has the instructions, [`lower`] makes them from SPIR-V, [`machine`] runs them.
 #![allow(unsafe_code)]
+#![allow(clippy::disallowed_methods, reason = "the rules of files are those of the library")]
 
 pub mod driver;
 pub mod findings;

@@ -35,7 +35,8 @@ impl Touch {
     fn conflicts(&self, lane: &Lane, is_atomic: bool) -> bool {
         let is_own = self.lane == lane.number;
         let is_earlier = !self.is_wide && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch;
-        self.epoch == lane.epoch + 1 && !is_own && !is_earlier && !(self.is_atomic && is_atomic)
+        let are_atomic = self.is_atomic && is_atomic;
+        self.epoch == lane.epoch + 1 && !is_own && !is_earlier && !are_atomic
     }
 
     /// Adds an access. Those before it in the order of the subgroup are implied by it.

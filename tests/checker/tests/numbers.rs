@@ -27,9 +27,9 @@ fn compare(glsl: &str, expected: impl Fn(u32, u32, u32) -> u32) {
     let mut state = 1_u32;
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        let bits = (state >> (state >> 28) + 4 ^ state).wrapping_mul(277_803_737);
+        let bits = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
         // Floats near 1 half of the time, so that sums do not only have one term.
-        if bits & 1 == 0 { 0x3f80_0000 ^ bits >> 7 } else { bits }
+        if bits & 1 == 0 { 0x3f80_0000 ^ (bits >> 7) } else { bits }
     };
     buffers.words[..3].iter_mut().for_each(|words| words.iter_mut().for_each(|word| *word = next()));
     assert_eq!(buffers.run(&program, [4, 1, 1], 32, 0), []);

@@ -42,6 +42,7 @@ macro_rules! table {
     };
 }
 
+#[allow(clippy::too_many_lines, reason = "a table")]
 fn function(name: &str) -> Option<Function> {
     table!(name;
         "vkCreateInstance" => instance::create,

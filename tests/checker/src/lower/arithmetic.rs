@@ -157,6 +157,14 @@ impl Lowering<'_> {
                 let both = from.class.opcode == Op::All;
                 vec![self.fold(if both { Binary::BitwiseAnd } else { Binary::BitwiseOr }, &a)]
             }
+            _ => return self.product(from),
+        }))
+    }
+
+    /// Lowers products of vectors and matrices.
+    fn product(&mut self, from: &dr::Instruction) -> Result<Option<Words>> {
+        let operands = &from.operands;
+        Ok(Some(match from.class.opcode {
             Op::Dot => {
                 let (a, b) = (self.value(operands, 0)?, self.value(operands, 1)?);
                 vec![self.dot(&a, &b)]

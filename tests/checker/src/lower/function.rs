@@ -218,18 +218,7 @@ impl<'a> Lowering<'a> {
                     _ => self.load(&pointer)?,
                 }
             }
-            Op::ArrayLength => {
-                let pointer = self.pointer(operands, 0)?;
-                let (Space::Buffer(binding), Type::Struct(members)) =
-                    (pointer.place.space, self.globals.types.get(pointer.of)?)
-                else {
-                    return Err("the length of what is no buffer".to_owned());
-                };
-                let member = literal(operands, 1)?;
-                let (plus, _) = self.globals.types.member(pointer.of, member)?;
-                let stride = self.globals.types.stride(members[member as usize], None)?;
-                vec![self.new_word(|to| Instruction::Length { to, binding, plus, stride })]
-            }
+            Op::ArrayLength => self.length(operands)?,
             Op::ImageFetch => {
                 let binding = *self.images.get(&id(operands, 0)?).ok_or("an image that was not loaded")?;
                 let index = self.value(operands, 1)?[0];
@@ -249,6 +238,20 @@ impl<'a> Lowering<'a> {
             self.types.insert(id, of);
         }
         Ok(())
+    }
+
+    /// Elements of a runtime array.
+    fn length(&mut self, operands: &[dr::Operand]) -> Result<Words> {
+        let pointer = self.pointer(operands, 0)?;
+        let (Space::Buffer(binding), Type::Struct(members)) =
+            (pointer.place.space, self.globals.types.get(pointer.of)?)
+        else {
+            return Err("the length of what is no buffer".to_owned());
+        };
+        let member = literal(operands, 1)?;
+        let (plus, _) = self.globals.types.member(pointer.of, member)?;
+        let stride = self.globals.types.stride(members[member as usize], None)?;
+        Ok(vec![self.new_word(|to| Instruction::Length { to, binding, plus, stride })])
     }
 
     fn barrier(&mut self, operands: &[dr::Operand]) -> Result<()> {

@@ -89,7 +89,7 @@ impl Dispatch<'_> {
             memories,
             races,
             findings: Findings::default(),
-            random: Pcg32::new(self.seed, 0xa02b_dbf7_bb3c_0a7),
+            random: Pcg32::new(self.seed, 0x0a02_bdbf_7bb3_c0a7),
         };
         machine.run();
         machine.findings.list
@@ -150,7 +150,7 @@ impl<const W: usize> Machine<'_, W> {
     fn below(&mut self, bound: usize) -> usize {
         match bound {
             0 | 1 => 0,
-            _ => (u64::from(self.random.next_u32()) * bound as u64 >> 32) as usize,
+            _ => ((u64::from(self.random.next_u32()) * bound as u64) >> 32) as usize,
         }
     }
 

@@ -91,6 +91,12 @@ impl<const W: usize> Subgroup<W> {
         Some(Fragment { pc, mask })
     }
 
+    /// Lanes part: each part goes on at its instruction.
+    fn part(&mut self, parts: &[(u32, u64)]) {
+        let parts = parts.iter().filter(|(_, mask)| *mask != 0);
+        self.ready.extend(parts.map(|&(pc, mask)| Fragment { pc, mask }));
+    }
+
     /// Lanes whose value is not 0.
     fn truths(value: &[u32; W], mask: u64) -> u64 {
         (0..W).fold(0, |bits, lane| bits | u64::from(value[lane] != 0) << lane) & mask
@@ -128,30 +134,13 @@ fn run_fragment<const W: usize>(
     let active = Active::new(mask, subgroup.alive);
     loop {
         match &program.code[pc as usize] {
-            Instruction::Unary { op, to, a } => {
-                let value = op.each([subgroup.get(constants, *a)]);
-                subgroup.set(*to, value, &active);
-            }
-            Instruction::Binary { op, to, a, b } => {
-                let value = op.each([subgroup.get(constants, *a), subgroup.get(constants, *b)]);
-                subgroup.set(*to, value, &active);
-            }
-            Instruction::Ternary { op, to, a, b, c } => {
-                let [a, b, c] = [a, b, c].map(|source| subgroup.get(constants, *source));
-                let value = op.each([a, b, c]);
-                subgroup.set(*to, value, &active);
-            }
-            Instruction::Move { to, from } => {
-                let value = *subgroup.get(constants, *from);
-                subgroup.set(*to, value, &active);
+            Instruction::Jump(to) if subgroup.ready.is_empty() => {
+                pc = *to;
+                continue;
             }
             Instruction::Jump(to) => {
-                pc = *to;
-                if !subgroup.ready.is_empty() {
-                    subgroup.ready.push(Fragment { pc, mask });
-                    return false;
-                }
-                continue;
+                subgroup.part(&[(*to, mask)]);
+                return false;
             }
             Instruction::Branch { condition, yes, no } => {
                 let truths = Subgroup::truths(subgroup.get(constants, *condition), mask);
@@ -160,21 +149,15 @@ fn run_fragment<const W: usize>(
                     pc = if rest == 0 { *yes } else { *no };
                     continue;
                 }
-                let parts = [Fragment { pc: *yes, mask: truths }, Fragment { pc: *no, mask: rest }];
-                subgroup.ready.extend(parts.into_iter().filter(|part| part.mask != 0));
+                subgroup.part(&[(*yes, truths), (*no, rest)]);
                 return false;
             }
             Instruction::Switch { value, default, cases } => {
                 let values = subgroup.get(constants, *value);
-                let mut rest = mask;
-                let mut parts = Vec::new();
-                for &(case, to) in cases {
-                    let here = lanes(rest).filter(|lane| values[*lane] == case).fold(0, |bits, lane| bits | 1 << lane);
-                    parts.push(Fragment { pc: to, mask: here });
-                    rest &= !here;
-                }
-                parts.push(Fragment { pc: *default, mask: rest });
-                subgroup.ready.extend(parts.into_iter().filter(|part| part.mask != 0));
+                let of = |case: u32| Subgroup::truths(&values.map(|value| u32::from(value == case)), mask);
+                let mut parts: Vec<(u32, u64)> = cases.iter().map(|&(case, to)| (to, of(case))).collect();
+                parts.push((*default, parts.iter().fold(mask, |rest, (_, part)| rest & !part)));
+                subgroup.part(&parts);
                 return false;
             }
             Instruction::Return => {
@@ -186,30 +169,10 @@ fn run_fragment<const W: usize>(
                 return false;
             }
             Instruction::Fence { semantics, is_part } => fence(subgroup, mask, (*semantics, *is_part), pc),
-            Instruction::Atomic { op, to, place, value, comparator } => {
-                let is_buffer = matches!(place.space, Space::Buffer(_));
-                let now = if is_buffer { machine.some_of(mask) } else { mask };
-                let some = Active::new(now, subgroup.alive);
-                machine.atomic((shared, subgroup), &some, (*op, *to, place, *value, *comparator), pc);
-                if is_buffer {
-                    let parts = [Fragment { pc: pc + 1, mask: now }, Fragment { pc, mask: mask & !now }];
-                    subgroup.ready.extend(parts.into_iter().filter(|part| part.mask != 0));
+            Instruction::Atomic { .. } => {
+                if atomic(machine, (shared, subgroup), fragment.mask, pc) {
                     return true;
                 }
-            }
-            Instruction::Offset { to, base, index, stride, bound } => {
-                let index = *subgroup.get(constants, *index);
-                if *bound != u32::MAX
-                    && let Some(lane) = lanes(mask).find(|lane| index[*lane] >= *bound)
-                {
-                    let (index, from) = (index[lane], subgroup.lanes[lane].clone());
-                    machine.found(Kind::Bounds, pc, 0, || {
-                        format!("{} uses index {} of {bound} elements", from.name(), index.cast_signed())
-                    });
-                }
-                let base = base.map_or([0; W], |base| *subgroup.get(constants, base));
-                let value = std::array::from_fn(|lane| base[lane].saturating_add(index[lane].saturating_mul(*stride)));
-                subgroup.set(*to, value, &active);
             }
             Instruction::Load { to, place, width } => {
                 let value = machine.load((shared, subgroup), mask, place, *width, pc);
@@ -218,17 +181,73 @@ fn run_fragment<const W: usize>(
             Instruction::Store { place, from, width } => {
                 machine.store((shared, subgroup), mask, place, *from, *width, pc);
             }
-            Instruction::Length { to, binding, plus, stride } => {
-                let bytes = machine.bound[usize::from(*binding)].bytes.saturating_sub(u64::from(*plus));
-                subgroup.set(*to, [(bytes / u64::from(*stride)) as u32; W], &active);
-            }
             Instruction::Fetch { to, binding, index, component } => {
                 let value = machine.fetch(subgroup, mask, *binding, (*index, *component), pc);
                 subgroup.set(*to, value, &active);
             }
+            other => compute(machine, subgroup, &active, other, pc),
         }
         pc += 1;
     }
+}
+
+/// Runs an atomic. On a buffer, lanes part, others may come between, and the result is true.
+fn atomic<const W: usize>(
+    machine: &mut Machine<'_, W>,
+    (shared, subgroup): (&mut SharedMemory, &mut Subgroup<W>),
+    mask: u64,
+    pc: u32,
+) -> bool {
+    let Instruction::Atomic { op, to, place, value, comparator } = &machine.program.code[pc as usize] else {
+        return false;
+    };
+    let is_buffer = matches!(place.space, Space::Buffer(_));
+    let now = if is_buffer { machine.some_of(mask) } else { mask };
+    let active = Active::new(now, subgroup.alive);
+    machine.atomic((shared, subgroup), &active, (*op, *to, place, *value, *comparator), pc);
+    if is_buffer {
+        subgroup.part(&[(pc + 1, now), (pc, mask & !now)]);
+    }
+    is_buffer
+}
+
+/// Runs an instruction that only computes.
+#[inline(always)]
+fn compute<const W: usize>(
+    machine: &mut Machine<'_, W>,
+    subgroup: &mut Subgroup<W>,
+    active: &Active<W>,
+    instruction: &Instruction,
+    pc: u32,
+) {
+    let constants = machine.constants;
+    let (to, value) = match instruction {
+        Instruction::Unary { op, to, a } => (to, op.each([subgroup.get(constants, *a)])),
+        Instruction::Binary { op, to, a, b } => {
+            (to, op.each([subgroup.get(constants, *a), subgroup.get(constants, *b)]))
+        }
+        Instruction::Ternary { op, to, a, b, c } => {
+            (to, op.each([a, b, c].map(|source| subgroup.get(constants, *source))))
+        }
+        Instruction::Move { to, from } => (to, *subgroup.get(constants, *from)),
+        Instruction::Offset { to, base, index, stride, bound } => {
+            let index = *subgroup.get(constants, *index);
+            if *bound != u32::MAX
+                && let Some(lane) = lanes(active.mask).find(|lane| index[*lane] >= *bound)
+            {
+                let (index, from) = (index[lane].cast_signed(), subgroup.lanes[lane].name());
+                machine.found(Kind::Bounds, pc, 0, || format!("{from} uses index {index} of {bound} elements"));
+            }
+            let base = base.map_or([0; W], |base| *subgroup.get(constants, base));
+            (to, std::array::from_fn(|lane| base[lane].saturating_add(index[lane].saturating_mul(*stride))))
+        }
+        Instruction::Length { to, binding, plus, stride } => {
+            let bytes = machine.bound[usize::from(*binding)].bytes.saturating_sub(u64::from(*plus));
+            (to, [(bytes / u64::from(*stride)) as u32; W])
+        }
+        _ => return,
+    };
+    subgroup.set(*to, value, active);
 }
 
 fn fence<const W: usize>(
