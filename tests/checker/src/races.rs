@@ -69,12 +69,13 @@ pub struct Races {
 impl Access {
     /// True if it comes before all that the invocation does now.
     fn is_before(&self, lane: &Lane) -> bool {
-        if self.group != lane.group {
-            return lane.known.as_ref().is_some_and(|known| known.covers(self.group, self.lane, self.time));
-        }
-        self.lane == lane.number
-            || self.time < lane.horizon
-            || (self.lane != MANY && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch)
+        let is_known = || lane.known.as_ref().is_some_and(|known| known.covers(self.group, self.lane, self.time));
+        let is_ordered_here = || {
+            self.lane == lane.number
+                || self.time < lane.horizon
+                || (self.lane != MANY && self.subgroup == lane.subgroup && self.subgroup_epoch < lane.subgroup_epoch)
+        };
+        (self.group == lane.group && is_ordered_here()) || is_known()
     }
 }
 
