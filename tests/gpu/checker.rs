@@ -2,31 +2,28 @@
 //! non-uniform flow, or an access of what is not there.
 
 use crate::reference::Rules;
-use labelgs::gpu::{Gpu, GpuOptions};
+use crate::support::device::device;
 use labelgs::pass::KernelShape;
 use labelgs::shaders;
 use labelgs::verify::selftest;
 use labelgs_checker::program::module_hash;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
+use std::sync::LazyLock;
 
 /// Where the driver's file and the names of kernels are; `tools/soak` uses them too.
 const FOLDER: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/checker");
 
 /// Writes the driver's file, and the names of all kernels for its messages.
-fn driver() -> Vec<(&'static str, String)> {
+static DRIVER: LazyLock<Vec<(&'static str, String)>> = LazyLock::new(|| {
     let folder = Path::new(FOLDER);
     std::fs::create_dir_all(folder).expect("a folder");
-    let here = std::env::current_exe().expect("a path");
-    let library = here.with_file_name("liblabelgs_checker.so");
+    let library = std::env::current_exe().expect("a path").with_file_name("liblabelgs_checker.so");
     assert!(library.is_file(), "{} is not built", library.display());
     let write = |name: &str, text: String| -> String {
-        let path: PathBuf = folder.join(name);
-        // Tests may run at the same time: each writes a file of its own, with the same contents.
-        let new = folder.join(format!("{name}.{}", std::process::id()));
-        std::fs::write(&new, text).expect("written");
-        std::fs::rename(&new, &path).expect("renamed");
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("written");
         path.to_str().expect("UTF-8").to_owned()
     };
     let icd = serde_json::json!({ "library_path": library, "api_version": "1.3.0" });
@@ -39,12 +36,12 @@ fn driver() -> Vec<(&'static str, String)> {
     });
     let names = write("names", names);
     vec![("VK_DRIVER_FILES", icd.clone()), ("VK_ICD_FILENAMES", icd), ("LABELGS_CHECKER_NAMES", names)]
-}
+});
 
 /// Runs the test below as a process of its own, on the driver.
 fn checked(kind: &str, lanes: &str) {
     let mut command = Command::new(std::env::current_exe().expect("a path"));
-    command.args(["--exact", "gpu::checker::on_the_driver", "--ignored", "--nocapture"]).envs(driver());
+    command.args(["--exact", "gpu::checker::on_the_driver", "--ignored", "--nocapture"]).envs(DRIVER.iter().cloned());
     command.env_remove("LABELGS_DEVICE").env("LABELGS_CHECKER_TYPE", kind).env("LABELGS_CHECKER_LANES", lanes);
     let output = command.output().expect("it runs");
     let said = [output.stdout, output.stderr].concat();
@@ -66,7 +63,8 @@ fn kernels_of_a_cpu_have_no_race() {
 #[test]
 #[ignore = "run by the tests above, on the driver"]
 fn on_the_driver() {
-    let gpu = Gpu::new(&GpuOptions::from_env().expect("options")).expect("the driver works");
+    let turn = device().expect("the driver works");
+    let gpu = turn.gpu();
     assert_eq!(gpu.capabilities().name, "labelgs checker");
     let shape = KernelShape::for_device(gpu.capabilities());
     let passes = |check: selftest::Check| assert!(check.verdict.is_ok(), "{}: {:?}", check.name, check.verdict);

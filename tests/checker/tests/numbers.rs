@@ -85,6 +85,10 @@ fn vectors_and_matrices() {
     compare("vec3 v = vec3(f(a), f(b), f(c)); r = u(dot(v, v.zxy));", |a, b, c| {
         dot([f(a), f(b), f(c)], [f(c), f(a), f(b)]).to_bits()
     });
+    compare("r = u(distance(vec3(f(a), f(b), f(c)), vec3(1, 2, 3)));", |a, b, c| {
+        let d = [f(a) - 1.0, f(b) - 2.0, f(c) - 3.0];
+        dot(d, d).sqrt().to_bits()
+    });
     compare(
         "mat3 m = mat3(1, 2, 3, 4, 5, 6, 7, 8, 9); vec3 v = vec3(f(a), f(b), f(c)); r = u((m * v).y + (v * m).z);",
         |a, b, c| {

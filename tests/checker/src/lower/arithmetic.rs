@@ -247,6 +247,12 @@ impl Lowering<'_> {
                 let square = self.dot(&a, &a);
                 Ok(self.unary(Unary::Sqrt, &[square]))
             }
+            GlslStd450Op::Distance => {
+                let b = self.value(operands, 3)?;
+                let between = self.binary(Binary::FSub, &a, &b);
+                let square = self.dot(&between, &between);
+                Ok(self.unary(Unary::Sqrt, &[square]))
+            }
             GlslStd450Op::Normalize => {
                 let square = self.dot(&a, &a);
                 let length = self.unary(Unary::Sqrt, &[square])[0];
