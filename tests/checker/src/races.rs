@@ -43,8 +43,22 @@ pub enum How {
     Read,
     /// Plain write.
     Write,
+    /// Atomic read.
+    AtomicRead,
     /// Atomic read and write.
     Atomic,
+}
+
+impl How {
+    /// True if nothing is written.
+    pub fn only_reads(self) -> bool {
+        matches!(self, Self::Read | Self::AtomicRead)
+    }
+
+    /// True for atomics.
+    pub fn is_atomic(self) -> bool {
+        matches!(self, Self::AtomicRead | Self::Atomic)
+    }
 }
 
 /// How two accesses conflict.
@@ -104,7 +118,7 @@ impl Races {
             subgroup_epoch: lane.subgroup_epoch,
             time: lane.time,
             pc,
-            is_atomic: how == How::Atomic,
+            is_atomic: how.is_atomic(),
             is_coherent,
         };
         let conflicts =
@@ -116,10 +130,12 @@ impl Races {
         let hidden = is_other && is_plain && !(last.is_coherent && is_coherent);
         let hidden = hidden.then_some((shadow.write, Conflict::Incoherent));
         let unordered = |found: Option<Access>| found.map(|access| (access, Conflict::Unordered));
-        if how == How::Read {
+        if how.only_reads() {
             let old = shadow.read;
             if old.dispatch == now.dispatch && !old.is_before(lane) {
                 if old.group == now.group {
+                    // Several reads are plain if one of them is.
+                    now.is_atomic &= old.is_atomic;
                     (now.lane, now.time, now.pc) = (MANY, now.time.max(old.time), old.pc);
                 } else {
                     let others = self.readers.entry((memory, unit)).or_default();

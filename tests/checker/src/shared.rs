@@ -43,6 +43,8 @@ impl Touch {
     fn add(&mut self, lane: &Lane, is_atomic: bool, pc: u32) {
         let old = *self;
         let (epoch, subgroup_epoch) = (lane.epoch + 1, lane.subgroup_epoch);
+        // Several accesses are plain if one of them is.
+        let is_atomic = is_atomic && (old.epoch != epoch || old.is_atomic);
         *self =
             Self { epoch, subgroup_epoch, subgroup: lane.subgroup, lane: lane.number, is_wide: false, is_atomic, pc };
         if old.epoch != epoch || old.lane == lane.number {
@@ -83,12 +85,12 @@ impl SharedMemory {
     /// Notes an access. Returns an earlier one that it conflicts with.
     pub fn access(&mut self, place: u32, lane: &Lane, how: How, pc: u32) -> Option<Touch> {
         let word = &mut self.0[place as usize];
-        let is_atomic = how == How::Atomic;
+        let is_atomic = how.is_atomic();
         let mut found = Some(word.write).filter(|touch| touch.conflicts(lane, is_atomic));
-        if how == How::Read {
-            word.read.add(lane, false, pc);
+        if how.only_reads() {
+            word.read.add(lane, is_atomic, pc);
         } else {
-            found = found.or(Some(word.read).filter(|touch| touch.conflicts(lane, false)));
+            found = found.or(Some(word.read).filter(|touch| touch.conflicts(lane, is_atomic)));
             word.write.add(lane, is_atomic, pc);
         }
         found

@@ -28,7 +28,7 @@ fn plain_reads_of_words_with_atomics() {
             #ifdef FAULT
             data[index] = counters[3];
             #else
-            data[index] = atomicOr(counters[3], 0);
+            data[index] = atomicLoad(counters[3], gl_ScopeDevice, gl_StorageSemanticsNone, gl_SemanticsRelaxed);
             #endif
             if (lane == 0 && group == 2) atomicOr(counters[3], 4);
         }",

@@ -99,7 +99,7 @@ impl<const W: usize> Machine<'_, W> {
         let later = active.mask >> start << start;
         for lane in lanes(later).chain(lanes(active.mask & !later)) {
             let at = offsets[lane];
-            let how = if op == Atomic::Load { How::Read } else { How::Atomic };
+            let how = if op == Atomic::Load { How::AtomicRead } else { How::Atomic };
             let before = match place.space {
                 Space::Buffer(binding) => {
                     self.hand_over(&mut subgroup.lanes[lane], binding, at);
@@ -177,7 +177,7 @@ impl<const W: usize> Machine<'_, W> {
         let granule = program.granule;
         for part in 0..width / granule {
             let unit = byte / u64::from(granule) + u64::from(part);
-            let how = (how, how == How::Atomic || program.bindings[usize::from(binding)].is_coherent);
+            let how = (how, how.is_atomic() || program.bindings[usize::from(binding)].is_coherent);
             let found = self.races.access((memory, unit), found.shadow(unit), lane, how, pc);
             let Some((other, conflict)) = found else { continue };
             let name = lane.name();
