@@ -19,8 +19,10 @@ pub enum Kind {
     Fence,
     /// Invocations of a subgroup meet a subgroup operation without the others.
     Subgroup,
-    /// A word is read that nobody has written.
+    /// A word of shared memory is read that nobody has written.
     Unwritten,
+    /// The same of device memory.
+    Stale,
     /// An access is outside of an array or a buffer.
     Bounds,
 }
@@ -35,6 +37,7 @@ impl fmt::Display for Kind {
             Self::Fence => "fence in non-uniform flow",
             Self::Subgroup => "subgroup operation in non-uniform flow",
             Self::Unwritten => "read of an unwritten word",
+            Self::Stale => "read of unwritten device memory",
             Self::Bounds => "access out of bounds",
         })
     }

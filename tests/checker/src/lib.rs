@@ -20,7 +20,7 @@
 //! | coherence | in order, but not both through a `coherent` buffer |
 //! | fence | invocations of a workgroup run different `memoryBarrier*()` between two barriers |
 //! | subgroup | a subgroup operation that not all lanes of the subgroup reach |
-//! | unwritten | a read of shared memory, or of device memory, that nobody has written |
+//! | unwritten, stale | a read of shared memory, or of device memory, that nobody has written |
 //! | bounds | an index beyond an array, or a place beyond a buffer |
 //!
 //! A message names the kernel, the SPIR-V instruction, counted from the first label of the function, and invocations.

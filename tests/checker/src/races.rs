@@ -45,6 +45,8 @@ pub enum How {
     Write,
     /// Atomic read.
     AtomicRead,
+    /// Atomic write that may return the value before.
+    Exchange,
     /// Atomic read and write.
     Atomic,
 }
@@ -57,7 +59,7 @@ impl How {
 
     /// True for atomics.
     pub fn is_atomic(self) -> bool {
-        matches!(self, Self::AtomicRead | Self::Atomic)
+        matches!(self, Self::AtomicRead | Self::Exchange | Self::Atomic)
     }
 }
 

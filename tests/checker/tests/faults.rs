@@ -252,7 +252,7 @@ fn reads_of_unwritten_shared_words() {
 #[test]
 fn reads_of_unwritten_memory() {
     planted(
-        Kind::Unwritten,
+        Kind::Stale,
         "
         void main() {
             #ifdef FAULT

@@ -7,6 +7,7 @@
 //! | `LABELGS_CHECKER_SEED` | seed of the schedules; 0 if it is not set |
 //! | `LABELGS_CHECKER_LOG` | file to which findings, and kernels that ran, are appended |
 //! | `LABELGS_CHECKER_NAMES` | file with a hash and a name in each line, for messages |
+//! | `LABELGS_CHECKER_STALE` | if it is 1, reads of unwritten device memory are no findings: a step that fails has them |
 //! | `LABELGS_CHECKER_KEEP_GOING` | if it is 1, a finding does not lose the device |
 
 use super::lock;
@@ -23,6 +24,7 @@ pub(super) struct Options {
     pub(super) kind: vk::PhysicalDeviceType,
     pub(super) seed: u64,
     pub(super) keeps_going: bool,
+    pub(super) may_be_stale: bool,
 }
 
 fn variable(name: &str) -> Option<String> {
@@ -38,6 +40,7 @@ pub(super) fn options() -> Options {
             _ => vk::PhysicalDeviceType::DISCRETE_GPU,
         },
         seed: variable("SEED").and_then(|seed| seed.parse().ok()).unwrap_or(0),
+        may_be_stale: variable("STALE").as_deref() == Some("1"),
         keeps_going: variable("KEEP_GOING").as_deref() == Some("1"),
     });
     *OPTIONS

@@ -5,6 +5,7 @@ use super::device::{Device, Queue, State};
 use super::properties::MAX_GROUPS;
 use super::sync::{Queries, Timeline};
 use super::{chain, lock, log, object, slice};
+use crate::findings::Kind;
 use crate::machine::{Bound, Dispatch};
 use ash::vk;
 use std::sync::LazyLock;
@@ -121,7 +122,8 @@ fn dispatch(state: &mut State, with: &Bindings, groups: [u32; 3]) {
     let seed = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(state.dispatches);
     let dispatch = Dispatch { program, bound, push: &with.push, groups, lanes: options.lanes, seed };
     match dispatch.run(&mut state.memories, &mut state.races) {
-        Ok(findings) => {
+        Ok(mut findings) => {
+            findings.retain(|finding| finding.kind != Kind::Stale || !options.may_be_stale);
             findings.iter().for_each(|finding| log::report(program.hash, finding));
             state.is_lost |= !findings.is_empty() && !options.keeps_going;
         }

@@ -99,7 +99,11 @@ impl<const W: usize> Machine<'_, W> {
         let later = active.mask >> start << start;
         for lane in lanes(later).chain(lanes(active.mask & !later)) {
             let at = offsets[lane];
-            let how = if op == Atomic::Load { How::AtomicRead } else { How::Atomic };
+            let how = match op {
+                Atomic::Load => How::AtomicRead,
+                Atomic::Exchange | Atomic::Store => How::Exchange,
+                _ => How::Atomic,
+            };
             let before = match place.space {
                 Space::Buffer(binding) => {
                     self.hand_over(&mut subgroup.lanes[lane], binding, at);
@@ -199,11 +203,12 @@ impl<const W: usize> Machine<'_, W> {
         let (binding, at, width) = place;
         let Some(found) = self.memories[memory].as_ref() else { return 0 };
         let value = found.read(byte, width);
-        if found.is_written(byte) {
+        // What an exchange returns may be unused.
+        if found.is_written(byte) || how == How::Exchange {
             return value;
         }
         let (name, number) = (lane.name(), self.program.bindings[usize::from(binding)].number);
-        self.found(Kind::Unwritten, pc, u64::from(binding), || format!("{name} reads byte {at} of binding {number}"));
+        self.found(Kind::Stale, pc, u64::from(binding), || format!("{name} reads byte {at} of binding {number}"));
         POISON
     }
 
@@ -223,7 +228,7 @@ impl<const W: usize> Machine<'_, W> {
 
     fn load_shared(&mut self, shared: &mut SharedMemory, lane: &Lane, at: u32, how: How, pc: u32) -> u32 {
         let Some(value) = self.check_shared(shared, lane, at, how, pc) else { return POISON };
-        if !shared.is_written(at) {
+        if !shared.is_written(at) && how != How::Exchange {
             let name = lane.name();
             self.found(Kind::Unwritten, pc, u64::MAX, || format!("{name} reads word {at} of shared memory"));
         }
