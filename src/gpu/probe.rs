@@ -8,6 +8,7 @@ use super::hidden::HiddenFeatures;
 use super::limits::{Limits, PlanLimits};
 use crate::error::Result;
 use ash::vk;
+use std::ffi::CStr;
 
 /// Smallest device memory: one block of the allocator. A compile-only driver has none.
 const MEMORY_MIN: u64 = 64 << 20;
@@ -24,14 +25,12 @@ impl Capabilities {
         let extensions = vk_call("vkEnumerateDeviceExtensionProperties", || unsafe {
             instance.enumerate_device_extension_properties(physical)
         })?;
-        let has = |name| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let has = |name: &CStr| extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
         let is_1_3 = version >= vk::API_VERSION_1_3;
         let has_size_control = is_1_3 || has(ash::ext::subgroup_size_control::NAME);
         let hidden = HiddenFeatures::from_env()?;
         core.device_type = hidden.device_type(core.device_type);
-        let statistics = has(ash::khr::pipeline_executable_properties::NAME);
-        let has_flow = has(ash::khr::shader_subgroup_uniform_control_flow::NAME);
-        let mut features = features(instance, physical, (has_size_control, has_flow), statistics);
+        let mut features = features(instance, physical, has_size_control, has);
         hidden.features(&mut features);
         let mut eleven = vk::PhysicalDeviceVulkan11Properties::default();
         let mut twelve = vk::PhysicalDeviceVulkan12Properties::default();
@@ -93,8 +92,8 @@ fn version_parts(version: u32) -> (u32, u32, u32) {
 fn features(
     instance: &ash::Instance,
     physical: vk::PhysicalDevice,
-    (size_control, uniform_flow): (bool, bool),
-    statistics: bool,
+    size_control: bool,
+    has: impl Fn(&CStr) -> bool,
 ) -> Features {
     let mut twelve = vk::PhysicalDeviceVulkan12Features::default();
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
@@ -109,7 +108,7 @@ fn features(
     if size_control {
         all = all.push_next(&mut control);
     }
-    if uniform_flow {
+    if has(ash::khr::shader_subgroup_uniform_control_flow::NAME) {
         all = all.push_next(&mut flow);
     }
     // SAFETY: the device's version and extensions support the chained structs.
@@ -122,7 +121,7 @@ fn features(
         robust: on(core.robust_buffer_access),
         size_control: on(control.subgroup_size_control),
         full_subgroups: on(control.compute_full_subgroups),
-        statistics,
+        statistics: has(ash::khr::pipeline_executable_properties::NAME),
         narrow_storage: on(storage.storage_buffer16_bit_access),
         uniform_flow: on(flow.shader_subgroup_uniform_control_flow),
     }
@@ -281,7 +280,7 @@ fn need(what: &'static str, is_met: bool, needed: &str, found: String, reason: &
     Requirement { what, is_required: true, needed: needed.to_owned(), found, is_met, reason }
 }
 
-fn text<E>(name: std::result::Result<&std::ffi::CStr, E>) -> String {
+fn text<E>(name: std::result::Result<&CStr, E>) -> String {
     name.map_or_else(|_| String::new(), |name| name.to_string_lossy().into_owned())
 }
 
